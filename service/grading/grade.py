@@ -1,0 +1,114 @@
+"""The result of grading one submission: marks, verdicts, evidence. Every output is a pure function of it.
+
+Nothing here judges or simulates; ``judge.py`` and ``grader.py`` make grades, reports and the store keep them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+
+from sim.recording import Image, Pose, Recording, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """How often a classifier was right: n pictures, ``value`` with its 95 % Wilson interval, and who was taken for whom.
+
+    ``confusion`` maps (truth, answer) to a count; the answer is None where none was given or it could not be read.
+    """
+
+    value: float
+    low: float
+    high: float
+    n: int
+    labels: tuple[str, ...]
+    confusion: tuple[tuple[str, str | None, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One picture the robot sent, what it showed and what was answered."""
+
+    image: Image
+    truth: str
+    answer: str | None
+    scenario: str
+    trial: int  # index into the grade's trials
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """When and where a criterion was decided, so that a report can point at it."""
+
+    trial: int  # index into the grade's trials
+    passed: bool
+    message: str
+    t: float | None = None
+    pose: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionResult:
+    """One marked line."""
+
+    id: str
+    title: str
+    marks: Decimal
+    max_marks: Decimal
+    message: str  # a sentence for the student: what was expected, what happened
+    visibility: str = "visible"
+    evidence: tuple[Evidence, ...] = ()
+    accuracy: Accuracy | None = None
+    sights: tuple[Sight, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """One run of a scenario at one pose, noise level and seed."""
+
+    scenario: str
+    index: int
+    seed: int
+    light_noise: float
+    motor_noise: float
+    visibility: str
+    recording: Recording
+
+    @property
+    def verdict(self) -> Verdict:
+        return self.recording.verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Grade:
+    """The marks of one job. ``walls`` says which layers stood around the student's code."""
+
+    assignment: str
+    assignment_title: str
+    assignment_version: str  # content hash
+    submission: str  # content hash
+    student: str
+    criteria: tuple[CriterionResult, ...]
+    trials: tuple[TrialResult, ...]
+    walls: str
+    grader_version: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def marks(self) -> Decimal:
+        return sum((result.marks for result in self.criteria), Decimal(0))
+
+    @property
+    def max_marks(self) -> Decimal:
+        return sum((result.max_marks for result in self.criteria), Decimal(0))
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict of the first faulty trial, ``finished`` if there is none."""
+        return next((t.verdict for t in self.trials if t.verdict is not Verdict.FINISHED), Verdict.FINISHED)
+
+    @property
+    def accuracy(self) -> Accuracy | None:
+        """The first classification criterion's accuracy."""
+        return next((result.accuracy for result in self.criteria if result.accuracy is not None), None)

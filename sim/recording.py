@@ -1,0 +1,198 @@
+"""What happened in one trial, tick by tick and word by word, and how it ended.
+
+A recording is plain data: it knows neither students nor marks, and nothing in it is read back into a simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
+SECOND = 3_000_000
+TICK = SECOND // 30
+MILLISECOND = SECOND // 1000
+#: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
+SENSOR_SIDE = 20
+
+
+class Verdict(StrEnum):
+    """How a trial ended and whose fault it was."""
+
+    FINISHED = "finished"
+    PROGRAM_ERROR = "program_error"
+    RESPONDER_ERROR = "responder_error"
+    PROTOCOL_ERROR = "protocol_error"
+    TIME_LIMIT = "time_limit"
+    CPU_LIMIT = "cpu_limit"
+    MEMORY_LIMIT = "memory_limit"
+    OUTPUT_LIMIT = "output_limit"
+    STALLED = "stalled"
+    SANDBOX_VIOLATION = "sandbox_violation"
+    ASSIGNMENT_ERROR = "assignment_error"
+    HOST_ERROR = "host_error"
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the robot is: mm from the lower left corner, degrees anticlockwise from +x."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ticks:
+    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows."""
+
+    x: Floats
+    y: Floats
+    heading: Floats  # degrees, unwrapped
+    left_position: Floats  # encoder degrees
+    right_position: Floats
+    left_sums: Integers  # (n, 3): R, G, B summed over the sensor's pixels
+    right_sums: Integers
+    ultrasonic: Floats  # mm
+    gyro: Floats  # degrees, clockwise
+    left_pixels: int = 305  # how many pixels the sums are over
+    right_pixels: int = 305
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def t(self) -> Floats:
+        """Seconds, shape (n,)."""
+        return np.arange(1, len(self.x) + 1) / 30.0
+
+    @property
+    def left_rgb(self) -> Floats:
+        """Mean R, G, B of the left light sensor, 0..255, shape (n, 3)."""
+        return self.left_sums / self.left_pixels
+
+    @property
+    def right_rgb(self) -> Floats:
+        """Mean R, G, B of the right light sensor, 0..255, shape (n, 3)."""
+        return self.right_sums / self.right_pixels
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Something printed or spoken, and when (seconds)."""
+
+    t: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One text that crossed the bridge.
+
+    ``t`` is when it was sent; ``delivered`` when it arrived, None if it never did. ``reply_to`` is the index, in
+    the recording's messages, of the text that it answers. ``note`` says what befell it: lost, duplicated, malformed.
+    """
+
+    t: float
+    sender: Literal["robot", "responder"]
+    text: str
+    delivered: float | None
+    reply_to: int | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What both light sensors saw when the program printed IMG_DATA, and where the robot was.
+
+    ``left`` and ``right`` are the raw RGBA bytes of side x side pixels, row-major, top row first;
+    ``message`` is the index of the message that carried it.
+    """
+
+    t: float
+    tick: int
+    pose: Pose
+    left: bytes
+    right: bytes
+    message: int
+    truth: str | None = None  # what the floor has under the left sensor, where it has a label
+    side: int = SENSOR_SIDE
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call inside the responder (parser, agent, logger, predict), for the sequence diagram; never marked."""
+
+    message: int  # index of the message being answered
+    depth: int
+    caller: str  # responder, agent ...
+    callee: str  # parser, agent, logger, or the name bound to a network
+    argument: str  # shortened repr
+    result: str  # shortened repr
+
+
+@dataclass(frozen=True, slots=True)
+class Datum:
+    """One datalog line: ``Light_left: 42 1.5`` has name Light_left, value 42.0, simtime 1.5."""
+
+    t: float
+    name: str
+    value: float
+    simtime: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """The robot's body began to touch a wall or an obstacle."""
+
+    t: float
+    what: str
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one."""
+
+    t: float
+    verdict: Verdict
+    who: Literal["program", "responder", "bridge", "host", "assignment"]
+    message: str
+    line: int | None = None
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message."""
+
+    background: str
+    start: Pose
+    end: Pose
+    end_t: float
+    ticks: Ticks
+    verdict: Verdict
+    sha256: str
+    printed: tuple[Line, ...] = ()
+    spoken: tuple[Line, ...] = ()
+    messages: tuple[Message, ...] = ()
+    images: tuple[Image, ...] = ()
+    calls: tuple[Call, ...] = ()
+    datalog: tuple[Datum, ...] = ()
+    image_log: tuple[tuple[str, str, int], ...] = ()  # side, csv, tick: what ``image_data left|right|both`` collects
+    touches: tuple[Touch, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    robot: str = "Default_Robot"
+    pen: tuple[tuple[int, bool], ...] = ()  # (tick, down) whenever the pen changes
+    responder_output: str = ""
+    responder_log: str = ""  # what the responder wrote to logger.txt
+    walls: str = "process limits only"
+    notes: tuple[str, ...] = field(default=())
