@@ -1,0 +1,156 @@
+"""Walls and obstacles in PyBullet: what an ultrasonic ray meets, and whether the robot's body touches something.
+
+Nothing here stops the robot: in free motion the drive's equations alone decide where it goes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.bullet import Client, pb
+from sim.camera import HEIGHT, WIDTH
+from sim.robot import Robot
+from sim.trigonometry import round_half_up, sincos
+
+Rectangle = tuple[float, float, float, float]  # x, y of the lower left corner, width, height
+
+_METRE = 0.001
+_RANGE = 2550.0  # mm
+_RAYS = tuple(math.radians(angle) for angle in (0, 7, -7, 14, -14, 21, -21))
+_HORIZONTAL, _VERTICAL = 2, 4  # collision groups of the edges that run along x and along y
+_WALL = 100.0  # thickness, mm; only the inner face matters
+
+
+class Arena:
+    """The walls round the floor and a set of obstacles; has no state that a trial could change."""
+
+    def __init__(self, obstacles: tuple[Rectangle, ...] = ()) -> None:
+        self._client = Client()
+        self.obstacles = obstacles
+        floor: Rectangle = (0, 0, WIDTH, HEIGHT)
+        self._edges = {
+            _HORIZONTAL: self._add_edges(
+                [
+                    (x, level, x + width, level)
+                    for x, y, width, height in (floor, *obstacles)
+                    for level in (y, y + height)
+                ],
+                _HORIZONTAL,
+            ),
+            _VERTICAL: self._add_edges(
+                [
+                    (level, y, level, y + height)
+                    for x, y, width, height in (floor, *obstacles)
+                    for level in (x, x + width)
+                ],
+                _VERTICAL,
+            ),
+        }
+        walls = {
+            "left wall": (-_WALL, -_WALL, _WALL, HEIGHT + 2 * _WALL),
+            "right wall": (WIDTH, -_WALL, _WALL, HEIGHT + 2 * _WALL),
+            "bottom wall": (-_WALL, -_WALL, WIDTH + 2 * _WALL, _WALL),
+            "top wall": (-_WALL, HEIGHT, WIDTH + 2 * _WALL, _WALL),
+        }
+        blocks = walls | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
+        self._blocks = [(name, box, self._add_block(box)) for name, box in blocks.items()]
+        self._bodies: dict[str, int] = {}
+
+    def close(self) -> None:
+        self._client.close()
+
+    def distance(self, x: float, y: float, heading: float, forward: float) -> float:
+        """What the ultrasonic sensor reads, mm, 0..2550, ``forward`` mm in front of the axle; heading in radians.
+
+        Seven rays within 21 degrees; an edge counts if its direction and the central heading (wrapped to one turn)
+        differ by more than 40 and less than 140 degrees (robolab section 4).
+        """
+        degrees = math.degrees(heading) % 360
+        groups = 0
+        for direction, group in ((0, _HORIZONTAL), (90, _VERTICAL)):
+            incidence = abs(direction - degrees)
+            if incidence > 180:
+                incidence = 360 - incidence
+            if 40 < incidence < 140:
+                groups |= group
+        if not groups:
+            return _RANGE
+        sine, cosine = sincos(heading)
+        start = ((x + cosine * forward) * _METRE, (y + sine * forward) * _METRE, 0.0)
+        ends = []
+        for angle in _RAYS:
+            ray_sine, ray_cosine = sincos(heading + angle)
+            reach = _RANGE * _METRE
+            ends.append((start[0] + ray_cosine * reach, start[1] + ray_sine * reach, 0.0))
+        hits = pb.rayTestBatch([start] * len(ends), ends, collisionFilterMask=groups, physicsClientId=self._client.id)
+        nearest = min(hit[2] for hit in hits)
+        return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
+
+    def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
+        """The names of the walls and obstacles that the robot's body touches or overlaps."""
+        near = [(name, block) for name, box, block in self._blocks if _gap(box, x, y) <= robot.reach]
+        if not near:
+            return ()
+        body = self._body(robot)
+        half = sincos(heading / 2)
+        pb.resetBasePositionAndOrientation(
+            body, (x * _METRE, y * _METRE, 0), (0, 0, half[0], half[1]), physicsClientId=self._client.id
+        )
+        return tuple(
+            name
+            for name, block in near
+            if any(point[8] <= 0 for point in pb.getClosestPoints(body, block, 0.0, physicsClientId=self._client.id))
+        )
+
+    def _body(self, robot: Robot) -> int:
+        if robot.name not in self._bodies:
+            length = robot.front - robot.back
+            shape = pb.createCollisionShape(
+                pb.GEOM_BOX,
+                halfExtents=[length / 2 * _METRE, robot.half_width * _METRE, 0.03],
+                collisionFramePosition=[(robot.front + robot.back) / 2 * _METRE, 0, 0],
+                physicsClientId=self._client.id,
+            )
+            body = pb.createMultiBody(0, shape, physicsClientId=self._client.id)
+            pb.setCollisionFilterGroupMask(body, -1, 1, 1, physicsClientId=self._client.id)
+            self._bodies[robot.name] = body
+        return self._bodies[robot.name]
+
+    def _add_block(self, box: Rectangle) -> int:
+        x, y, width, height = (value * _METRE for value in box)
+        shape = pb.createCollisionShape(
+            pb.GEOM_BOX, halfExtents=[width / 2, height / 2, 0.1], physicsClientId=self._client.id
+        )
+        body: int = pb.createMultiBody(
+            0, shape, basePosition=[x + width / 2, y + height / 2, 0], physicsClientId=self._client.id
+        )
+        pb.setCollisionFilterGroupMask(body, -1, 1, 1, physicsClientId=self._client.id)
+        return body
+
+    def _add_edges(self, lines: list[Rectangle], group: int) -> int:
+        """Upright sheets without thickness, so that a ray's hit is the edge itself."""
+        vertices: list[list[float]] = []
+        indices: list[int] = []
+        for x1, y1, x2, y2 in lines:
+            first = len(vertices)
+            vertices += [
+                [x * _METRE, y * _METRE, z]
+                for x, y, z in ((x1, y1, -0.5), (x2, y2, -0.5), (x2, y2, 0.5), (x1, y1, 0.5))
+            ]
+            indices += [first, first + 1, first + 2, first, first + 2, first + 3]
+        shape = pb.createCollisionShape(
+            pb.GEOM_MESH,
+            vertices=vertices,
+            indices=indices,
+            flags=pb.GEOM_FORCE_CONCAVE_TRIMESH,
+            physicsClientId=self._client.id,
+        )
+        body: int = pb.createMultiBody(0, shape, physicsClientId=self._client.id)
+        pb.setCollisionFilterGroupMask(body, -1, group, -1, physicsClientId=self._client.id)
+        return body
+
+
+def _gap(box: Rectangle, x: float, y: float) -> float:
+    """Distance from a point to a rectangle, mm."""
+    left, bottom, width, height = box
+    return math.hypot(max(left - x, 0, x - left - width), max(bottom - y, 0, y - bottom - height))

@@ -1,0 +1,28 @@
+"""The printed floors that the robot drives over: what they look like, and what is where on them.
+
+Pictures only: how a light sensor sees them is the camera's, and what a flag asks for is the flags'.
+"""
+
+from sim.backgrounds.drawing import HEIGHT, LABEL_GREYS, WIDTH
+from sim.backgrounds.floors import (
+    OBSTACLE_PRESETS,
+    SHAPES,
+    Floor,
+    FloorLabel,
+    floor,
+    floor_from_picture,
+    names,
+)
+
+__all__ = [
+    "HEIGHT",
+    "LABEL_GREYS",
+    "OBSTACLE_PRESETS",
+    "SHAPES",
+    "WIDTH",
+    "Floor",
+    "FloorLabel",
+    "floor",
+    "floor_from_picture",
+    "names",
+]

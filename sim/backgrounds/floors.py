@@ -1,0 +1,178 @@
+"""The floors by name: picture, default pose, labels and obstacles, as the course's simulator has them.
+
+The drawing itself is ``drawing.py``; what a flag with an unknown name means is decided where flags are read.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from sim.backgrounds import drawing
+from sim.errors import UsageError
+from sim.recording import Pose
+
+Obstacle = tuple[float, float, float, float]
+_Picture = Callable[[], NDArray[np.uint8]]
+
+#: The six shapes of Simple_Shapes, in the order of the codes 0 to 5 that the course gives them.
+SHAPES = (
+    "square",
+    "right facing triangle",
+    "left facing triangle",
+    "downwards facing triangle",
+    "upwards facing triangle",
+    "diamond",
+)
+
+#: What the flag ``-o`` offers: x, y, width, height of each obstacle, mm, lower left corner first.
+OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
+    {
+        "None": (),
+        "Central_post": ((900, 500, 200, 200),),
+        "Square_posts": (
+            (500, 200, 100, 100),
+            (500, 700, 100, 100),
+            (1500, 200, 100, 100),
+            (1500, 700, 100, 100),
+        ),
+        "Wall": ((1500, 200, 200, 800),),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FloorLabel:
+    """Where the left light sensor's centre sees a named thing: lower left corner and size, world mm."""
+
+    label: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def holds(self, x: float, y: float) -> bool:
+        return self.x <= x <= self.x + self.width and self.y <= y <= self.y + self.height
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A background. ``picture`` is read-only, shape (1143, 2362, 3); its row 0 is at world y = 1143."""
+
+    name: str
+    picture: NDArray[np.uint8]
+    default_pose: Pose
+    labels: tuple[FloorLabel, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def label_at(self, x: float, y: float) -> str | None:
+        """What a left light sensor with its centre at (x, y) mm sees, if that has a name."""
+        return next((label.label for label in self.labels if label.holds(x, y)), None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    pose: Pose
+    picture: _Picture
+    unlabelled: _Picture | None = None
+    labels: tuple[FloorLabel, ...] = ()
+
+
+def _painted(painter: drawing.Painter, background: drawing.Colour = drawing.WHITE) -> Callable[[], NDArray[np.uint8]]:
+    return functools.partial(drawing.paint, painter, background)
+
+
+def _shape_labels() -> tuple[FloorLabel, ...]:
+    """Within 10 mm of where the course stands the left sensor: the shape is then inside the sensor's view."""
+    rows = ((920.0, SHAPES), (720.0, tuple(SHAPES[code] for code in (1, 5, 0, 2))))
+    return tuple(
+        FloorLabel(name, 230.0 + 80 * column - 10, y - 10, 20.0, 20.0)
+        for y, shapes in rows
+        for column, name in enumerate(shapes)
+    )
+
+
+_PLANS: Mapping[str, _Plan] = MappingProxyType(
+    {
+        "Empty_Map": _Plan(Pose(100, 800, 0), _painted(drawing.nothing)),
+        "Loop": _Plan(Pose(500, 500, 90), _painted(drawing.loop)),
+        "Two_shapes": _Plan(Pose(200, 500, 90), _painted(drawing.two_shapes)),
+        "Grey_bands": _Plan(Pose(150, 500, 0), _painted(drawing.grey_bands)),
+        "Linear_grey": _Plan(Pose(200, 50, 90), drawing.linear_grey),
+        "Radial_grey": _Plan(Pose(100, 400, 0), lambda: drawing.radial(inner=drawing.WHITE, outer=drawing.BLACK)),
+        "Radial_red": _Plan(Pose(100, 400, 0), lambda: drawing.radial(inner=(255, 80, 80), outer=(80, 0, 0))),
+        "Coloured_bands": _Plan(Pose(100, 800, 0), _painted(drawing.coloured_bands)),
+        "Rainbow_bands": _Plan(Pose(100, 800, 0), _painted(drawing.rainbow_bands)),
+        "Grey_and_black": _Plan(Pose(400, 700, 90), _painted(drawing.grey_and_black)),
+        "Lollipop": _Plan(Pose(750, 375, -180), _painted(drawing.lollipop, drawing.grey(211))),
+        "Square": _Plan(Pose(550, 300, -90), _painted(drawing.square)),
+        "Line_Following_Test": _Plan(Pose(141, 125, 90), drawing.line_following_test),
+        "Sensor_Diameter_Test": _Plan(Pose(550, 450, 90), _painted(drawing.sensor_diameter_test)),
+        "Simple_Shapes": _Plan(
+            Pose(800, 400, 0),
+            _painted(drawing.simple_shapes_with_labels),
+            _painted(drawing.simple_shapes),
+            _shape_labels(),
+        ),
+    }
+)
+
+
+def names() -> tuple[str, ...]:
+    """Every floor that ``floor`` knows, in the order of the course's menu."""
+    return tuple(_PLANS)
+
+
+@functools.cache
+def floor(name: str, *, labels: bool = True) -> Floor:
+    """The floor called ``name``; with ``labels=False`` drawn without the grey patches that tell the answer.
+
+    Raises UsageError for a name that no floor has, and offers the names nearest to it.
+    """
+    if name not in _PLANS:
+        raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
+    plan = _PLANS[name]
+    draw = plan.picture if labels or plan.unlabelled is None else plan.unlabelled
+    return Floor(name, _read_only(draw()), plan.pose, plan.labels)
+
+
+def floor_from_picture(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
+    """A floor of the instructor's own, from the bytes of a PNG or JPEG file of 2362 x 1143 pixels.
+
+    Raises UsageError when the bytes are no such picture. See-through parts show white.
+    """
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
+            if image.size != (drawing.WIDTH, drawing.HEIGHT):
+                raise UsageError(
+                    f"The background picture {name!r} is {image.width} x {image.height} pixels; "
+                    f"it must be {drawing.WIDTH} x {drawing.HEIGHT}, one a millimetre."
+                )
+            paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
+            picture = np.asarray(Image.alpha_composite(paper, image.convert("RGBA")).convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise UsageError(f"The background picture {name!r} cannot be read as PNG or JPEG.") from error
+    return Floor(name, _read_only(picture), default_pose)
+
+
+def _suggestion(name: str) -> str:
+    """The end of a sentence that names the floors nearest to ``name``, or all."""
+    by_lower = {known.lower(): known for known in _PLANS}
+    near = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
+    if near:
+        return "did you mean " + " or ".join(by_lower[match] for match in near) + "?"
+    return "there are " + ", ".join(_PLANS) + "."
+
+
+def _read_only(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    fixed = np.ascontiguousarray(picture)
+    fixed.setflags(write=False)
+    return fixed

@@ -1,0 +1,134 @@
+"""The course's drive: two wheels with a speed, a command and an encoder, advanced a thirtieth of a second at a time.
+
+These are the original's equations, quirks included, because student programs are tuned to them; contact with walls
+is not decided here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from sim.chance import Stream
+from sim.robot import MAX_SPEED, Robot
+from sim.trigonometry import round_half_up, sincos
+
+Command = Literal["", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct", "reset"]
+TWO_PI = 2 * math.pi
+
+
+@dataclass(slots=True)
+class Wheel:
+    """One motor and its wheel: degrees and degrees per second, ``time_sp`` in seconds."""
+
+    position: float = 0.0
+    speed: float = 0.0
+    speed_sp: float = 0.0
+    position_sp: float = 0.0
+    time_sp: float = 0.0
+    polarity: str = "normal"
+    state: str = ""
+    command: str = ""
+    _time_target: float = 0.0
+    _position_target: float = 0.0
+
+    def run(self, command: str, clock: int) -> None:
+        """Take a command between two ticks; ``clock`` counts the ticks that have passed."""
+        self.command = command
+        if command == "run-timed":
+            self._time_target = clock + self.time_sp * 30
+            self.state = "running"
+        elif command == "run-to-rel-pos":
+            self._position_target = self.position + self.position_sp
+            if self._position_target != self.position:
+                self.state = "running"
+        elif command == "run-to-abs-pos":
+            self._position_target = self.position_sp
+            if self._position_target != self.position:
+                self.state = "running"
+        elif command == "run-forever":
+            self.state = "running"
+
+    def change_speed(self, most: float, noise: float) -> None:
+        """Move the speed towards its set point. Only speeds that are not negative are rounded, capped and noisy."""
+        if self.speed < self.speed_sp:
+            self.speed = min(self.speed + most, self.speed_sp)
+        elif self.speed > self.speed_sp:
+            self.speed = max(self.speed - most, self.speed_sp)
+        noisy = self.speed + noise
+        if noisy >= 0:
+            self.speed = min(round_half_up(noisy), MAX_SPEED)
+
+    def travel(self, clock: int) -> float:
+        """Wheel degrees moved in this tick. A move to a position counts on the encoder twice, as in the original."""
+        degrees = self.speed / 30
+        sign = -1.0 if self.polarity == "inversed" else 1.0
+        if self.command == "run-forever" or (self.command == "run-timed" and clock < self._time_target):
+            self.position += degrees
+            return sign * degrees
+        if self.command in ("run-to-rel-pos", "run-to-abs-pos"):
+            backwards = self.position_sp < 0
+            if backwards:
+                degrees = -degrees
+            self.position += degrees
+            passed = self.position < self._position_target if backwards else self.position > self._position_target
+            if passed:
+                self.state = ""
+                return 0.0
+            self.position += degrees
+            return sign * degrees
+        self.state = ""
+        return 0.0
+
+
+@dataclass(slots=True)
+class Drive:
+    """Pose and wheels. ``heading`` is radians, wrapped from above only; ``turns`` counts the wraps."""
+
+    robot: Robot
+    x: float
+    y: float
+    heading: float
+    noise: float = 0.0
+    left_chance: Stream | None = None
+    right_chance: Stream | None = None
+    turns: int = 0
+    gyro_angle: float = 0.0  # degrees, clockwise
+    gyro_rate: float = 0.0
+    left: Wheel = field(default_factory=Wheel)
+    right: Wheel = field(default_factory=Wheel)
+
+    @property
+    def heading_degrees(self) -> float:
+        """Unwrapped."""
+        return math.degrees(self.heading) + 360.0 * self.turns
+
+    def tick(self, clock: int) -> None:
+        """Advance a thirtieth of a second: speeds, travel, then the pose by explicit Euler with the old heading."""
+        most = self.robot.acceleration
+        self.left.change_speed(most, self._noise(self.left_chance, clock))
+        self.right.change_speed(most, self._noise(self.right_chance, clock))
+        mm_per_degree = math.pi * self.robot.wheel_diameter / 360
+        left = self.left.travel(clock) * mm_per_degree
+        right = self.right.travel(clock) * mm_per_degree
+        if left == 0.0 and right == 0.0:
+            self.gyro_rate = 0.0
+            return
+        sine, cosine = sincos(self.heading)
+        middle = (left + right) / 2
+        self.x += middle * cosine
+        self.y += middle * sine
+        turned = (right - left) / self.robot.wheel_spacing
+        self.heading += turned
+        if self.heading > TWO_PI:
+            self.heading -= TWO_PI
+            self.turns += 1
+        degrees = math.degrees(turned)
+        self.gyro_angle -= degrees
+        self.gyro_rate = -degrees * 30
+
+    def _noise(self, chance: Stream | None, clock: int) -> float:
+        if self.noise <= 0 or chance is None:
+            return 0.0
+        return chance.between(-self.noise, self.noise, clock)

@@ -1,0 +1,94 @@
+"""The robots that RoboLab offers: dimensions, where the sensors sit, how quickly a wheel changes speed.
+
+Local coordinates have x to the robot's right and y forward, from the middle of the axle; lengths are mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from sim.errors import UsageError
+
+#: Degrees per second that a wheel of weight 1 gains in a second.
+ACCELERATION = 5000.0
+MAX_SPEED = 1050.0  # wheel degrees per second at 100 %
+
+
+@dataclass(frozen=True, slots=True)
+class LightSensor:
+    """A round window on the floor, ``diameter`` pixels wide."""
+
+    x: float
+    y: float
+    diameter: int = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """What is bolted together. ``weight`` divides the acceleration; 0 means that speeds change at once."""
+
+    name: str = "Default_Robot"
+    wheel_diameter: float = 56.0
+    wheel_spacing: float = 180.0
+    weight: float = 6.0
+    left_light: LightSensor = LightSensor(-20, 30)
+    right_light: LightSensor = LightSensor(20, 30)
+    ultrasonic_y: float = 20.0
+    front: float = 45.0
+    back: float = -120.0
+    half_width: float = 100.0
+
+    @property
+    def acceleration(self) -> float:
+        """The most a wheel's speed can change in a tick, degrees per second."""
+        return ACCELERATION / self.weight / 30 if self.weight else math.inf
+
+    @property
+    def reach(self) -> float:
+        """The farthest any point of the body is from the middle of the axle, mm."""
+        return math.hypot(max(self.front, -self.back), self.half_width)
+
+
+_DEFAULT = Robot()
+_SMALL = Robot(
+    name="Small_Robot",
+    wheel_diameter=28,
+    wheel_spacing=90,
+    weight=0,
+    left_light=LightSensor(-10, 15, 10),
+    right_light=LightSensor(10, 15, 10),
+    ultrasonic_y=10,
+    front=22.5,
+    back=-60,
+    half_width=50,
+)
+
+ROBOTS: Mapping[str, Robot] = MappingProxyType(
+    {
+        "Default_Robot": _DEFAULT,
+        "Small_Robot": _SMALL,
+        "Small_Robot_Wide_Eyes": replace(
+            _SMALL,
+            name="Small_Robot_Wide_Eyes",
+            left_light=LightSensor(-30, 15, 10),
+            right_light=LightSensor(30, 15, 10),
+        ),
+        "Sensor_Diameter_Config": replace(
+            _DEFAULT,
+            name="Sensor_Diameter_Config",
+            left_light=LightSensor(-20, 30, 30),
+            right_light=LightSensor(20, 30, 10),
+        ),
+    }
+)
+
+
+def robot(name: str) -> Robot:
+    """The robot called ``name``. Raises UsageError for a name that RoboLab does not have."""
+    try:
+        return ROBOTS[name]
+    except KeyError:
+        raise UsageError(f"there is no robot called {name!r}; expected one of {', '.join(ROBOTS)}") from None
