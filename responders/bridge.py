@@ -1,0 +1,400 @@
+"""Runs one trial: the robot program, its world and its responder, in lock-step simulated time.
+
+The bridge owns the time and believes no child: programs ask and tell, and it alone moves the world and writes down
+what happened. Marks are none of its business.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import stat
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NoReturn
+
+from responders import messages, wire
+from responders.channel import Channel
+from responders.conversation import Code, Conversation, Responder, ResponderOrder, error_fault
+from responders.sandbox.manager import WALLS, Child, ChildLimits, ChildStopped, Sandboxes
+from sim.arena import Arena
+from sim.backgrounds import Floor
+from sim.camera import LightCamera
+from sim.chance import Stream
+from sim.drive import Wheel
+from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Recording, Verdict
+from sim.robot import Robot
+from sim.world import Chain, Noise, World
+
+Preamble = Literal["none", "imports", "preloaded"]
+
+_READ = 10 * MILLISECOND
+_WORDS_A_MINUTE = 130
+#: How often a program may act without waiting; its own process counts too, and can name the line.
+_FREE_ACTS = 100_100
+_LOG_FILE = "logger.txt"
+_LOG_BYTES = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramOrder:
+    """A robot program and what it may use."""
+
+    code: Code
+    preamble: Preamble
+    limits: ChildLimits
+    output_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class TrialOrder:
+    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
+
+    program: ProgramOrder
+    responder: ResponderOrder | None
+    collaborative: bool
+    floor: Floor
+    robot: Robot
+    pose: Pose
+    noise: Noise
+    channel: Channel
+    seconds: float
+    seed: int
+    pen_down: bool = False
+
+
+class _Cut(Exception):
+    """The trial ends here."""
+
+    def __init__(self, fault: Fault) -> None:
+        super().__init__(fault.message)
+        self.fault = fault
+
+
+class _Bridge:
+    def __init__(
+        self,
+        order: TrialOrder,
+        arena: Arena,
+        camera: LightCamera,
+        child: Child,
+        responder: Responder | None,
+        pulse: Callable[[], None],
+    ) -> None:
+        self._order = order
+        self._child = child
+        self._pulse = pulse
+        self.now = 0
+        self.chain = Chain()
+        self.world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, self.chain)
+        self.conversation = Conversation(order.channel, order.seed, self.chain, responder)
+        self.printed: list[Line] = []
+        self.spoken: list[Line] = []
+        self.images: list[Image] = []
+        self.image_log: list[tuple[str, str, int]] = []
+        self._limit = round(order.seconds * SECOND)
+        self._said_until = 0
+        self._arrived: list[Any] = []
+        self._free_acts = 0
+        self._output_left = order.program.output_bytes
+
+    def run(self) -> Fault | None:
+        """Serve the program until it ends. What cut it short or went wrong, if anything."""
+        order = self._order
+        try:
+            self._child.send(
+                {
+                    "name": order.program.code.name,
+                    "text": order.program.code.text,
+                    "preamble": order.program.preamble,
+                    "seed": Stream(order.seed, "program").integer(0),
+                }
+            )
+            while True:
+                frame = self._child.receive(wire.ROBOT, self._pulse)
+                if frame["do"] == "end":
+                    return None if frame["error"] is None else error_fault(frame["error"], self.now, "program")
+                self._serve(frame)
+        except ChildStopped as stop:
+            return Fault(
+                self.now / SECOND,
+                stop.verdict,
+                "program",
+                f"the program was stopped: {stop.message}",
+                stop.line,
+            )
+        except _Cut as cut:
+            return cut.fault
+
+    def _serve(self, frame: wire.Frame) -> None:
+        match frame["do"]:
+            case "read":
+                self._read(frame["what"], frame["times"])
+            case "wait":
+                self._advance(frame["units"])
+                self._reply(None)
+            case "print":
+                self._print(frame["text"])
+            case "motor":
+                self._set_motor(frame)
+            case "motor_state":
+                self._free_act()
+                self._reply_wheel(frame["port"])
+            case "paid_motor":
+                self._advance(_READ)
+                self._reply_wheel(frame["port"])
+            case "until":
+                self._until(frame)
+            case "say":
+                self._say(frame["text"])
+            case "until_said":
+                while self.now < self._said_until:
+                    self._advance(_READ)
+                self._reply(None)
+            case "stuck":
+                self._never_waits(frame["line"])
+
+    def _advance(self, units: int) -> None:
+        """Let simulated time pass; a tick that is due at the very end of a wait still runs."""
+        self._free_acts = 0
+        end = self.now + units
+        last = min(end, self._limit)
+        due = (self.world.clock + 1) * TICK
+        while due <= last:
+            self.now = due
+            self._arrived += self.conversation.deliver(due)
+            self.world.tick()
+            due += TICK
+            if self.world.clock % 3000 == 0:
+                self._pulse()
+        if end > self._limit:
+            self.now = self._limit
+            sentence = f"the program was still running after {self._order.seconds:g} seconds of simulated time"
+            raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
+        self.now = end
+
+    def _reply(self, value: Any) -> None:
+        answer: dict[str, Any] = {"t": self.now, "v": value}
+        if self._arrived:
+            answer["m"] = self._arrived
+            self._arrived = []
+        self._child.send(answer)
+
+    def _read(self, what: str, times: int) -> None:
+        self._advance(times * _READ)
+        world = self.world
+        value: float | list[float]
+        if what == "left":
+            pixels = world.pixels[0]
+            value = [total / pixels for total in world.left_sums]
+        elif what == "right":
+            pixels = world.pixels[1]
+            value = [total / pixels for total in world.right_sums]
+        elif what == "ultrasonic":
+            value = world.ultrasonic
+        else:
+            value = [world.drive.gyro_angle, world.drive.gyro_rate]
+        self.chain.add(what, self.now, repr(value).encode())
+        self._reply(value)
+
+    def _wheel(self, port: str) -> Wheel:
+        return self.world.drive.left if port == "outB" else self.world.drive.right
+
+    def _reply_wheel(self, port: str) -> None:
+        wheel = self._wheel(port)
+        value = {
+            "position": wheel.position,
+            "position_sp": wheel.position_sp,
+            "speed": wheel.speed,
+            "speed_sp": wheel.speed_sp,
+            "state": wheel.state,
+            "polarity": wheel.polarity,
+        }
+        self.chain.add(port, self.now, repr(value).encode())
+        self._reply(value)
+
+    def _set_motor(self, frame: wire.Frame) -> None:
+        self._free_act()
+        wheel = self._wheel(frame["port"])
+        for name in ("speed_sp", "position_sp", "position", "time_sp", "polarity"):
+            if name in frame:
+                value = frame[name]
+                setattr(wheel, name, value[:20] if isinstance(value, str) else float(value))
+        if "command" in frame:
+            wheel.run(frame["command"], self.world.clock)
+
+    def _until(self, frame: wire.Frame) -> None:
+        """Look every 10 ms, first at once; a time-out is over when strictly exceeded."""
+        wheel = self._wheel(frame["port"])
+        wanted = frame["state"] == "running"
+        began = self.now
+        while (wheel.state == "running") is not wanted:
+            self._advance(_READ)
+            if frame["timeout"] is not None and self.now - began > frame["timeout"]:
+                self._reply(False)
+                return
+        self._free_acts = 0
+        self._reply(True)
+
+    def _print(self, text: str) -> None:
+        self._free_act()
+        self._output_left -= len(text.encode()) + 1
+        if self._output_left < 0:
+            sentence = f"the program printed more than {self._order.program.output_bytes} bytes"
+            raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
+        self.chain.add("print", self.now, text.encode())
+        kind = messages.kind(text)
+        if kind == "log image":
+            self._log_image(text)
+            return
+        self.printed.append(Line(self.now / SECOND, text))
+        if self._order.collaborative and kind == "py":
+            self.conversation.send(text, self.now)
+        elif self._order.collaborative and kind == "image":
+            self._send_image()
+
+    def _send_image(self) -> None:
+        left, right = self.world.images()
+        self._output_left -= len(left) + len(right)
+        where = self.world.left_look
+        number = self.conversation.send(messages.image_message(left, right), self.now)
+        self.images.append(
+            Image(
+                self.now / SECOND,
+                self.world.clock,
+                self.world.pose,
+                left,
+                right,
+                number,
+                self._order.floor.label_at(where.x, where.y),
+                self._order.robot.left_light.diameter,
+            )
+        )
+
+    def _log_image(self, text: str) -> None:
+        sides = messages.logged_sides(text)
+        word = text.split(" ")[1] if " " in text else "undefined"
+        self.printed.append(Line(self.now / SECOND, f"{word} image data logged..."))
+        images = dict(zip(("left", "right"), self.world.images(), strict=True))
+        for side in sides:
+            self._output_left -= len(images[side])
+            self.chain.add("image", self.now, images[side])
+            self.image_log.append((side, messages.csv(images[side]), self.world.clock))
+
+    def _say(self, text: str) -> None:
+        """Utterances queue up; each lasts as long as its words at 130 a minute."""
+        self._free_act()
+        self._output_left -= len(text.encode())
+        self.chain.add("say", self.now, text.encode())
+        self.spoken.append(Line(self.now / SECOND, text))
+        length = len(text.split()) * 60 * SECOND // _WORDS_A_MINUTE
+        self._said_until = max(self._said_until, self.now) + length
+
+    def _free_act(self) -> None:
+        self._free_acts += 1
+        if self._free_acts > _FREE_ACTS:
+            self._never_waits(None)
+
+    def _never_waits(self, line: int | None) -> NoReturn:
+        where = "this loop never waits" if line is not None else "the program never waits"
+        hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
+        fault = Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", f"{where}, so the world cannot move", line, hint)
+        raise _Cut(fault)
+
+
+def run_trial(
+    order: TrialOrder,
+    arena: Arena,
+    camera: LightCamera,
+    sandboxes: Sandboxes,
+    pulse: Callable[[], None] = lambda: None,
+) -> Recording:
+    """One run of a program from start to end, in fresh children.
+
+    ``pulse`` is called several times a second of real time and may raise to stop the trial.
+    Raises HostError when the machine, not the student, fails.
+    """
+    with _private_folder() as folder:
+        responder = None
+        if order.responder is not None:
+            responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
+        try:
+            program = sandboxes.spawn("robot", order.program.limits)
+            try:
+                unloadable = responder.load() if responder is not None else None
+                bridge = _Bridge(order, arena, camera, program, responder, pulse)
+                fault = bridge.run()
+            finally:
+                program.close()
+        finally:
+            if responder is not None:
+                responder.close()
+        log = _read_log(folder) if responder is not None else ""
+    bridge.conversation.finish()
+    faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
+    faults.sort(key=lambda each: each.t)
+    return _recording(order, bridge, responder, tuple(faults), log)
+
+
+@contextlib.contextmanager
+def _private_folder() -> Iterator[Path]:
+    """A folder for one trial, removed afterwards whatever the student's code has put into it."""
+    folder = Path(tempfile.mkdtemp(prefix="robomark-"))
+    try:
+        yield folder
+    finally:
+        try:
+            shutil.rmtree(folder, ignore_errors=True)
+        except RecursionError:
+            # rmtree recurses; a chain of a thousand folders is a student's doing.
+            subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
+
+
+def _recording(
+    order: TrialOrder, bridge: _Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str
+) -> Recording:
+    world = bridge.world
+    data = (messages.datum(line.text, line.t) for line in bridge.printed)
+    return Recording(
+        background=order.floor.name,
+        start=order.pose,
+        end=world.pose,
+        end_t=bridge.now / SECOND,
+        ticks=world.ticks(),
+        verdict=faults[0].verdict if faults else Verdict.FINISHED,
+        sha256=bridge.chain.hexdigest(),
+        printed=tuple(bridge.printed),
+        spoken=tuple(bridge.spoken),
+        messages=tuple(bridge.conversation.messages),
+        images=tuple(bridge.images),
+        calls=tuple(responder.calls) if responder is not None else (),
+        datalog=tuple(datum for datum in data if datum is not None),
+        image_log=tuple(bridge.image_log),
+        touches=tuple(world.touches),
+        faults=faults,
+        obstacles=world.obstacles,
+        robot=order.robot.name,
+        pen=((0, True),) if order.pen_down else (),
+        responder_output="\n".join(responder.output) if responder is not None else "",
+        responder_log=log,
+        walls=WALLS,
+    )
+
+
+def _read_log(folder: Path) -> str:
+    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped."""
+    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
+    except OSError:
+        return ""
+    finally:
+        os.close(directory)
+    with os.fdopen(fd, "rb") as file:
+        if not stat.S_ISREG(os.fstat(fd).st_mode):
+            return ""
+        return file.read(_LOG_BYTES).decode("utf-8", "replace")

@@ -1,0 +1,253 @@
+"""The talk between a robot program and its responder: who said what when, and what is still under way.
+
+It keeps the messages of one trial and asks the responder's process for answers; simulated time is the bridge's.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from responders import messages, wire
+from responders.channel import Channel, Line
+from responders.sandbox.manager import Child, ChildLimits, ChildStopped, Sandboxes
+from sim.chance import Stream
+from sim.recording import SECOND, Call, Fault, Message, Verdict
+from sim.world import Chain
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A Python file: its name, which its tracebacks show, and its text."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ResponderOrder:
+    """What answers the robot: code and the files in its folder."""
+
+    code: Code
+    files: Mapping[str, bytes]
+    limits: ChildLimits
+    output_bytes: int
+    function: str | None = None  # the name of the responder; by the module's own choice if not given
+
+
+class Responder:
+    """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
+
+    def __init__(
+        self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, pulse: Callable[[], None]
+    ) -> None:
+        self._order = order
+        self._pulse = pulse
+        self._folder = folder
+        self.output: list[str] = []
+        self._output_left = order.output_bytes
+        self.calls: list[Call] = []
+        for name, data in order.files.items():
+            (folder / name).write_bytes(data)
+        self._child: Child | None = sandboxes.spawn("responder", order.limits, folder)
+        self._seed = seed
+
+    def load(self) -> Fault | None:
+        """Run the module. The fault that kept it from answering, if any."""
+        assert self._child is not None
+        try:
+            self._child.send(
+                {
+                    "name": self._order.code.name,
+                    "text": self._order.code.text,
+                    "seed": Stream(self._seed, "responder").integer(0),
+                    "function": self._order.function,
+                }
+            )
+            frame = self._until("ready", -1, [])
+        except ChildStopped as stop:
+            return self._stopped(stop, 0)
+        if frame["error"] is not None:
+            self.close()
+            return error_fault(frame["error"], 0, "responder")
+        return None
+
+    @property
+    def alive(self) -> bool:
+        return self._child is not None
+
+    def answer(self, text: str, t: int, message: int) -> tuple[str | None, int, Fault | None]:
+        """The answer to ``text``, if there is one; how long the responder slept; and what went wrong."""
+        if self._child is None:
+            return None, 0, None
+        slept: list[int] = []
+        try:
+            self._child.send({"do": "message", "t": t, "text": text})
+            frame = self._until("answer", message, slept)
+        except ChildStopped as stop:
+            return None, 0, self._stopped(stop, t)
+        answered = t + sum(slept)
+        if frame["kind"] == "text":
+            return frame["text"], sum(slept), None
+        if frame["kind"] == "error":
+            return None, 0, error_fault(frame["error"], answered, "responder")
+        what = (
+            f"an answer of {frame['length']} characters; the most is about 60000"
+            if frame["kind"] == "long"
+            else f"{frame['type']} instead of a text; an answer has to be a str"
+        )
+        sentence = f"the responder returned {what}"
+        return None, 0, Fault(answered / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence)
+
+    def close(self) -> None:
+        if self._child is not None:
+            self._child.close()
+            self._child = None
+
+    def _until(self, last: str, message: int, slept: list[int]) -> wire.Frame:
+        assert self._child is not None
+        while True:
+            frame = self._child.receive(wire.RESPONDER, self._pulse)
+            match frame["do"]:
+                case "print":
+                    self._print(frame["text"])
+                case "sleep":
+                    slept.append(frame["units"])
+                case "call":
+                    self.calls.append(
+                        Call(
+                            message,
+                            frame["depth"],
+                            frame["caller"],
+                            frame["callee"],
+                            frame["argument"],
+                            frame["result"],
+                        )
+                    )
+                case kind if kind == last:
+                    return frame
+                case kind:
+                    raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
+
+    def _print(self, text: str) -> None:
+        self._output_left -= len(text.encode()) + 1
+        if self._output_left < 0:
+            raise ChildStopped(
+                Verdict.OUTPUT_LIMIT, f"the responder printed more than {self._order.output_bytes} bytes"
+            )
+        self.output.append(text)
+
+    def _stopped(self, stop: ChildStopped, t: int) -> Fault:
+        self.close()
+        verdict = Verdict.RESPONDER_ERROR if stop.verdict is Verdict.PROGRAM_ERROR else stop.verdict
+        return Fault(t / SECOND, verdict, "responder", f"the responder was stopped: {stop.message}", stop.line)
+
+
+class Conversation:
+    """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
+
+    def __init__(self, channel: Channel, seed: int, chain: Chain, responder: Responder | None) -> None:
+        self._line = Line(channel, seed)
+        self._chain = chain
+        self._responder = responder
+        self._under_way: list[tuple[int, int, int]] = []  # due, order, index of the message
+        self._texts = 0
+        self.messages: list[Message] = []
+        self.faults: list[Fault] = []
+
+    def send(self, text: str, now: int) -> int:
+        """The robot says ``text``; the responder answers at once, and the answer sets out. The message's index."""
+        number = self._texts
+        self._texts += 1
+        copies = self._line.copies(number)
+        index = len(self.messages)
+        self.messages.append(
+            Message(
+                now / SECOND,
+                "robot",
+                text,
+                now / SECOND if copies else None,
+                note="" if copies == 1 else "duplicated" if copies else "lost",
+            )
+        )
+        self._chain.add("message", now, text.encode())
+        for copy in range(copies):
+            self._answer(text, now, index, number, copy)
+        return index
+
+    def deliver(self, now: int) -> list[Any]:
+        """Everything due at the tick at ``now``, in order; the objects that join the robot's queue."""
+        arrived = []
+        while self._under_way and self._under_way[0][0] <= now:
+            _, _, index = heapq.heappop(self._under_way)
+            message = self.messages[index] = replace(self.messages[index], delivered=now / SECOND)
+            self._chain.add("answer", now, message.text.encode())
+            if message.text.startswith(messages.JSON) and message.note != "malformed":
+                arrived.append(messages.parsed_answer(message.text))
+        return arrived
+
+    def finish(self) -> None:
+        """The program has ended: what is still under way will never arrive."""
+        for _, _, index in self._under_way:
+            self.messages[index] = replace(self.messages[index], note="undelivered")
+        self._under_way.clear()
+
+    def _answer(self, text: str, now: int, question: int, number: int, copy: int) -> None:
+        answer: str | None = f"pingpong {text}"
+        slept, fault = 0, None
+        if self._responder is not None:
+            answer, slept, fault = self._responder.answer(text, now, question)
+        if fault is not None:
+            self.faults.append(fault)
+        if answer is None:
+            return
+        note = self._malformed(answer, now + slept)
+        t = (now + slept) / SECOND
+        arrivals = self._line.arrivals(number, copy, now, slept)
+        if not arrivals:
+            self.messages.append(Message(t, "responder", answer, None, question, note or "lost"))
+        for place, due in enumerate(arrivals):
+            index = len(self.messages)
+            self.messages.append(
+                Message(t, "responder", answer, None, question, note or ("duplicated" if place else ""))
+            )
+            heapq.heappush(self._under_way, (due, index, index))
+
+    def _malformed(self, answer: str, now: int) -> str:
+        if not answer.startswith(messages.JSON):
+            return ""
+        try:
+            messages.parsed_answer(answer)
+        except ValueError as error:
+            sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
+            self.faults.append(Fault(now / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence))
+            return "malformed"
+        return ""
+
+
+_PYTHON_2 = (
+    "Missing parentheses in call to",
+    "leading zeros in decimal integer literals",
+    "multiple exception types must be parenthesized",
+)
+
+
+def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
+    """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
+    if error["type"] == "MemoryError":
+        sentence = f"the {who} asked for more memory than it may have"
+        return Fault(now / SECOND, Verdict.MEMORY_LIMIT, _who(who), sentence, error["line"])
+    verdict = Verdict.RESPONDER_ERROR if who == "responder" else Verdict.PROGRAM_ERROR
+    words = error["text"]
+    sentence = f"{error['type']}: {words}" if words else str(error["type"])
+    hint = ""
+    if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
+        hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
+    return Fault(now / SECOND, verdict, _who(who), sentence, error["line"], hint)
+
+
+def _who(who: str) -> Any:
+    return "responder" if who == "responder" else "program"

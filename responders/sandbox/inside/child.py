@@ -1,0 +1,81 @@
+"""From fork to student code: the layers go up in order, and nothing of the zygote's is left within reach.
+
+The role (robot program or responder) takes over once every layer stands.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+from collections.abc import Callable
+from typing import Any
+
+from .frames import Wire
+
+_PR_SET_PDEATHSIG = 1
+_PR_SET_DUMPABLE = 4
+_PR_SET_NO_NEW_PRIVS = 38
+
+_WIRE, _FOLDER = 3, 4
+
+
+def start(order: dict[str, Any], descriptors: list[int], role: Callable[[Wire], None]) -> None:
+    """Never returns. ``descriptors`` are the wire and, if the order has a folder, the folder."""
+    try:
+        _own_session()
+        _descriptors(descriptors, bool(order["folder"]))
+        _limits(order)
+        _walls()
+        os.environ.clear()
+        os.environ["HOME"] = "/"
+        role(Wire(_WIRE))
+    finally:
+        os._exit(0)
+
+
+def _own_session() -> None:
+    os.setsid()
+    prctl = ctypes.CDLL(None, use_errno=True).prctl
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() == 1:
+        os._exit(0)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+
+
+def _descriptors(descriptors: list[int], has_folder: bool) -> None:
+    """Nothing stays open but the null device on 0 to 2 and the wire; the folder becomes the working folder."""
+    high = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
+    null = os.open(os.devnull, os.O_RDWR)
+    for fd in (0, 1, 2):
+        os.dup2(null, fd)
+    os.dup2(high[0], _WIRE)
+    if has_folder:
+        os.fchdir(high[1])
+    else:
+        os.chdir("/")
+    os.closerange(_FOLDER, 1 << 16)
+    os.umask(0o077)
+
+
+def _limits(order: dict[str, Any]) -> None:
+    """Address space beyond what the zygote maps already, CPU as a backstop, small files, few descriptors."""
+    with open("/proc/self/statm", "rb") as statm:
+        mapped = int(statm.read().split()[0]) * resource.getpagesize()
+    memory = mapped + order["memory"]
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    seconds = int(order["cpu"]) + 2
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (order["file_size"], order["file_size"]))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))
+    resource.setrlimit(resource.RLIMIT_MSGQUEUE, (0, 0))
+
+
+def _walls() -> None:
+    """Where the kernel's own walls go up: after every limit, before any student code. None stand yet."""

@@ -1,0 +1,59 @@
+"""The child's end of the wire: one JSON object a line over one descriptor.
+
+The worker checks every frame as if it came from the internet; here there is nothing to defend.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+Frame = dict[str, Any]
+
+#: The longest line that the worker accepts, bytes.
+MOST = 65536
+
+_encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
+
+
+class Wire:
+    """Sends and receives frames over descriptor ``fd``."""
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+        self._pending = b""
+
+    def send(self, frame: Frame) -> None:
+        data = _encode(frame).encode("ascii") + b"\n"
+        while data:
+            data = data[os.write(self._fd, data) :]
+
+    def receive(self) -> Frame:
+        """The next frame. Ends the process when the worker has gone."""
+        while True:
+            line, newline, rest = self._pending.partition(b"\n")
+            if newline:
+                self._pending = rest
+                frame: Frame = json.loads(line)
+                return frame
+            data = os.read(self._fd, MOST)
+            if not data:
+                os._exit(0)
+            self._pending += data
+
+
+def fits(text: str) -> bool:
+    """Whether a frame can carry ``text``."""
+    # Six bytes a character at the most, and some room for the rest of the frame.
+    return len(text) * 6 < MOST - 200 or len(_encode(text)) < MOST - 200
+
+
+def fitted(text: str) -> str:
+    """``text``, cut so that a frame can carry it."""
+    return text if fits(text) else clip(text, MOST // 6 - 100)
+
+
+def clip(text: str, most: int = 2000) -> str:
+    """``text`` cut to ``most`` characters, saying so."""
+    return text if len(text) <= most else f"{text[:most]}… ({len(text)} characters)"

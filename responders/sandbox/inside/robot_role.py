@@ -1,0 +1,81 @@
+"""Runs a robot program: the preamble, then the student's file, with the brick's modules for a robot.
+
+It decides nothing: what the program asks of the world goes over the wire, and so does how it ended.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import types
+from types import FrameType
+from typing import Any
+
+from . import determinism, student_code
+from .frames import Frame, Wire, clip, fitted
+
+
+def preload() -> None:
+    """Import what every robot program needs, before any fork."""
+    import brick_link  # noqa: F401
+    import brick_preambles  # noqa: F401
+    import ev3dev2_glue  # noqa: F401
+
+
+def run(wire: Wire) -> None:
+    """Receive a program, run it to its end, and report that."""
+    from brick_link import link
+    from brick_preambles import PREAMBLES
+
+    job = wire.receive()
+    name: str = job["name"]
+
+    def stuck() -> None:
+        _leave(wire, {"do": "stuck", "line": student_code.line_of(sys._getframe(), name)})
+
+    def busy(_: int, frame: FrameType | None) -> None:
+        _leave(wire, {"do": "busy", "line": student_code.line_of(frame, name)})
+
+    def emit(text: str) -> None:
+        link.tell({"do": "print", "text": fitted(text)})
+
+    def now() -> int:
+        link.read_freely()
+        return link.units
+
+    def sleep(units: int) -> None:
+        link.ask({"do": "wait", "units": units})
+
+    signal.signal(signal.SIGXCPU, busy)
+    link.connect(wire.send, wire.receive, stuck)
+    student_code.install_output(emit)
+    determinism.install_clock(now, sleep)
+    determinism.install_chance(job["seed"])
+    module = types.ModuleType("__main__")
+    sys.modules["__main__"] = module
+    wire.send({"do": "end", "error": _execute(job, PREAMBLES[job["preamble"]], module.__dict__)})
+    wire.receive()
+
+
+def _execute(job: Frame, preamble: str, namespace: dict[str, Any]) -> Frame | None:
+    """The error that ended the program, or None."""
+    name: str = job["name"]
+    try:
+        exec(compile(preamble, "<preamble>", "exec", dont_inherit=True), namespace)
+        exec(student_code.compile_source(job["text"], name), namespace)
+    except SystemExit as ending:
+        if ending.code in (None, 0):
+            return None
+        return {"type": "SystemExit", "text": clip(str(ending.code)), "line": None}
+    except BaseException as error:
+        return student_code.describe(error, name)
+    return None
+
+
+def _leave(wire: Wire, frame: Frame) -> None:
+    """Say why, and end here and now: the student's code must not go on or catch this."""
+    try:
+        wire.send(frame)
+    finally:
+        os._exit(0)

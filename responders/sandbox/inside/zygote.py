@@ -1,0 +1,80 @@
+"""A process with the heavy imports loaded that forks one child an order; it never holds anything secret.
+
+It is exec'd with a clean environment, has one thread, and dies with its worker.
+"""
+
+from __future__ import annotations
+
+import array
+import ctypes
+import gc
+import json
+import os
+import signal
+import socket
+import sys
+from typing import Any
+
+_PR_SET_PDEATHSIG = 1
+_PR_SET_DUMPABLE = 4
+
+
+def main(role_name: str, roots: list[str]) -> None:
+    """Serve orders on descriptor 3 until the worker closes it."""
+    prctl = ctypes.CDLL(None).prctl
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.dont_write_bytecode = True
+    sys.path[:0] = roots
+    from . import child, determinism, student_code  # noqa: F401
+
+    if role_name == "robot":
+        from . import robot_role as role
+    else:
+        from . import responder_role as role  # type: ignore[no-redef]
+    role.preload()
+    _one_thread()
+    gc.collect()
+    gc.freeze()
+    control = socket.socket(fileno=3)
+    _reply(control, {"ready": True})
+    while True:
+        order, descriptors = _receive(control)
+        if order is None:
+            os._exit(0)
+        if order["do"] == "spawn":
+            pid = os.fork()
+            if pid == 0:
+                child.start(order, descriptors, role.run)
+            pidfd = os.pidfd_open(pid)
+            _reply(control, {"pid": pid}, [pidfd])
+            for fd in (*descriptors, pidfd):
+                os.close(fd)
+        else:
+            _, status, usage = os.wait4(order["pid"], 0)
+            _reply(
+                control,
+                {"status": status, "cpu": usage.ru_utime + usage.ru_stime, "memory_kb": usage.ru_maxrss},
+            )
+
+
+def _one_thread() -> None:
+    with open("/proc/self/status") as status:
+        threads = next(int(line.split()[1]) for line in status if line.startswith("Threads:"))
+    if threads != 1:
+        raise SystemExit(f"the zygote has {threads} threads; it can fork safely only with one")
+
+
+def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
+    data, ancillary, _, _ = control.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
+    descriptors = array.array("i")
+    for _, _, payload in ancillary:
+        descriptors.frombytes(payload[: len(payload) - len(payload) % 4])
+    return (json.loads(data) if data else None), list(descriptors)
+
+
+def _reply(control: socket.socket, answer: dict[str, Any], descriptors: list[int] | None = None) -> None:
+    payload = array.array("i", descriptors or [])
+    ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
+    control.sendmsg([json.dumps(answer).encode()], ancillary)

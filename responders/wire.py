@@ -1,0 +1,176 @@
+"""The worker's end of the wire: frames from a child are read as if they came from the internet.
+
+One strict JSON object a line, of a closed schema; there is no frame that could carry a mark, a time or a verdict.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+Frame = dict[str, Any]
+
+#: The longest line that is read, bytes.
+MOST = 65536
+
+
+class WireError(Exception):
+    """A frame that no honest child sends; the text says what is wrong with it."""
+
+
+Check = Callable[[object], bool]
+
+
+def _text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _whole(low: int, high: int) -> Check:
+    return lambda value: type(value) is int and low <= value <= high
+
+
+def _number(value: object) -> bool:
+    return type(value) in (int, float) and math.isfinite(value)  # type: ignore[arg-type]
+
+
+def _one_of(*values: object) -> Check:
+    return lambda value: isinstance(value, str) and value in values
+
+
+def _or_none(check: Check) -> Check:
+    return lambda value: value is None or check(value)
+
+
+def _error(value: object) -> bool:
+    return (
+        isinstance(value, dict)
+        and value.keys() == {"type", "text", "line"}
+        and isinstance(value["type"], str)
+        and isinstance(value["text"], str)
+        and _line(value["line"])
+    )
+
+
+_line = _or_none(_whole(0, 10**7))
+_port = _one_of("outB", "outC")
+_units = _whole(0, 10**15)
+
+Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
+
+#: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
+ROBOT: Schema = MappingProxyType(
+    {
+        "print": ({"text": _text}, {}),
+        "say": ({"text": _text}, {}),
+        "motor": (
+            {"port": _port},
+            {
+                "speed_sp": _number,
+                "position_sp": _number,
+                "position": _number,
+                "time_sp": _number,
+                "polarity": _text,
+                "command": _one_of(
+                    "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct"
+                ),
+            },
+        ),
+        "wait": ({"units": _units}, {}),
+        "read": ({"what": _one_of("left", "right", "ultrasonic", "gyro"), "times": _whole(1, 2)}, {}),
+        "motor_state": ({"port": _port}, {}),
+        "paid_motor": ({"port": _port}, {}),
+        "until": (
+            {"port": _port, "state": _one_of("running", "still"), "timeout": _or_none(_units)},
+            {},
+        ),
+        "until_said": ({}, {}),
+        "stuck": ({"line": _line}, {}),
+        "busy": ({"line": _line}, {}),
+        "end": ({"error": _or_none(_error)}, {}),
+    }
+)
+
+#: What a responder's process may say.
+RESPONDER: Schema = MappingProxyType(
+    {
+        "ready": ({"error": _or_none(_error)}, {}),
+        "print": ({"text": _text}, {}),
+        "sleep": ({"units": _units}, {}),
+        "busy": ({"line": _line}, {}),
+        "call": (
+            {
+                "depth": _whole(0, 1000),
+                "caller": _text,
+                "callee": _text,
+                "argument": _text,
+                "result": _text,
+            },
+            {},
+        ),
+        "answer": (
+            {"kind": _one_of("text", "error", "other", "long")},
+            {"text": _text, "error": _error, "type": _text, "length": _whole(0, 10**12)},
+        ),
+    }
+)
+
+#: The field that each kind of answer must have.
+_ANSWER = {"text": "text", "error": "error", "other": "type", "long": "length"}
+
+
+def _no_constant(name: str) -> None:
+    raise WireError(f"{name} is not a JSON number")
+
+
+def _no_duplicates(pairs: list[tuple[str, Any]]) -> Frame:
+    frame = dict(pairs)
+    if len(frame) != len(pairs):
+        raise WireError("a key appears twice")
+    return frame
+
+
+_decode = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_no_duplicates).decode
+
+
+def parse(line: bytes, schema: Schema) -> Frame:
+    """One frame of ``schema``. Raises WireError for anything else."""
+    if len(line) > MOST:
+        raise WireError(f"a frame of more than {MOST} bytes")
+    try:
+        frame = _decode(line.decode("utf-8"))
+    except WireError:
+        raise
+    except (ValueError, RecursionError):
+        raise WireError("a frame that is not JSON") from None
+    if not isinstance(frame, dict) or not isinstance(frame.get("do"), str):
+        raise WireError("a frame that is not an object with a do")
+    fields = schema.get(frame["do"])
+    if fields is None:
+        raise WireError("a frame of an unknown kind")
+    required, optional = fields
+    for name, check in required.items():
+        if name not in frame or not check(frame[name]):
+            raise WireError(f"a {frame['do']} frame with a wrong {name}")
+    if len(frame) > len(required) + 1:
+        for name, value in frame.items():
+            if name == "do" or name in required:
+                continue
+            if name not in optional or not optional[name](value):
+                raise WireError(f"a {frame['do']} frame with a wrong {name[:40]!r}")
+    if frame["do"] == "answer" and _ANSWER[frame["kind"]] not in frame:
+        raise WireError(f"an answer without its {_ANSWER[frame['kind']]}")
+    text = frame.get("text")
+    if text is not None:
+        try:
+            text.encode("utf-8")
+        except UnicodeEncodeError:
+            frame["text"] = text.encode("utf-8", "replace").decode("utf-8")
+    return frame
+
+
+def encode(frame: Mapping[str, Any]) -> bytes:
+    """A frame for a child, as one line."""
+    return json.dumps(frame, separators=(",", ":")).encode("ascii") + b"\n"
