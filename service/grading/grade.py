@@ -13,7 +13,7 @@ from sim.recording import Image, Pose, Recording, Verdict
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How often a classifier was right: n pictures, ``value`` with its 95 % Wilson interval, and who was taken for whom.
+    """How often a classifier was right, with the 95 % Wilson interval, and who was taken for whom.
 
     ``confusion`` maps (truth, answer) to a count; the answer is None where none was given or it could not be read.
     """

@@ -1,0 +1,177 @@
+"""``robomark run``: one robot program, now, in a simulator set up by the magic's flags. No marks."""
+
+from __future__ import annotations
+
+import json
+import stat
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from models import weights_bytes
+from responders.bridge import ProgramOrder, TrialOrder
+from responders.channel import Channel
+from responders.conversation import Code, ResponderOrder
+from responders.sandbox.manager import ChildLimits
+from service.grading.grade import TrialResult
+from service.grading.rig import Rig
+from service.reports.figure import png
+from service.reports.path_plot import draw_path
+from service.reports.readable import readable
+from service.reports.trace import trace
+from sim.backgrounds import floor
+from sim.errors import UsageError
+from sim.recording import Recording
+from sim.robot import robot
+from sim.world import Noise
+from submissions.magics import Flags, Setup, setup, split_program
+from submissions.source_text import decode_source
+
+_PROGRAM = ChildLimits(5.0, 128 << 20)
+_RESPONDER = ChildLimits(10.0, 512 << 20)
+_OUTPUT_BYTES = 1_000_000
+_FILES_BYTES = 16 << 20
+_NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
+
+
+def run(
+    program: Annotated[Path, typer.Argument(help="The robot program, a .py file.")],
+    background: Annotated[str | None, typer.Option("-b", "--background", help="Floor.")] = None,
+    robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot.")] = None,
+    obstacles: Annotated[str | None, typer.Option("-o", "--obstacles", help="Obstacle preset.")] = None,
+    x: Annotated[str | None, typer.Option("-x", "--xpos", help="Start, mm from the left.")] = None,
+    y: Annotated[str | None, typer.Option("-y", "--ypos", help="Start, mm from the bottom.")] = None,
+    angle: Annotated[str | None, typer.Option("-a", "--angle", help="Start heading, degrees.")] = None,
+    light_noise: Annotated[str | None, typer.Option("-N", "--sensornoise", help="Light noise, 0 to 128.")] = None,
+    motor_noise: Annotated[str | None, typer.Option("-M", "--motornoise", help="Wheel noise, 0 to 500.")] = None,
+    pen_colour: Annotated[str | None, typer.Option("-P", "--pencolor", help="Colour of the pen.")] = None,
+    pen_down: Annotated[bool, typer.Option("-p", "--pendown", help="Draw the path.")] = False,
+    collab: Annotated[bool, typer.Option("-L", "--collab", help="Pass PY:: texts on.")] = False,
+    autorun: Annotated[bool, typer.Option("-R", "--autorun", help="Always so here.")] = False,
+    output: Annotated[bool, typer.Option("-O", "--output", hidden=True)] = False,
+    array: Annotated[bool, typer.Option("-A", "--array", hidden=True)] = False,
+    hide: Annotated[bool, typer.Option("-H", "--hide", hidden=True)] = False,
+    world: Annotated[bool, typer.Option("-W", "--world", hidden=True)] = False,
+    settings: Annotated[bool, typer.Option("-Z", "--settings", hidden=True)] = False,
+    noise_controls: Annotated[bool, typer.Option("-z", "--noisecontrols", hidden=True)] = False,
+    positioning: Annotated[bool, typer.Option("-X", "--positioning", hidden=True)] = False,
+    code: Annotated[bool, typer.Option("-D", "--code", hidden=True)] = False,
+    instrumentation: Annotated[bool, typer.Option("-i", "--instrumentation", hidden=True)] = False,
+    chart: Annotated[bool, typer.Option("-c", "--chart", hidden=True)] = False,
+    ultrasound: Annotated[bool, typer.Option("-u", "--ultrasound", hidden=True)] = False,
+    clear: Annotated[bool, typer.Option("-C", "--clear", hidden=True)] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", hidden=True)] = False,
+    preview: Annotated[bool, typer.Option("-v", "--preview", hidden=True)] = False,
+    responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
+    trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw the path over the floor, as PNG.")] = None,
+) -> None:
+    """Run a robot program in the simulator, set up by the flags of %sim_magic; print what it says."""
+    flags, text = split_program(_source(program))
+    values = {
+        "b": background,
+        "r": robot_setup,
+        "o": obstacles,
+        "x": x,
+        "y": y,
+        "a": angle,
+        "N": light_noise,
+        "M": motor_noise,
+        "P": pen_colour,
+    }
+    switches = {letter for letter, on in (("p", pen_down), ("L", collab)) if on}
+    flags = Flags(flags.preamble, flags.with_values(**values).values, flags.switches | switches)
+    chosen = setup(flags)
+    order = TrialOrder(
+        program=ProgramOrder(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
+        responder=_responder(responder),
+        collaborative=chosen.collaborative or responder is not None,
+        floor=floor(chosen.background),
+        robot=robot(chosen.robot),
+        pose=chosen.pose,
+        noise=Noise(chosen.light_noise, chosen.motor_noise),
+        channel=Channel(),
+        seconds=seconds,
+        seed=seed,
+        pen_down=chosen.pen_down,
+    )
+    for note in chosen.notes:
+        typer.echo(f"note: {note}", err=True)
+    with Rig() as rig:
+        recording = rig.run(order, chosen.obstacles)
+    _show(recording)
+    if trace_file is not None:
+        _write(trace_file, json.dumps(trace(recording)).encode())
+    if picture is not None:
+        _write(picture, _drawn(recording, program.name, chosen, seed))
+
+
+def _source(path: Path) -> str:
+    return decode_source(_read(path), path.name)[0]
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise UsageError(f"{path} is not a file; expected a Python file")
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _responder(given: str | None) -> ResponderOrder | None:
+    """FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
+    if given is None:
+        return None
+    path, name = Path(given), None
+    if not path.exists() and ":" in given:
+        file, _, name = given.rpartition(":")
+        path = Path(file)
+    files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
+    text = _source(path)
+    left = _FILES_BYTES
+    for beside in sorted(path.parent.iterdir()):
+        if beside.suffix in (".py", "") or beside.is_symlink() or not beside.is_file():
+            continue
+        left -= beside.stat().st_size
+        if left >= 0:
+            files[beside.name] = beside.read_bytes()
+    return ResponderOrder(Code(path.name, text), files, _RESPONDER, _OUTPUT_BYTES, name)
+
+
+def _show(recording: Recording) -> None:
+    """What was printed, spoken and answered, in order, and how it ended."""
+    shown = [(line.t, 0, line.text) for line in recording.printed]
+    shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
+    shown += [
+        (message.delivered, 2, f"(answer) {message.text}")
+        for message in recording.messages
+        if message.sender == "responder" and message.delivered is not None
+    ]
+    for t, _, text in sorted(shown, key=lambda each: (each[0], each[1])):
+        typer.echo(f"{t:8.2f} s  {readable(text, 400)}")
+    end = recording.end
+    typer.echo(
+        f"{recording.end_t:8.2f} s  end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading {end.heading:.1f} degrees; "
+        f"{recording.verdict}"
+    )
+    for fault in recording.faults:
+        where = f" (line {fault.line} of the {fault.who})" if fault.line is not None else ""
+        typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
+        if fault.hint:
+            typer.echo(f"            {fault.hint}", err=True)
+
+
+def _drawn(recording: Recording, name: str, chosen: Setup, seed: int) -> bytes:
+    trial = TrialResult("run", 0, seed, chosen.light_noise, chosen.motor_noise, "visible", recording)
+    return png(draw_path(trial, name, floor(chosen.background).picture))
