@@ -100,6 +100,9 @@ class _Bridge:
         self._said_until = 0
         self._arrived: list[Any] = []
         self._free_acts = 0
+        self._values: dict[str, Any] = {}
+        self._encoded: dict[str, bytes] = {}
+        self._told_in = -1
         self._output_left = order.program.output_bytes
 
     def run(self) -> Fault | None:
@@ -185,21 +188,30 @@ class _Bridge:
         self._child.send(answer)
 
     def _read(self, what: str, times: int) -> None:
-        self._advance(times * _READ)
-        world = self.world
-        value: float | list[float]
-        if what == "left":
-            pixels = world.pixels[0]
-            value = [total / pixels for total in world.left_sums]
-        elif what == "right":
-            pixels = world.pixels[1]
-            value = [total / pixels for total in world.right_sums]
-        elif what == "ultrasonic":
-            value = world.ultrasonic
+        """The value of every sensor; no answer when the child has been told them in this tick already."""
+        end = self.now + times * _READ
+        known = self._told_in == end // TICK
+        if known:
+            self._free_acts = 0
+            self.now = end
         else:
-            value = [world.drive.gyro_angle, world.drive.gyro_rate]
-        self.chain.add(what, self.now, repr(value).encode())
-        self._reply(value)
+            self._advance(times * _READ)
+            self._values, self._told_in = self._sensor_values(), self.world.clock
+        self.chain.add(what, self.now, self._encoded[what])
+        if not known:
+            self._reply(list(self._values.values()))
+
+    def _sensor_values(self) -> dict[str, Any]:
+        world = self.world
+        left, right = world.pixels
+        values: dict[str, Any] = {
+            "left": [total / left for total in world.left_sums],
+            "right": [total / right for total in world.right_sums],
+            "ultrasonic": world.ultrasonic,
+            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
+        }
+        self._encoded = {what: repr(value).encode() for what, value in values.items()}
+        return values
 
     def _wheel(self, port: str) -> Wheel:
         return self.world.drive.left if port == "outB" else self.world.drive.right

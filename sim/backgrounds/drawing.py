@@ -170,16 +170,16 @@ def simple_shapes_with_labels(canvas: Canvas) -> None:
 
 
 def linear_grey() -> NDArray[np.uint8]:
-    """An even slope from white at picture row 100 to black at row 1043, 50 black rows, and white beyond."""
+    """An even slope from white at picture row 100 to black at row 1043, 51 black rows, and white beyond."""
     column = np.full(HEIGHT, 255, dtype=np.uint8)
     for row in range(100, 1043):
         column[row] = 255 - int(255 * (row - 100) / 943)
-    column[1043:1093] = 0
+    column[1043:1094] = 0
     return np.repeat(column[:, None], WIDTH * 3, axis=1).reshape(HEIGHT, WIDTH, 3)
 
 
 def radial(inner: Colour, outer: Colour) -> NDArray[np.uint8]:
-    """From ``inner`` at the centre (1181, 571.5) to ``outer``, by the cube root of distance / (sqrt(2) * 1181).
+    """From ``inner`` at (1181, 571.5) to ``outer``, by the cube root of distance / (sqrt(2) * 1181).
 
     The levels fall with the distance, so each is found as the distance at which it ends; a pixel's colour
     then depends on no vectorised power function, which may differ between processors.

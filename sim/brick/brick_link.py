@@ -12,9 +12,11 @@ Frame = dict[str, Any]
 
 TICK = 100_000  # thirds of a microsecond in a thirtieth of a second
 SECOND = 30 * TICK
+READ = SECOND // 100
 FREE_READS = 100_000
 
 _WAITS = frozenset({"wait", "read", "until", "until_said", "paid_motor"})
+_SENSORS = ("left", "right", "ultrasonic", "gyro")
 
 
 def _unconnected(frame: Frame) -> NoReturn:
@@ -28,18 +30,32 @@ class Link:
         self.units = 0
         self.state: dict[str, list[Any]] = {"messages": []}
         self._send: Callable[[Frame], None] = _unconnected
+        self._send_later: Callable[[Frame], None] = _unconnected
         self._receive: Callable[[], Frame] | None = None
         self._stuck: Callable[[], None] | None = None
         self._free = 0
+        self._seen: Frame = {}  # what the sensors read in tick number _seen_in
+        self._seen_in = -1
 
-    def connect(self, send: Callable[[Frame], None], receive: Callable[[], Frame], stuck: Callable[[], None]) -> None:
-        """``stuck`` is called when the program has read too often without ever waiting."""
-        self._send, self._receive, self._stuck = send, receive, stuck
+    def connect(
+        self,
+        send: Callable[[Frame], None],
+        send_later: Callable[[Frame], None],
+        receive: Callable[[], Frame],
+        stuck: Callable[[], None],
+    ) -> None:
+        """``send_later`` may hold a frame back until the next one; ``stuck`` ends a program that never waits."""
+        self._send, self._send_later, self._receive, self._stuck = send, send_later, receive, stuck
 
     def tell(self, frame: Frame) -> None:
         """Something happened; no answer is awaited."""
         self.read_freely()
         self._send(frame)
+
+    def tell_later(self, frame: Frame) -> None:
+        """Something that shows only once the world moves; it is sent with the next question at the latest."""
+        self.read_freely()
+        self._send_later(frame)
 
     def ask(self, frame: Frame) -> Any:
         """The answer's value, once the world has moved as far as the question takes."""
@@ -56,6 +72,24 @@ class Link:
             # A new dictionary for new messages: what a program took earlier stays as it was.
             self.state = {"messages": [*self.state["messages"], *arrived]}
         return answer.get("v")
+
+    def read(self, what: str, times: int) -> Any:
+        """A sensor's value after ``times`` reading times.
+
+        Values change only at ticks: a reading that ends before the next one is known already, so the world is told
+        of it and not asked. The world counts the time by the same rule, and gives no answer then.
+        """
+        frame = {"do": "read", "what": what, "times": times}
+        end = self.units + times * READ
+        if self._seen_in == end // TICK:
+            self._free = 0
+            self.units = end
+            self._send_later(frame)
+            return self._seen[what]
+        values = self.ask(frame)
+        self._seen = dict(zip(_SENSORS, values, strict=True))
+        self._seen_in = self.units // TICK
+        return self._seen[what]
 
     def read_freely(self) -> None:
         """Count an act that costs no time; the world cannot move while a program only does these."""

@@ -17,15 +17,30 @@ MOST = 65536
 _encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
 
 
+def _line(frame: Frame) -> bytes:
+    return _encode(frame).encode("ascii") + b"\n"
+
+
 class Wire:
     """Sends and receives frames over descriptor ``fd``."""
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
         self._pending = b""
+        self._held = b""
+
+    def send_later(self, frame: Frame) -> None:
+        """Send with the next frame that cannot wait."""
+        self._held += _line(frame)
+        if len(self._held) > MOST // 2:
+            self._write(b"")
 
     def send(self, frame: Frame) -> None:
-        data = _encode(frame).encode("ascii") + b"\n"
+        self._write(_line(frame))
+
+    def _write(self, data: bytes) -> None:
+        data = self._held + data
+        self._held = b""
         while data:
             data = data[os.write(self._fd, data) :]
 

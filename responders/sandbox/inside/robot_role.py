@@ -48,7 +48,7 @@ def run(wire: Wire) -> None:
         link.ask({"do": "wait", "units": units})
 
     signal.signal(signal.SIGXCPU, busy)
-    link.connect(wire.send, wire.receive, stuck)
+    link.connect(wire.send, wire.send_later, wire.receive, stuck)
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(job["seed"])

@@ -157,7 +157,7 @@ class Motor:
         self._stop_action: str | None = None
 
     def _tell(self, **fields: float | str) -> None:
-        link.tell({"do": "motor", "port": self.address, **fields})
+        link.tell_later({"do": "motor", "port": self.address, **fields})
 
     def _see(self, what: str) -> Any:
         return link.ask({"do": "motor_state", "port": self.address})[what]
@@ -475,18 +475,14 @@ class MoveTank(MotorSet):
 
     def _move_seconds(self, left: int, right: int, seconds: float, block: bool) -> None:
         _not_negative(seconds)
-        self.left_motor._tell(speed_sp=left, time_sp=float(seconds))
-        self.right_motor._tell(speed_sp=right, time_sp=float(seconds))
-        self.left_motor.run_timed()
-        self.right_motor.run_timed()
+        self.left_motor._tell(speed_sp=left, time_sp=float(seconds), command="run-timed")
+        self.right_motor._tell(speed_sp=right, time_sp=float(seconds), command="run-timed")
         if block:
             self._block()
 
     def _move(self, left: int, right: int) -> None:
-        self.left_motor._tell(speed_sp=left)
-        self.right_motor._tell(speed_sp=right)
-        self.left_motor.run_forever()
-        self.right_motor.run_forever()
+        self.left_motor._tell(speed_sp=left, command="run-forever")
+        self.right_motor._tell(speed_sp=right, command="run-forever")
 
     def _block(self) -> None:
         # One motor after the other, as in the original: the second has often stopped by then, and the

@@ -28,7 +28,7 @@ class Sensor:
 
     def _read(self, what: str, times: int = 1) -> Any:
         """A value after ``times`` reading times of 10 ms."""
-        return link.ask({"do": "read", "what": what, "times": times})
+        return link.read(what, times)
 
 
 class ColorSensor(Sensor):

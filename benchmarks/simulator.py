@@ -1,0 +1,96 @@
+"""The simulator by itself, and through the two sandboxed processes: a line follower of 60 simulated seconds."""
+
+from __future__ import annotations
+
+import time
+
+from benchmarks.measurement import Measurement, cpu_seconds, median_of
+from responders.bridge import ProgramOrder, TrialOrder
+from responders.channel import Channel
+from responders.conversation import Code, ResponderOrder
+from responders.sandbox.manager import ChildLimits
+from service.grading.rig import Rig
+from sim.arena import Arena
+from sim.backgrounds import floor
+from sim.camera import BulletCamera, CachedCamera, LightCamera
+from sim.recording import Pose
+from sim.robot import robot
+from sim.world import Chain, Noise, World
+
+_SECONDS = 60
+_START = Pose(141, 125, 90)
+_FLOOR = "Line_Following_Test"
+_FOLLOWER = """
+while True:
+    left, right = colorLeft.reflected_light_intensity, colorRight.reflected_light_intensity
+    tank_drive.on(20 + (right - left) * 0.05, 20 - (right - left) * 0.05)
+"""
+_LIMITS = ChildLimits(30, 512 << 20)
+
+
+def measure() -> list[Measurement]:
+    """Times real time, on one core, by CPU time."""
+    picture = floor(_FLOOR).picture
+    arena, cached, camera = Arena(), CachedCamera(picture), BulletCamera(picture)
+    try:
+        table = median_of(5, lambda: cpu_seconds(lambda: _follow(arena, cached)))
+        shots = median_of(3, lambda: cpu_seconds(lambda: _follow(arena, camera)))
+    finally:
+        camera.close()
+        cached.close()
+        arena.close()
+    with Rig() as rig:
+        both = median_of(5, lambda: _through_processes(rig))
+        ready = median_of(20, lambda: _until_ready(rig))
+    return [
+        Measurement("simulator alone, 60 s line follower, sensor table", _times(table), "400x", "800x"),
+        Measurement("the same, a PyBullet camera image each tick", _times(shots), "60x"),
+        Measurement("the same through both sandboxed processes", _times(both), "100x", "250x"),
+        Measurement("a whole trial of an empty program with a responder", f"{ready * 1000:.0f} ms", "30 ms (child ready)"),
+    ]
+
+
+def _times(seconds: float) -> str:
+    return f"{_SECONDS / seconds:.0f}x ({seconds:.3f} s)"
+
+
+def _follow(arena: Arena, camera: LightCamera) -> None:
+    """Both sensors read fifty times a second, as a program that only reads them does."""
+    world = World(robot("Default_Robot"), arena, camera, _START, Noise(), 0, Chain())
+    left, right = world.drive.left, world.drive.right
+    left.run("run-forever", 0)
+    right.run("run-forever", 0)
+    for _ in range(_SECONDS * 30):
+        for _ in range(3):
+            difference = (world.right_sums[0] - world.left_sums[0]) / 305
+            left.speed_sp = 210 + difference * 0.5
+            right.speed_sp = 210 - difference * 0.5
+        world.tick()
+
+
+def _order(program: str) -> TrialOrder:
+    return TrialOrder(
+        ProgramOrder(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
+        ResponderOrder(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
+        True,
+        floor(_FLOOR),
+        robot("Default_Robot"),
+        _START,
+        Noise(),
+        Channel(),
+        _SECONDS,
+        0,
+    )
+
+
+def _through_processes(rig: Rig) -> float:
+    """CPU seconds of the worker and of both students' processes together."""
+    before = rig.children_cpu_seconds
+    own = cpu_seconds(lambda: rig.run(_order(_FOLLOWER)))
+    return own + rig.children_cpu_seconds - before
+
+
+def _until_ready(rig: Rig) -> float:
+    start = time.perf_counter()
+    rig.run(_order("pass"))
+    return time.perf_counter() - start

@@ -1,0 +1,103 @@
+"""``robomark grade``: grades hand-ins here and now, without queue or database."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from service.grading.grade import Grade
+from service.grading.grader import grade as grade_submission
+from service.grading.rig import Rig
+from service.reports.audience import student_view
+from service.reports.gradescope import gradescope_text
+from service.reports.json_output import json_text
+from service.reports.junit import junit_text
+from service.reports.rich_text import rich_report
+from service.reports.text import plain_text
+from service.reports.written import write_report
+from sim.errors import RobomarkError, UsageError
+from submissions.assignment import Assignment
+from submissions.assignment_file import find_assignment
+from submissions.bundle import fit_parts, read_submission
+from submissions.submission import Submission
+
+
+class Format(StrEnum):
+    """What ``grade`` prints."""
+
+    TEXT = "text"
+    JSON = "json"
+    GRADESCOPE = "gradescope"
+    JUNIT = "junit"
+
+
+def _text(grade: Grade) -> None:
+    console = Console()
+    if console.is_terminal:
+        console.print(rich_report(grade))
+    else:
+        sys.stdout.write(plain_text(grade))
+
+
+_PRINT: Mapping[Format, Callable[[Grade], None]] = MappingProxyType(
+    {
+        Format.TEXT: _text,
+        Format.JSON: lambda grade: print(json_text(grade)),
+        Format.GRADESCOPE: lambda grade: print(gradescope_text(student_view(grade))),
+        Format.JUNIT: lambda grade: print(junit_text(grade)),
+    }
+)
+
+
+def grade(
+    submissions: Annotated[list[Path], typer.Argument(help="Hand-ins: a .py file, a folder or a .zip each.")],
+    assignment: Annotated[
+        str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report for each hand-in into this folder.")] = None,
+    form: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+) -> None:
+    """Grade hand-ins now; exit status 0 when all were graded, whatever the marks."""
+    worst: RobomarkError | None = None
+    with Rig() as rig:
+        for path in submissions:
+            try:
+                submission, asked = read_with_assignment(path, assignment)
+                graded = grade_submission(submission, asked, rig=rig)
+            except RobomarkError as error:
+                if len(submissions) == 1:
+                    raise
+                print(f"robomark: {error}", file=sys.stderr)
+                worst = worst if worst is not None and not isinstance(worst, UsageError) else error
+                continue
+            _PRINT[form](graded)
+            if report is not None:
+                written = write_report(report, graded, submission)
+                print(f"report: {written}", file=sys.stderr)
+    if worst is not None:
+        raise type(worst)(f"not every hand-in could be graded; the last trouble: {worst}")
+
+
+def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission, Assignment]:
+    """A hand-in and what it is marked against: the assignment named, or else the one that the hand-in names.
+
+    Raises UsageError when either cannot be used.
+    """
+    if assignment is not None:
+        asked = find_assignment(assignment)
+        return read_submission(path, asked=asked.parts), asked
+    submission = read_submission(path)
+    if submission.assignment is None:
+        raise UsageError(f"{path}: which assignment is this for? name it with -a, or in the hand-in's submission.toml")
+    try:
+        asked = find_assignment(submission.assignment)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error} Name the assignment with -a.") from None
+    return fit_parts(submission, asked.parts), asked

@@ -1,0 +1,55 @@
+"""Running one program, with or without a responder, the way a trial does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from responders.bridge import Preamble, ProgramOrder, TrialOrder
+from responders.channel import Channel
+from responders.conversation import Code, ResponderOrder
+from responders.sandbox.manager import ChildLimits
+from service.grading.rig import Rig
+from sim.arena import Rectangle
+from sim.backgrounds import floor
+from sim.recording import Pose, Recording
+from sim.robot import robot
+from sim.world import Noise
+
+PROGRAM_LIMITS = ChildLimits(2.0, 128 << 20)
+RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
+
+
+def run_program(
+    rig: Rig,
+    program: str,
+    start: Pose | None = None,
+    *,
+    responder: str | None = None,
+    files: Mapping[str, bytes] | None = None,
+    background: str = "Empty_Map",
+    robot_name: str = "Default_Robot",
+    obstacles: tuple[Rectangle, ...] = (),
+    noise: Noise = Noise(),  # noqa: B008
+    channel: Channel = Channel(),  # noqa: B008
+    preamble: Preamble = "preloaded",
+    seconds: float = 60,
+    seed: int = 1,
+    output_bytes: int = 1_000_000,
+) -> Recording:
+    """One trial; the start is the background's own unless given."""
+    ground = floor(background)
+    order = TrialOrder(
+        program=ProgramOrder(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
+        responder=None
+        if responder is None
+        else ResponderOrder(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
+        collaborative=responder is not None,
+        floor=ground,
+        robot=robot(robot_name),
+        pose=start or ground.default_pose,
+        noise=noise,
+        channel=channel,
+        seconds=seconds,
+        seed=seed,
+    )
+    return rig.run(order, obstacles)

@@ -1,0 +1,48 @@
+"""What the light sensors see is the printed floor, pixel for pixel, off the floor included."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.backgrounds import floor
+from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, sensor_mask
+
+MARGIN = 400
+
+
+@pytest.fixture(scope="module", params=["Lollipop", "noise"])
+def picture(request: pytest.FixtureRequest) -> np.ndarray:
+    if request.param == "noise":
+        return np.random.default_rng(7).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    return floor(request.param).picture
+
+
+def places(count: int) -> list[tuple[int, int, int]]:
+    random = np.random.default_rng(11)
+    columns = random.integers(-60, WIDTH + 40, count)
+    rows = random.integers(-60, HEIGHT + 40, count)
+    return [(int(x), int(y), (10, 20, 30)[i % 3]) for i, (x, y) in enumerate(zip(columns, rows, strict=True))]
+
+
+def test_no_pixel_differs_over_a_thousand_places(picture: np.ndarray) -> None:
+    padded = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)))
+    reference, cached = BulletCamera(picture), CachedCamera(picture)
+    try:
+        for column, row, side in places(1000):
+            printed = padded[row + MARGIN : row + MARGIN + side, column + MARGIN : column + MARGIN + side]
+            assert np.array_equal(reference.window(column, row, side), printed), (column, row, side)
+            assert np.array_equal(cached.window(column, row, side), printed), (column, row, side)
+            sums = tuple(printed[sensor_mask(side)].sum(axis=0, dtype=np.int64).tolist())
+            assert cached.sums(column, row, side) == sums == reference.sums(column, row, side)
+    finally:
+        reference.close()
+        cached.close()
+
+
+@pytest.mark.parametrize(("side", "pixels"), [(10, 69), (20, 305), (30, 697)])
+def test_the_window_is_round_and_leaves_out_row_and_column_0(side: int, pixels: int) -> None:
+    mask = sensor_mask(side)
+    assert not mask[0].any()
+    assert not mask[:, 0].any()
+    assert mask.sum() == pixels

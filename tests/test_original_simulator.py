@@ -1,0 +1,62 @@
+"""What unmodified RoboLab does: every figure of its golden runs that this simulator keeps."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.grading.rig import Rig
+from sim.arena import Arena
+from sim.backgrounds import floor
+from sim.camera import CachedCamera
+from sim.recording import Pose
+from sim.robot import robot
+from sim.world import Chain, Noise, World
+
+from running import run_program
+
+GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("original_simulator.toml").read_text())
+
+
+@pytest.mark.parametrize("row", GOLDEN["drive"], ids=lambda row: row["program"].replace("\n", "; "))
+def test_drive(rig: Rig, row: dict[str, Any]) -> None:
+    recording = run_program(rig, row["program"], Pose(*row["start"]))
+    x, y, heading = row["end"]
+    assert recording.end.x == pytest.approx(x, abs=0.01)
+    assert recording.end.y == pytest.approx(y, abs=0.01)
+    assert recording.end.heading == pytest.approx(heading, abs=0.01)
+    assert abs(len(recording.ticks) - row["milliseconds"] * 30 / 1000) <= 1
+    if "encoders" in row:
+        left, right = row["encoders"]
+        assert recording.ticks.left_position[-1] == pytest.approx(left, abs=0.01)
+        assert recording.ticks.right_position[-1] == pytest.approx(right, abs=0.01)
+
+
+@pytest.mark.parametrize("row", GOLDEN["light"], ids=lambda row: f"{row['background']} {row['pose']}")
+def test_light_sensors(row: dict[str, Any]) -> None:
+    ground = floor(row["background"])
+    arena, camera = Arena(), CachedCamera(ground.picture)
+    try:
+        world = World(robot("Default_Robot"), arena, camera, Pose(*row["pose"]), Noise(), 0, Chain())
+        for sums, pixels, expected in zip(
+            (world.left_sums, world.right_sums), world.pixels, (row["left"], row["right"]), strict=True
+        ):
+            assert [value / pixels for value in sums] == pytest.approx(expected, abs=row.get("tolerance", 0.0001))
+    finally:
+        camera.close()
+        arena.close()
+
+
+@pytest.mark.parametrize("row", GOLDEN["ultrasonic"], ids=lambda row: str(row["pose"]))
+def test_ultrasonic(row: dict[str, Any]) -> None:
+    import math
+
+    arena = Arena(tuple(tuple(box) for box in row.get("obstacles", [])))
+    try:
+        x, y, heading = row["pose"]
+        assert arena.distance(x, y, math.radians(heading), 20) == row["distance"]
+    finally:
+        arena.close()

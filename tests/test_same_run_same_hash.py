@@ -1,0 +1,103 @@
+"""The same submission, assignment and seed give the same chain anywhere, any time, beside anything."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from models import weights_bytes
+from running import run_program
+from service.grading.rig import Rig
+from sim.recording import Pose, Verdict
+from sim.world import Noise
+
+FOLLOWER = """
+while True:
+    left, right = colorLeft.reflected_light_intensity, colorRight.reflected_light_intensity
+    tank_drive.on(20 + (right - left) * 0.05, 20 - (right - left) * 0.05)
+"""
+SHOW_AND_TELL = """
+import random, time
+import ev3dev2_glue as glue
+for i in range(20):
+    print("IMG_DATA")
+    time.sleep(random.uniform(0.2, 0.6))
+    print(time.time(), len(glue.pyState()["messages"]))
+"""
+LIBRARY = Path(__file__).parents[1] / "responders" / "library"
+
+
+def chain(name: str, rig: Rig) -> str:
+    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
+    if name == "follower":
+        recording = run_program(rig, FOLLOWER, Pose(141, 125, 90), background="Line_Following_Test", noise=Noise(10, 20))
+        assert recording.verdict is Verdict.TIME_LIMIT
+        assert len(recording.ticks) == 1800
+    else:
+        recording = run_program(
+            rig,
+            SHOW_AND_TELL,
+            Pose(520, 900, 0),
+            background="Simple_Shapes",
+            noise=Noise(light=10),
+            responder=(LIBRARY / "shape_responder.py").read_text(),
+            files={"mlp_shapes_14x14.joblib": weights_bytes("shapes")},
+        )
+        assert recording.verdict is Verdict.FINISHED
+        assert sum(message.sender == "responder" for message in recording.messages) == 20
+    return recording.sha256
+
+
+ELSEWHERE = textwrap.dedent("""
+    import sys
+    sys.path.insert(0, sys.argv[1])
+    from service.grading.rig import Rig
+    from test_same_run_same_hash import chain
+    with Rig() as rig:
+        for name in sys.argv[2:]:
+            print(name, chain(name, rig), flush=True)
+""")
+
+
+def test_ten_processes_in_shuffled_order_beside_a_busy_core(rig: Rig) -> None:
+    here = {name: chain(name, rig) for name in ("follower", "talk")}
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        for number in range(5):
+            pair = []
+            for half in range(2):
+                order = ["follower", "talk"]
+                random.Random(number * 2 + half).shuffle(order)
+                command = [sys.executable, "-c", ELSEWHERE, str(Path(__file__).parent), *order]
+                pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+            for process in pair:
+                output, _ = process.communicate(timeout=300)
+                assert process.returncode == 0
+                assert dict(line.split() for line in output.splitlines()) == here
+    finally:
+        busy.kill()
+        busy.wait()
+
+
+def test_another_seed_gives_another_run(rig: Rig) -> None:
+    hashes = {
+        run_program(rig, "tank_drive.on_for_seconds(50, 50, 1)", noise=Noise(motor=20), seed=seed).sha256
+        for seed in (1, 2, 3)
+    }
+    assert len(hashes) == 3
+
+
+@pytest.mark.parametrize("extra", ["colorRight.rgb", "random.random()", "print(gyro.rate)"])
+def test_looking_more_often_or_switching_a_noise_on_disturbs_no_other_chance(rig: Rig, extra: str) -> None:
+    program = "import random\ntank_drive.on(30, 40)\nfor i in range(20):\n    {}\n    time.sleep(0.1)\n"
+    plain = run_program(rig, "import time\n" + program.format("pass"), noise=Noise(motor=30))
+    other = run_program(rig, "import time\n" + program.format(extra), noise=Noise(light=40, motor=30))
+    count = min(len(plain.ticks), len(other.ticks))
+    assert count >= 59
+    assert plain.ticks.x[:count].tolist() == other.ticks.x[:count].tolist()
+    assert plain.ticks.heading[:count].tolist() == other.ticks.heading[:count].tolist()

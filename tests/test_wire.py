@@ -1,0 +1,76 @@
+"""Frames from a child: whatever bytes arrive, the worker reads one of the agreed frames or refuses."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from responders import wire
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=12,
+)
+KINDS = [(schema, kind) for schema in (wire.ROBOT, wire.RESPONDER) for kind in schema]
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_read_or_refused(data: bytes) -> None:
+    try:
+        frame = wire.parse(data, wire.ROBOT)
+    except wire.WireError:
+        return
+    assert frame["do"] in wire.ROBOT
+
+
+@given(st.sampled_from(KINDS), st.dictionaries(st.sampled_from(["text", "units", "line", "port", "mark", "t"]), JSON))
+def test_a_frame_has_the_fields_of_its_kind_and_no_others(kind: tuple[wire.Schema, str], fields: dict[str, Any]) -> None:
+    schema, do = kind
+    required, optional = schema[do]
+    try:
+        frame = wire.parse(json.dumps({"do": do, **fields}).encode(), schema)
+    except wire.WireError:
+        return
+    assert required.keys() <= frame.keys() - {"do"} <= required.keys() | optional.keys()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"hello",
+        b"[]",
+        b"{}",
+        b'{"do":"mark","marks":10}',
+        b'{"do":"verdict","verdict":"finished"}',
+        b'{"do":"wait","units":-1}',
+        b'{"do":"wait","units":true}',
+        b'{"do":"wait","units":1.5}',
+        b'{"do":"wait","units":1e400}',
+        b'{"do":"wait","units":1,"t":99}',
+        b'{"do":"wait","units":1,"units":2}',
+        b'{"do":"motor","port":"outB","speed_sp":NaN}',
+        b'{"do":"motor","port":"outB","speed_sp":1e999}',
+        b'{"do":"motor","port":"outA","speed_sp":1}',
+        b'{"do":"motor","port":"outB","command":"fly"}',
+        b'{"do":"print","text":5}',
+        b'{"do":"print","text":"\xff"}',
+        b'{"do":"end","error":{"type":"X","text":"y","line":1,"verdict":"finished"}}',
+        b"[" * 60_000,
+        b'{"do":"print","text":"' + b"x" * wire.MOST + b'"}',
+        b'{"do":"wait","units":' + b"9" * 5000 + b"}",
+    ],
+    ids=lambda line: repr(line[:40]),
+)
+def test_a_frame_that_no_honest_child_sends_is_refused(line: bytes) -> None:
+    with pytest.raises(wire.WireError):
+        wire.parse(line, wire.ROBOT)
+
+
+def test_a_lone_surrogate_becomes_a_character_that_can_be_stored() -> None:
+    assert wire.parse(rb'{"do":"print","text":"a\ud800b"}', wire.ROBOT)["text"] == "a?b"
