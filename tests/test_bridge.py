@@ -14,7 +14,10 @@ LISTEN = "import time, ev3dev2_glue as glue\n"
 
 
 def test_an_answer_joins_the_queue_at_the_first_tick_after_its_delay(rig: Rig) -> None:
-    program = LISTEN + "print('PY::a')\nfor _ in range(30):\n    time.sleep(0.01)\n    print(len(glue.pyState()['messages']))\n"
+    program = (
+        LISTEN
+        + "print('PY::a')\nfor _ in range(30):\n    time.sleep(0.01)\n    print(len(glue.pyState()['messages']))\n"
+    )
     recording = run_program(rig, program, responder=ECHO)
     arrived = next(line.t for line in recording.printed if line.text == "1")
     assert recording.messages[1].delivered == pytest.approx(0.1)
@@ -41,7 +44,10 @@ def test_only_a_text_that_begins_with_the_prefix_is_a_message(rig: Rig, text: st
 
 
 def test_several_answers_in_one_tick_queue_up_in_order(rig: Rig) -> None:
-    program = LISTEN + "for i in range(5): print('PY::' + str(i))\ntime.sleep(1)\nprint([m['heard'] for m in glue.pyState()['messages']])"
+    program = (
+        LISTEN
+        + "for i in range(5): print('PY::' + str(i))\ntime.sleep(1)\nprint([m['heard'] for m in glue.pyState()['messages']])"
+    )
     recording = run_program(rig, program, responder=ECHO)
     assert recording.printed[-1].text == "['0', '1', '2', '3', '4']"
 
@@ -95,7 +101,9 @@ def test_a_bad_answer_is_a_fault_and_the_robot_goes_on(rig: Rig, answer: str, ve
 
 
 def test_the_line_of_a_responders_error_is_its_own(rig: Rig) -> None:
-    recording = run_program(rig, "print('PY::a')", responder="def responder(text):\n    x = 1\n    return text.upcase()\n")
+    recording = run_program(
+        rig, "print('PY::a')", responder="def responder(text):\n    x = 1\n    return text.upcase()\n"
+    )
     assert recording.faults[0].line == 3
     assert recording.faults[0].who == "responder"
 

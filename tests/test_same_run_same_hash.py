@@ -35,7 +35,9 @@ LIBRARY = Path(__file__).parents[1] / "responders" / "library"
 def chain(name: str, rig: Rig) -> str:
     """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
     if name == "follower":
-        recording = run_program(rig, FOLLOWER, Pose(141, 125, 90), background="Line_Following_Test", noise=Noise(10, 20))
+        recording = run_program(
+            rig, FOLLOWER, Pose(141, 125, 90), background="Line_Following_Test", noise=Noise(10, 20)
+        )
         assert recording.verdict is Verdict.TIME_LIMIT
         assert len(recording.ticks) == 1800
     else:

@@ -29,7 +29,9 @@ def test_any_bytes_are_read_or_refused(data: bytes) -> None:
 
 
 @given(st.sampled_from(KINDS), st.dictionaries(st.sampled_from(["text", "units", "line", "port", "mark", "t"]), JSON))
-def test_a_frame_has_the_fields_of_its_kind_and_no_others(kind: tuple[wire.Schema, str], fields: dict[str, Any]) -> None:
+def test_a_frame_has_the_fields_of_its_kind_and_no_others(
+    kind: tuple[wire.Schema, str], fields: dict[str, Any]
+) -> None:
     schema, do = kind
     required, optional = schema[do]
     try:
