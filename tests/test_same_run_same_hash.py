@@ -29,7 +29,7 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
-LIBRARY = Path(__file__).parents[1] / "responders" / "library"
+SEED = Path(__file__).with_name("seed")
 
 
 def chain(name: str, rig: Rig) -> str:
@@ -47,7 +47,7 @@ def chain(name: str, rig: Rig) -> str:
             Pose(520, 900, 0),
             background="Simple_Shapes",
             noise=Noise(light=10),
-            responder=(LIBRARY / "shape_responder.py").read_text(),
+            responder=(SEED / "shape_responder.py").read_text(),
             files={"mlp_shapes_14x14.joblib": weights_bytes("shapes")},
         )
         assert recording.verdict is Verdict.FINISHED

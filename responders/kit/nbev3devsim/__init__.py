@@ -1,0 +1,1 @@
+"""What a responder imports in the place of the notebook's simulator widget."""

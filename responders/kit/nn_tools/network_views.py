@@ -1,0 +1,182 @@
+"""Training and asking the course's networks; the pictures of networks and losses that a notebook shows are left out.
+
+Predicting divides an image by its brightest pixel, training by its length, as the course does.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+from PIL import Image
+from sklearn.metrics import classification_report, confusion_matrix
+from sklearn.neural_network import MLPClassifier
+from sklearn.preprocessing import normalize
+
+from nn_tools.sensor_data import (
+    crop_and_zoom_to_fit,
+    generate_signature,
+    get_image_features,
+    jiggle,
+    make_image_black_and_white,
+)
+
+_NO_CNN = "convolutional networks in TensorFlow Lite's format cannot be loaded here; use a scikit-learn network"
+
+
+def class_predict_from_image(
+    MLP: Any,
+    img: Image.Image,
+    quiet: bool = True,
+    zoomview: bool = False,
+    confidence: bool = False,
+    signature: bool = False,
+) -> Any:
+    """The class that the network gives the image; with ``confidence`` also the highest probability."""
+    values = generate_signature(img, linear=True) if signature else get_image_features(img)
+    row = normalize([values], norm="max")
+    prediction = MLP.predict(row)[0]
+    if not quiet:
+        print(f"MLP predicts {prediction}")
+    if confidence:
+        return prediction, float(np.max(MLP.predict_proba(row)))
+    return prediction
+
+
+def predict_and_report_from_image(
+    MLP: Any,
+    img: Image.Image,
+    label: Any = None,
+    quiet: bool = False,
+    zoomview: bool = False,
+    jiggled: bool = False,
+    cropzoom: bool = False,
+    **_: Any,
+) -> None:
+    """Print what the network makes of the image, and what it is."""
+    if jiggled:
+        img = jiggle(img)
+    if cropzoom:
+        img = crop_and_zoom_to_fit(img)
+    print(f"MLP predicts {class_predict_from_image(MLP, img)} compared to label {label}; ")
+
+
+def image_class_predictor(
+    MLP: Any,
+    img: Image.Image,
+    label: Any = None,
+    size: tuple[int, int] | None = None,
+    greyscale_convert: bool = True,
+    eds_crop: bool = False,
+    **_: Any,
+) -> None:
+    """Print the predicted label. A sensor image of 20 x 20 is cut to 15 x 15, as in the original."""
+    if greyscale_convert:
+        img = img.convert("L")
+    if img.size == (20, 20):
+        img = img.crop((3, 3, 18, 18))
+    if size is not None:
+        img = img.resize(size, Image.Resampling.LANCZOS)
+    print(f"Predicted label: {class_predict_from_image(MLP, img)}")
+
+
+def progress_tracked_training(
+    data: Any,
+    labels: Any,
+    MLP: Any = None,
+    hidden_layer_sizes: Any = (30,),
+    max_iterations: int = 40,
+    quiet: bool = True,
+    **_: Any,
+) -> Any:
+    """A network trained one pass at a time."""
+    classes = np.unique(labels)
+    if MLP is None:
+        MLP = MLPClassifier(hidden_layer_sizes=hidden_layer_sizes, max_iter=1)
+    for _pass in range(max_iterations):
+        MLP.partial_fit(data, labels, classes=classes)
+    return MLP
+
+
+def quick_progress_tracked_training(
+    images: Sequence[Image.Image],
+    labels: Sequence[Any],
+    MLP: Any = None,
+    hidden_layer_sizes: Any = (30,),
+    max_iterations: int = 40,
+    report: bool = False,
+    test_limit: int | None = None,
+    size: tuple[int, int] | None = None,
+    jiggled: bool = False,
+    signature: bool = False,
+    **_: Any,
+) -> Any:
+    """A network trained on all images but the last tenth."""
+    if size is not None:
+        images = resized_images_pipeline(images, size)
+    if jiggled:
+        images = [jiggle(image) for image in images]
+    rows = [generate_signature(image, linear=True) if signature else get_image_features(image) for image in images]
+    kept = len(rows) - (max(len(rows) // 10, 1) if test_limit is None else test_limit)
+    MLP = progress_tracked_training(
+        normalize(rows[:kept], axis=1), list(labels)[:kept], MLP, hidden_layer_sizes, max_iterations
+    )
+    if report and kept < len(rows):
+        how_did_I_do(MLP, normalize(rows[kept:], axis=1), list(labels)[kept:])
+    return MLP
+
+
+def resized_images_pipeline(
+    images: Sequence[Image.Image],
+    size: tuple[int, int] = (14, 14),
+    bw: bool = True,
+    normalise: bool = False,
+    image_list: bool = True,
+) -> Any:
+    """The images resized, and cut to black and white at a grey of 100."""
+    resized = [image.resize(size, Image.Resampling.LANCZOS) for image in images]
+    if bw:
+        resized = [make_image_black_and_white(image, 100).convert("L") for image in resized]
+    if image_list and not normalise:
+        return resized
+    rows = [get_image_features(image) for image in resized]
+    return normalize(rows, axis=1) if normalise else rows
+
+
+def how_did_I_do(MLP: Any, data: Any, labels: Any) -> None:
+    """Print the classification report and the confusion matrix."""
+    predictions = MLP.predict(data)
+    print(classification_report(labels, predictions, zero_division=0))
+    print(confusion_matrix(labels, predictions))
+
+
+test_and_report = how_did_I_do
+
+
+def test_and_report_image_data(MLP: Any, images: Sequence[Image.Image], labels: Any, **_: Any) -> None:
+    how_did_I_do(MLP, normalize([get_image_features(image) for image in images], norm="max"), labels)
+
+
+def test_and_report_random_images(
+    MLP: Any, images: Sequence[Image.Image], labels: Sequence[Any], num_samples: int = 10, **_: Any
+) -> None:
+    """Print what the network makes of images drawn by chance."""
+    for place in random.sample(range(len(images)), min(num_samples, len(images))):
+        predict_and_report_from_image(MLP, images[place], labels[place])
+
+
+def _shows_nothing(*_args: Any, **_kwargs: Any) -> None:
+    """Draws in a notebook; nothing here."""
+
+
+network_structure = network_structure_report = show_loss = preview_weights = _shows_nothing
+prediction_class_chart = displayImageLabelPairFromArray = test_display = _shows_nothing
+
+
+def _no_cnn(*_args: Any, **_kwargs: Any) -> NoReturn:
+    raise NotImplementedError(_NO_CNN)
+
+
+cnn_load = cnn_get_details = cnn_rank_results = cnn_test_with_image = _no_cnn
