@@ -1,0 +1,67 @@
+"""The grades of a batch as comma-separated values: one for spreadsheets, one that Moodle imports.
+
+Cells that a spreadsheet would take for a formula are defused; nothing here decides who is in a batch.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+from service.grading.grade import Grade
+from service.reports.audience import student_view
+from service.reports.readable import number, one_line
+
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+
+def marks_csv(grades: Sequence[Grade]) -> str:
+    """One row a grade: student, assignment, marks, verdict, accuracy, hashes, then a column a criterion."""
+    criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
+    header = ["student", "assignment", "marks", "max_marks", "verdict"]
+    header += ["accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version"]
+    header += [f"marks: {criterion}" for criterion in criteria]
+    return _table([header, *(_row(grade, criteria) for grade in grades)])
+
+
+def moodle_csv(grades: Sequence[Grade]) -> str:
+    """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
+    rows = [["ID number", "Grade", "Feedback comments"]]
+    for grade in grades:
+        feedback = "; ".join(
+            f"{result.title}: {number(result.marks)} of {number(result.max_marks)}. {result.message}"
+            for result in student_view(grade).criteria
+        )
+        rows.append([grade.student, number(grade.marks), one_line(feedback, 2000)])
+    return _table(rows)
+
+
+def _row(grade: Grade, criteria: Sequence[str]) -> list[str]:
+    by_id = {result.id: number(result.marks) for result in grade.criteria}
+    accuracy = grade.accuracy
+    measured = [f"{accuracy.value:.4f}", f"{accuracy.low:.4f}", f"{accuracy.high:.4f}"] if accuracy else [""] * 3
+    return [
+        grade.student,
+        grade.assignment,
+        number(grade.marks),
+        number(grade.max_marks),
+        grade.verdict.value,
+        *measured,
+        str(accuracy.n) if accuracy else "",
+        grade.submission,
+        grade.assignment_version,
+        *(by_id.get(criterion, "") for criterion in criteria),
+    ]
+
+
+def _table(rows: Iterable[Sequence[str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\r\n")
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return stream.getvalue()
+
+
+def _cell(value: str) -> str:
+    text = one_line(value, 4000)
+    return f"'{text}" if text.startswith(_FORMULA_STARTS) else text

@@ -1,0 +1,88 @@
+"""The faults of a grade's trials, the same ones counted together, with the student's own line beside them.
+
+Faults are told, never judged; marks do not depend on anything here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from service.grading.grade import Grade
+from service.reports.readable import one_line, readable
+from sim.recording import Fault, Verdict
+from submissions.submission import Source, Submission
+
+_WHERE: Mapping[str, str] = MappingProxyType(
+    {
+        "program": "Robot program",
+        "responder": "Responder",
+        "bridge": "Bridge",
+        "host": "Grading machine",
+        "assignment": "Assignment",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLine:
+    """One line of the student's file; ``marked`` is the line at fault, the others stand around it."""
+
+    number: int
+    text: str
+    marked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FaultGroup:
+    """One fault and how often it came. All texts are fit to be shown."""
+
+    verdict: Verdict
+    where: str
+    message: str
+    hint: str
+    how_often: str
+    excerpt: tuple[SourceLine, ...] = ()
+
+
+def fault_groups(grade: Grade, submission: Submission | None = None, limit: int = 12) -> tuple[FaultGroup, ...]:
+    """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
+    found: dict[tuple[str, str, int | None], list[tuple[int, Fault]]] = {}
+    for index, trial in enumerate(grade.trials):
+        for fault in trial.recording.faults:
+            found.setdefault((fault.who, fault.message, fault.line), []).append((index, fault))
+    return tuple(_group(grade, places, submission) for places in list(found.values())[:limit])
+
+
+def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None) -> FaultGroup:
+    index, fault = places[0]
+    source = _source(fault, submission)
+    where = _WHERE[fault.who] if source is None else f"{_WHERE[fault.who]} ({one_line(source.name, 60)})"
+    if fault.line is not None:
+        where += f", line {fault.line}"
+    trial = grade.trials[index]
+    first = f"at {fault.t:.2f} s in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
+    trials = len({trial_index for trial_index, _ in places})
+    often = (
+        first if len(places) == 1 else f"{len(places)} times in {trials} of {len(grade.trials)} trials, first {first}"
+    )
+    excerpt = () if source is None or fault.line is None else _excerpt(source, fault.line)
+    return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), often, excerpt)
+
+
+def _source(fault: Fault, submission: Submission | None) -> Source | None:
+    if submission is None:
+        return None
+    return {"program": submission.program, "responder": submission.responder}.get(fault.who)
+
+
+def _excerpt(source: Source, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+    lines = source.text.rstrip("\n").split("\n")
+    if not 1 <= line <= len(lines):
+        return ()
+    first, last = max(1, line - around), min(len(lines), line + around)
+    return tuple(
+        SourceLine(number, readable(lines[number - 1].rstrip("\r"), 200), number == line)
+        for number in range(first, last + 1)
+    )

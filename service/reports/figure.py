@@ -1,0 +1,121 @@
+"""What every plot shares: paper size, type, colours that differ in lightness too, and how a figure becomes a PNG.
+
+It holds no state and never touches pyplot, so plots can be drawn in any process and come out the same.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, get_font
+from matplotlib.text import Text
+from PIL import Image
+
+from service.reports.readable import one_line
+
+#: Inches. On a phone the figure is shown about 3.6 inches wide, so 9 points still read as 6.
+WIDTH = 5.2
+DPI = 200
+
+INK = "#1c2630"
+FAINT = "#5d6873"
+RULE = "#c9ced3"
+LEFT = "#0b4a86"  # dark; the right side's orange is lighter and always dashed
+RIGHT = "#d9791a"
+PEN = "#e79b9b"
+FAULT = "#a3162a"
+SAID = "#3f7d3c"
+
+_FONT = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+_BOLD = _FONT.with_name("DejaVuSans-Bold.ttf")
+
+
+def new_figure(height: float, title: str, subtitle: str = "") -> Figure:
+    """A white figure ``WIDTH`` x ``height`` inches with its title at the top left; ``HEAD`` inches are taken."""
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    write(figure, 0.08, height - 0.08, one_line(title, 58), size=10.5, bold=True, va="top")
+    if subtitle:
+        write(figure, 0.08, height - 0.30, one_line(subtitle, 84), size=8, colour=FAINT, va="top")
+    return figure
+
+
+HEAD = 0.56
+
+
+def write(
+    figure: Figure,
+    x: float,
+    y: float,
+    text: str,
+    *,
+    size: float = 8.5,
+    colour: str = INK,
+    bold: bool = False,
+    ha: str = "left",
+    va: str = "baseline",
+) -> Text:
+    """Text at ``x``, ``y`` inches from the lower left corner of the figure."""
+    width, height = figure.get_size_inches()
+    return figure.text(
+        x / width, y / height, drawable(text), color=colour, ha=ha, va=va, font=font(size, bold=bold),
+        parse_math=False,
+    )  # fmt: skip
+
+
+def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Axes at a rectangle given in inches, with thin rules and small type."""
+    figure_width, figure_height = figure.get_size_inches()
+    axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
+    for side in axes.spines.values():
+        side.set_color(RULE)
+        side.set_linewidth(0.8)
+    axes.tick_params(color=RULE, labelcolor=INK, length=3, width=0.8, pad=2)
+    set_tick_type(axes)
+    return axes
+
+
+def set_tick_type(axes: Axes, size: float = 8) -> None:
+    """Sets the tick labels' type, points."""
+    axes.tick_params(labelsize=size, labelfontfamily="DejaVu Sans")
+
+
+@lru_cache(maxsize=64)
+def font(size: float, *, bold: bool = False) -> FontProperties:
+    """The type that comes with matplotlib, whatever the machine has installed."""
+    return FontProperties(fname=str(_BOLD if bold else _FONT), size=size)
+
+
+def drawable(text: str) -> str:
+    """``text`` with every character that the type lacks replaced, so that none is drawn as an empty box."""
+    known = _known_characters()
+    return "".join(character if character == "\n" or ord(character) in known else "\ufffd" for character in text)
+
+
+def whole(value: float) -> str:
+    """``value`` without decimals, with a true minus sign and never as minus nought."""
+    return str(round(value)).replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as a PNG of at most 256 colours, without metadata; the same figure gives the same bytes."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    picture = Image.frombuffer("RGBA", canvas.get_width_height(), bytes(canvas.buffer_rgba())).convert("RGB")  # type: ignore[no-untyped-call]
+    stream = io.BytesIO()
+    picture.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
+        stream, "PNG", compress_level=9, dpi=(DPI, DPI)
+    )
+    return stream.getvalue()
+
+
+@lru_cache(maxsize=1)
+def _known_characters() -> frozenset[int]:
+    # Both cuts are drawn with, and the bold one has fewer characters.
+    return frozenset(get_font(str(_FONT)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())

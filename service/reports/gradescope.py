@@ -1,0 +1,62 @@
+"""A grade as Gradescope's ``results.json``: one test a criterion, with its own visibility.
+
+Gradescope hides what is not ``visible`` by itself, so the whole grade goes in; the top-level text, which every
+student reads, tells nothing of hidden parts.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from service.grading.grade import CriterionResult, Grade
+from service.reports.audience import student_view
+from service.reports.json_output import json_number
+from service.reports.readable import readable
+from service.reports.verdict_words import verdict_words
+
+
+def gradescope_document(grade: Grade) -> dict[str, Any]:
+    """``grade`` in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
+    return {
+        "score": json_number(grade.marks),
+        "output": _output(grade),
+        "output_format": "text",
+        "test_output_format": "text",
+        "test_name_format": "text",
+        "visibility": "visible",
+        "stdout_visibility": "hidden",
+        "tests": [_test(number, result) for number, result in enumerate(grade.criteria, start=1)],
+        "extra_data": {
+            "assignment": grade.assignment,
+            "assignment_version": grade.assignment_version,
+            "submission": grade.submission,
+            "grader_version": grade.grader_version,
+            "walls": grade.walls,
+        },
+    }
+
+
+def gradescope_text(grade: Grade) -> str:
+    """The document as indented ASCII JSON."""
+    return json.dumps(gradescope_document(grade), indent=2, allow_nan=False)
+
+
+def _test(number: int, result: CriterionResult) -> dict[str, Any]:
+    return {
+        "number": str(number),
+        "name": readable(result.title, 200),
+        "score": json_number(result.marks),
+        "max_score": json_number(result.max_marks),
+        "status": "passed" if result.marks >= result.max_marks else "failed",
+        "output": readable(result.message),
+        "visibility": result.visibility,
+    }
+
+
+def _output(grade: Grade) -> str:
+    shown = student_view(grade)
+    words = verdict_words(shown.verdict)
+    faults = dict.fromkeys(readable(fault.message, 500) for trial in shown.trials for fault in trial.recording.faults)
+    lines = [words.happened, words.whose, words.next_step, *list(faults)[:10], f"walls: {grade.walls}"]
+    return "\n".join(lines)

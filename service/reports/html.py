@@ -1,0 +1,128 @@
+"""A grade as one self-contained HTML file, for the student or for staff, and the index page of a batch.
+
+Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
+the pages load nothing, run nothing and send nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import lru_cache
+from importlib.resources import files
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from service.grading.grade import Grade
+from service.reports.audience import BEFORE_PUBLICATION, student_view
+from service.reports.page import page_of
+from service.reports.readable import number, readable
+from service.reports.verdict_words import verdict_words
+from sim.recording import Verdict
+from submissions.submission import Submission
+
+
+@dataclass(frozen=True, slots=True)
+class BatchRow:
+    """One student of a batch. ``report`` is a path relative to the index page; marks are None until graded."""
+
+    student: str
+    marks: Decimal | None = None
+    max_marks: Decimal | None = None
+    verdict: Verdict | None = None
+    report: str | None = None
+    note: str = ""
+
+
+def student_report(
+    grade: Grade,
+    plots: Mapping[str, bytes],
+    submission: Submission | None = None,
+    released: frozenset[str] = BEFORE_PUBLICATION,
+) -> str:
+    """The page a student reads: nothing of hidden criteria or trials, and the source lines at fault if given.
+
+    ``plots`` are those of ``draw_all``; the ones that are missing are left out.
+    """
+    view = student_view(grade, released)
+    withheld = len(view.criteria) < len(grade.criteria) or len(view.trials) < len(grade.trials)
+    return _page(view, plots, submission, staff=False, withheld=withheld)
+
+
+def staff_report(grade: Grade, plots: Mapping[str, bytes], submission: Submission | None = None) -> str:
+    """The page staff read: everything, with the visibility of each criterion and trial."""
+    return _page(grade, plots, submission, staff=True, withheld=False)
+
+
+def batch_index(rows: Sequence[BatchRow], title: str = "Batch", walls: str = "") -> str:
+    """A page with one row a student: marks, verdict, and a link to the report."""
+    graded = [row for row in rows if row.marks is not None]
+    cells = [
+        {
+            "student": row.student,
+            "marks": "" if row.marks is None else number(row.marks),
+            "max_marks": "" if row.max_marks is None else number(row.max_marks),
+            "share": _share(row.marks, row.max_marks),
+            "words": None if row.verdict is None else verdict_words(row.verdict),
+            "report": None if row.report is None else _relative_link(row.report),
+            "note": row.note,
+        }
+        for row in rows
+    ]
+    return _render("batch.html", title=title, rows=cells, graded=len(graded), walls=walls)
+
+
+def _page(
+    grade: Grade, plots: Mapping[str, bytes], submission: Submission | None, *, staff: bool, withheld: bool
+) -> str:
+    pictures = {name: _data_uri(data) for name, data in plots.items()}
+    page = page_of(grade, submission)
+    return _render("report.html", page=page, pictures=pictures, staff=staff, withheld=withheld)
+
+
+def _render(template: str, **context: object) -> str:
+    style = _style()
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+    page = _environment().get_template(template)
+    return page.render(style=Markup(style), policy=policy, **context)
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("service.reports"),
+        autoescape=True,
+        finalize=_shown,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+@lru_cache(maxsize=1)
+def _style() -> str:
+    return "\n" + files("service.reports").joinpath("templates/report.css").read_text(encoding="utf-8")
+
+
+def _shown(value: object) -> object:
+    """Applied to every expression of a template, before it is escaped."""
+    return readable(value, 20_000, lines=400) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
+def _data_uri(data: bytes) -> Markup:
+    return Markup("data:image/png;base64,") + Markup(base64.b64encode(data).decode("ascii"))
+
+
+def _relative_link(path: str) -> str:
+    # A colon that is quoted cannot start a scheme, and two slashes cannot name a host.
+    return quote(path.encode("utf-8", "replace").decode("utf-8").lstrip("/"), safe="/")
+
+
+def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:
+    return 0.0 if not marks or not max_marks else round(100 * float(marks / max_marks), 1)

@@ -1,0 +1,234 @@
+"""What a report page tells of a grade, section by section, as plain data that a template lays out.
+
+Nothing is escaped here, and nothing is hidden: the grade that comes in is already the reader's view.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.audience import scenarios, worst_trial
+from service.reports.faults import FaultGroup, fault_groups
+from service.reports.plots import Plot, plots_of
+from service.reports.readable import message_words, number, one_line, readable
+from service.reports.verdict_words import VerdictWords, verdict_words
+from sim.recording import Message, Recording, Verdict
+from submissions.submission import Submission
+
+_TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
+_MOST_MESSAGES = 40
+_MOST_TRIALS = 250
+PROCESS_LIMITS = "process limits only"
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionLine:
+    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure."""
+
+    title: str
+    message: str
+    marks: str
+    max_marks: str
+    share: float
+    state: str  # full, part, none
+    visibility: str
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One moment of a timeline; ``t`` is empty for a line that says how many were left out."""
+
+    t: str
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MessageLine:
+    """One row of the messages table."""
+
+    t: str
+    sender: str
+    text: str
+    arrived: str
+    wrong: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TrialLine:
+    """One row of the table of all trials."""
+
+    scenario: str
+    index: int
+    start: str
+    noise: str
+    seed: str
+    seconds: str
+    words: VerdictWords
+    sha256: str
+    visibility: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A closer look at one trial of a scenario: the one that lost most."""
+
+    scenario: str
+    which: str
+    words: VerdictWords
+    plots: tuple[Plot, ...]
+    timeline: tuple[Entry, ...]
+    messages: tuple[MessageLine, ...]
+    more_messages: int
+    responder_output: str
+    responder_log: str
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """All that the template needs."""
+
+    grade: Grade
+    marks: str
+    max_marks: str
+    share: float
+    words: VerdictWords
+    next_step: str
+    criteria: tuple[CriterionLine, ...]
+    faults: tuple[FaultGroup, ...]
+    classification: tuple[Plot, ...]
+    scenes: tuple[Scene, ...]
+    trials: tuple[TrialLine, ...]
+    more_trials: int
+    notes: tuple[str, ...]
+    weak_walls: bool
+
+
+def page_of(grade: Grade, submission: Submission | None = None) -> Page:
+    """Everything a report says about ``grade``."""
+    plots = plots_of(grade)
+    lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
+    return Page(
+        grade=grade,
+        marks=number(grade.marks),
+        max_marks=number(grade.max_marks),
+        share=_share(float(grade.marks), float(grade.max_marks)),
+        words=verdict_words(grade.verdict),
+        next_step=_next_step(grade),
+        criteria=tuple(_criterion_line(grade, result) for result in grade.criteria),
+        faults=fault_groups(grade, submission),
+        classification=tuple(plot for plot in plots if not plot.scenario),
+        scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
+        trials=lines,
+        more_trials=len(grade.trials) - len(lines),
+        notes=tuple(readable(note, 400) for note in grade.notes[:20]),
+        weak_walls=PROCESS_LIMITS in grade.walls,
+    )
+
+
+def timeline(recording: Recording) -> tuple[Entry, ...]:
+    """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
+    moments = [(line.t, "printed", line.text) for line in recording.printed]
+    moments += [(line.t, "said", line.text) for line in recording.spoken]
+    moments += [(touch.t, "touched", touch.what) for touch in recording.touches]
+    moments += [(fault.t, "fault", fault.message) for fault in recording.faults]
+    moments.sort(key=lambda moment: moment[0])
+    omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
+    if omitted <= 1:
+        return tuple(_entry(*moment) for moment in moments)
+    first, last = moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:]
+    gap = Entry("", "", f"{omitted:,} more entries are not shown")
+    return (*(_entry(*moment) for moment in first), gap, *(_entry(*moment) for moment in last))
+
+
+def _next_step(grade: Grade) -> str:
+    """The verdict's advice if something went wrong, else what would gain most marks."""
+    words = verdict_words(grade.verdict)
+    if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
+        return words.next_step
+    lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
+    if lost is None or lost.marks >= lost.max_marks:
+        return "Everything that was asked for is there."
+    missing = number(lost.max_marks - lost.marks)
+    title, of = one_line(lost.title, 100), number(lost.max_marks)
+    return f"Most is to be gained at “{title}”, where {missing} of {of} marks are missing."
+
+
+def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:
+    full = result.marks >= result.max_marks
+    failed = next((item for item in result.evidence if not item.passed), None)
+    return CriterionLine(
+        title=one_line(result.title, 200),
+        message=readable(result.message, 1000, lines=12),
+        marks=number(result.marks),
+        max_marks=number(result.max_marks),
+        share=_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
+        state="full" if full else ("part" if result.marks > 0 else "none"),
+        visibility=result.visibility,
+        where="" if full or failed is None else _where(grade, failed),
+    )
+
+
+def _where(grade: Grade, evidence: Evidence) -> str:
+    if not 0 <= evidence.trial < len(grade.trials):
+        return ""
+    trial = grade.trials[evidence.trial]
+    return f"First missed in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
+
+
+def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
+    index = worst_trial(grade, scenario)
+    trial = grade.trials[index]
+    recording = trial.recording
+    of = sum(other.scenario == scenario for other in grade.trials)
+    which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
+    if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
+        which = f"trial {trial.index + 1} of {of}"
+    return Scene(
+        scenario=one_line(scenario, 80),
+        which=which,
+        words=verdict_words(trial.verdict),
+        plots=tuple(plot for plot in plots if plot.scenario == scenario),
+        timeline=timeline(recording),
+        messages=tuple(_message_lines(recording.messages[:_MOST_MESSAGES])),
+        more_messages=max(0, len(recording.messages) - _MOST_MESSAGES),
+        responder_output=readable(recording.responder_output, 4000),
+        responder_log=readable(recording.responder_log, 4000),
+        notes=tuple(readable(note, 400) for note in recording.notes[:10]),
+    )
+
+
+def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
+    for message in messages:
+        arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
+        if message.note:
+            arrived += f" ({one_line(message.note, 40)})"
+        wrong = message.delivered is None or bool(message.note)
+        yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
+
+
+def _trial_line(trial: TrialResult) -> TrialLine:
+    start = trial.recording.start
+    return TrialLine(
+        scenario=one_line(trial.scenario, 60),
+        index=trial.index + 1,
+        start=f"{start.x:.0f}, {start.y:.0f}, {start.heading:.0f}°",
+        noise=f"{trial.light_noise:g} / {trial.motor_noise:g}",
+        seed=str(trial.seed),
+        seconds=f"{trial.recording.end_t:.2f}",
+        words=verdict_words(trial.verdict),
+        sha256=trial.recording.sha256[:12],
+        visibility=trial.visibility,
+    )
+
+
+def _entry(t: float, kind: str, text: str) -> Entry:
+    return Entry(f"{t:.2f}", kind, readable(text, 400, lines=8))
+
+
+def _share(part: float, whole: float) -> float:
+    return round(100 * max(0.0, min(1.0, part / whole)), 1) if whole else 0.0

@@ -1,0 +1,181 @@
+"""Which plots a grade has, what each is called and says, and all of them drawn.
+
+The drawing is in one module a plot; nothing here is random, timed or kept between calls.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+from service.grading.grade import CriterionResult, Grade
+from service.reports.audience import BEFORE_PUBLICATION, scenarios, student_view, worst_trial
+from service.reports.confusion_plot import draw_confusion
+from service.reports.conversation_plot import draw_conversation
+from service.reports.figure import png
+from service.reports.path_plot import Picture, draw_path
+from service.reports.readable import one_line
+from service.reports.sensor_plot import draw_sensors
+from service.reports.sights_plot import chosen_sights, draw_sights, is_right
+from sim.backgrounds import floor as floor_of
+from sim.errors import UsageError
+
+Kind = Literal["path", "sensors", "conversation", "confusion", "sights"]
+_NO_PICTURES: Mapping[str, Picture] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """One plot of a grade. ``subject`` indexes the grade's trials, or its criteria for confusion and sights.
+
+    ``name`` ends in ``-staff`` if the plot shows anything that a student may not see before publication.
+    """
+
+    name: str
+    kind: Kind
+    subject: int
+    scenario: str  # empty for confusion and sights
+    title: str
+    caption: str
+    alt: str
+
+
+def plots_of(grade: Grade) -> tuple[Plot, ...]:
+    """Path and sensors of every scenario's worst trial, conversations of the first and the worst, classifications."""
+    return (*_classifications(grade), *_trials(grade))
+
+
+def draw_all(grade: Grade, pictures: Mapping[str, Picture] = _NO_PICTURES) -> dict[str, bytes]:
+    """Every plot of ``grade`` for staff and for the student, name -> PNG.
+
+    ``pictures`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
+    y = 1143 mm; a floor that is in neither is drawn white.
+    """
+    drawn: dict[str, bytes] = {}
+    for view in (grade, student_view(grade)):
+        for plot in plots_of(view):
+            if plot.name not in drawn:
+                drawn[plot.name] = png(_draw(view, plot, pictures))
+    return drawn
+
+
+def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
+    if plot.kind == "path":
+        trial = grade.trials[plot.subject]
+        return draw_path(trial, plot.title, _floor(trial.recording.background, pictures))
+    if plot.kind == "sensors":
+        return draw_sensors(grade.trials[plot.subject], plot.title)
+    if plot.kind == "conversation":
+        return draw_conversation(grade.trials[plot.subject], plot.title)
+    result = grade.criteria[plot.subject]
+    if plot.kind == "confusion" and result.accuracy is not None:
+        return draw_confusion(result, result.accuracy, plot.title)
+    return draw_sights(result.sights, plot.title)
+
+
+def _floor(background: str, pictures: Mapping[str, Picture]) -> Picture | None:
+    if background in pictures:
+        return pictures[background]
+    try:
+        return floor_of(background).picture
+    except UsageError:
+        return None
+
+
+def _classifications(grade: Grade) -> Iterator[Plot]:
+    for index, result in enumerate(grade.criteria):
+        suffix = _suffix(_hidden_classification(grade, result))
+        accuracy = result.accuracy
+        if accuracy is not None and accuracy.confusion:
+            right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
+            yield Plot(
+                f"confusion-{_slug(result.id)}{suffix}", "confusion", index, "", _title(grade, "what was answered"),
+                f"What each picture showed and what was answered, for “{one_line(result.title, 80)}”.",
+                f"Confusion matrix: {right} of {accuracy.n} pictures on the diagonal, accuracy {accuracy.value:.2f}, "
+                f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
+            )  # fmt: skip
+        if result.sights:
+            shown = len(chosen_sights(result.sights))
+            wrong = [sight for sight in result.sights if not is_right(sight)]
+            told = "; ".join(
+                f"{one_line(sight.truth, 40)} answered as {one_line(sight.answer or 'nothing', 40)}"
+                for sight in wrong[:4]
+            )
+            yield Plot(
+                f"sights-{_slug(result.id)}{suffix}", "sights", index, "", _title(grade, "what the sensor saw"),
+                "What the left light sensor sent, whole and in the focus that a network is shown. "
+                "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
+                f"{shown} sensor pictures, {len(wrong)} of {len(result.sights)} answered wrongly"
+                + (f": {told}." if told else "."),
+            )  # fmt: skip
+
+
+def _trials(grade: Grade) -> Iterator[Plot]:
+    for scenario in scenarios(grade):
+        index = worst_trial(grade, scenario)
+        trial = grade.trials[index]
+        recording = trial.recording
+        name = f"{_slug(scenario)}-{trial.index + 1}{_suffix(trial.visibility not in BEFORE_PUBLICATION)}"
+        title = _title(grade, scenario)
+        start, end = recording.start, recording.end
+        yield Plot(
+            f"path-{name}", "path", index, scenario, f"{title}: path",
+            "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
+            "darts point where it was heading.",
+            f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
+            f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
+            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches.",
+        )  # fmt: skip
+        light = recording.ticks.left_rgb[:, 0]
+        heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
+        yield Plot(
+            f"sensors-{name}", "sensors", index, scenario, f"{title}: sensors",
+            "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
+            "messages sent, answers received, speech, touches and faults.",
+            f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
+        )  # fmt: skip
+    yield from _conversations(grade)
+
+
+def _conversations(grade: Grade) -> Iterator[Plot]:
+    """Of the first trial in which anything was sent, and of every scenario's worst."""
+    talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
+    worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
+    for index in dict.fromkeys([*talking[:1], *(index for index in worst if index in talking)]):
+        trial = grade.trials[index]
+        messages = trial.recording.messages
+        sent = sum(message.sender == "robot" for message in messages)
+        lost = sum(message.delivered is None for message in messages)
+        suffix = _suffix(trial.visibility not in BEFORE_PUBLICATION)
+        yield Plot(
+            f"conversation-{_slug(trial.scenario)}-{trial.index + 1}{suffix}", "conversation", index, trial.scenario,
+            f"{_title(grade, trial.scenario)}: conversation",
+            f"Who told whom what in trial {trial.index + 1}; time goes down.",
+            f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
+            f"{lost} never arrived.",
+        )  # fmt: skip
+
+
+def _hidden_classification(grade: Grade, result: CriterionResult) -> bool:
+    return result.visibility not in BEFORE_PUBLICATION or any(
+        grade.trials[sight.trial].visibility not in BEFORE_PUBLICATION
+        for sight in result.sights
+        if 0 <= sight.trial < len(grade.trials)
+    )
+
+
+def _title(grade: Grade, what: str) -> str:
+    return f"{one_line(grade.assignment_title, 32)}, {one_line(what, 24)}"
+
+
+def _suffix(hidden: bool) -> str:
+    return "-staff" if hidden else ""
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", text)[:60].strip("-.") or "unnamed"

@@ -1,0 +1,75 @@
+"""Makes text that a student's program wrote fit to be shown: visible, one direction, capped.
+
+It does not escape for HTML, XML or a terminal's markup; whoever writes those formats does that too.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from decimal import Decimal
+
+#: Joiners that emoji and several scripts need; every other invisible format character is spelled out.
+_JOINERS = "\u200c\u200d"
+_LONGEST_MARKS = 6  # combining marks on one letter; no living script needs more
+_HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Cn", "Zl", "Zp"})
+
+
+def readable(text: str, limit: int = 2000, *, lines: int = 40) -> str:
+    """``text`` with nothing invisible left in it, at most ``limit`` characters and ``lines`` lines long.
+
+    Control characters, bidirectional overrides, lone surrogates and their like become escapes such as ``\\x1b``
+    and ``\\u202e``; line feeds stay, tabs become four spaces. What was cut is said at the end.
+    """
+    head = text[:limit]
+    kept = head.replace("\r\n", "\n").split("\n")[:lines]
+    shown = "\n".join(_spelled(line) for line in kept)
+    if len(shown) > 6 * limit:  # escapes are longer than what they stand for
+        shown = shown[: 6 * limit]
+    missing_lines = text.count("\n") + 1 - len(kept)
+    if len(text) > limit:
+        return f"{shown}… ({len(text) - limit:,} more characters)"
+    if missing_lines > 0:
+        return f"{shown}\n… ({missing_lines:,} more lines)"
+    return shown
+
+
+def one_line(text: str, limit: int = 120) -> str:
+    """``text`` on one line, at most ``limit`` characters, an ellipsis where it was cut."""
+    spelled = _spelled(re.sub(r"\s*[\r\n]\s*", " ⏎ ", text[: 4 * limit + 4].strip()))
+    return spelled if len(spelled) <= limit and len(text) <= 4 * limit else spelled[: limit - 1].rstrip() + "…"
+
+
+def message_words(text: str, limit: int = 120) -> str:
+    """A message on one line; the thousands of numbers of a picture are named instead of listed."""
+    if text.startswith("IMG_DATA::{") and len(text) > 200:
+        return "IMG_DATA::{left, right}"
+    return one_line(text, limit)
+
+
+def number(value: Decimal) -> str:
+    """Marks as people write them: ``4``, ``2.5``, never ``4.00`` or ``0E+1``."""
+    plain = f"{value:f}"
+    return plain.rstrip("0").rstrip(".") if "." in plain else plain
+
+
+def _spelled(line: str) -> str:
+    pieces: list[str] = []
+    marks = 0
+    for character in line:
+        category = unicodedata.category(character)
+        marks = marks + 1 if category in ("Mn", "Me") else 0
+        if character == "\t":
+            pieces.append("    ")
+        elif marks > _LONGEST_MARKS or (category in _HIDDEN_CATEGORIES and character not in _JOINERS):
+            pieces.append(_escape(character))
+        else:
+            pieces.append(character)
+    return "".join(pieces)
+
+
+def _escape(character: str) -> str:
+    code = ord(character)
+    if code < 0x100:
+        return f"\\x{code:02x}"
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

@@ -1,0 +1,60 @@
+"""A grade in a terminal with Rich: marks table, verdict, faults.
+
+Student text goes in as ``rich.text.Text``, so square brackets in it are never markup.
+"""
+
+from __future__ import annotations
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from service.grading.grade import Grade
+from service.reports.faults import FaultGroup, fault_groups
+from service.reports.readable import number, one_line, readable
+from service.reports.text import accuracy_words
+from service.reports.verdict_words import verdict_words
+
+_STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
+
+
+def rich_report(grade: Grade) -> RenderableType:
+    """``grade`` as one renderable; print it with ``rich.console.Console().print``."""
+    words = verdict_words(grade.verdict)
+    heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
+    verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.next_step}")
+    parts: list[RenderableType] = [heading, marks_table(grade), verdict]
+    parts += [_fault(group) for group in fault_groups(grade)]
+    if grade.accuracy is not None:
+        parts.append(Text(accuracy_words(grade)))
+    parts += [Text(f"Note: {readable(note, 300)}", style="dim") for note in grade.notes[:20]]
+    parts.append(Text(f"walls: {one_line(grade.walls)}", style="dim"))
+    return Group(*parts)
+
+
+def marks_table(grade: Grade) -> Table:
+    """Criteria with marks and messages, and the total in the footer."""
+    table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
+    table.add_column("Marks", justify="right", no_wrap=True, footer=_marks(grade))
+    table.add_column("Criterion", footer=Text("in all"))
+    for result in grade.criteria:
+        full = result.marks >= result.max_marks
+        style = "green" if full else ("red" if result.marks == 0 else "yellow")
+        marks = Text(f"{number(result.marks)} / {number(result.max_marks)}", style=style)
+        message = Text(readable(result.message, 600, lines=6), style="dim")
+        table.add_row(marks, Group(Text(one_line(result.title)), message))
+    return table
+
+
+def _marks(grade: Grade) -> Text:
+    return Text(f"{number(grade.marks)} / {number(grade.max_marks)}", style="bold")
+
+
+def _fault(group: FaultGroup) -> RenderableType:
+    text = Text.assemble((group.where, "bold"), f": {group.message}")
+    if group.hint:
+        text.append(f"\n{group.hint}")
+    text.append(f"\n({group.how_often})", style="dim")
+    return Padding(text, (0, 0, 0, 2))

@@ -1,0 +1,108 @@
+"""Draws the pictures that a light sensor sent: all of it, the focus that a network is shown, and what was answered.
+
+Whether an answer is right was decided when the work was marked; here it is only shown, by sign and word.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+from PIL import Image as Picture
+
+from service.grading.grade import Sight
+from service.reports.figure import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.readable import one_line
+from sim.recording import Image
+
+MOST_SIGHTS = 12
+#: The part of the 20 x 20 picture that lies wholly inside the round sensor: left, upper, right, lower.
+FOCUS = (3, 3, 17, 17)
+_CARD_WIDTH, _CARD_HEIGHT = 2.56, 1.77
+_SIDE = 1.13  # inches of a picture
+_COLUMNS = 2
+
+
+def draw_sights(sights: Sequence[Sight], title: str) -> Figure:
+    """Cards of at most ``MOST_SIGHTS`` pictures, wrong answers first where not all fit."""
+    shown = chosen_sights(sights)
+    rows = -(-len(shown) // _COLUMNS)
+    height = rows * _CARD_HEIGHT
+    figure = new_figure(HEAD + height + 0.06, title, _subtitle(sights, shown))
+    axes = axes_at(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
+    axes.set_axis_off()
+    for place, number in enumerate(shown):
+        x, y = place % _COLUMNS * _CARD_WIDTH, place // _COLUMNS * _CARD_HEIGHT
+        _draw_card(axes, sights[number], number + 1, x, y)
+    axes.set_xlim(-0.08, WIDTH - 0.12)
+    axes.set_ylim(height, -0.06)
+    return figure
+
+
+def chosen_sights(sights: Sequence[Sight]) -> tuple[int, ...]:
+    """Indices of the pictures to show, ascending; if there are too many, all wrong ones come first."""
+    order = sorted(range(len(sights)), key=lambda index: (is_right(sights[index]), index))
+    return tuple(sorted(order[:MOST_SIGHTS]))
+
+
+def is_right(sight: Sight) -> bool:
+    """Whether the answer was the truth."""
+    return sight.answer is not None and sight.answer == sight.truth
+
+
+def sensor_picture(image: Image) -> Picture.Image:
+    """What the left sensor sent, as an RGB picture of ``image.side`` squared."""
+    return Picture.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
+
+
+def focus_picture(image: Image) -> Picture.Image:
+    """The greyscale crop that a network is shown; sensors of another size than 20 are shown whole."""
+    whole = sensor_picture(image).convert("L")
+    return whole.crop(FOCUS) if image.side == 20 else whole
+
+
+def _subtitle(sights: Sequence[Sight], shown: Sequence[int]) -> str:
+    wrong = sum(not is_right(sight) for sight in sights)
+    count = f"{len(sights)} pictures" if len(shown) == len(sights) else f"{len(shown)} of {len(sights)} pictures"
+    return f"{count}, {wrong} answered wrongly; each: all 20×20, then the 14×14 focus"
+
+
+def _draw_card(axes: Axes, sight: Sight, number: int, x: float, y: float) -> None:
+    right = is_right(sight)
+    whole, focus = np.asarray(sensor_picture(sight.image)), np.asarray(focus_picture(sight.image))
+    _draw_picture(axes, whole, x, y)
+    _draw_picture(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
+    if sight.image.side == 20:
+        pixel = _SIDE / 20
+        axes.add_patch(
+            Rectangle((x + FOCUS[0] * pixel, y + FOCUS[1] * pixel), 14 * pixel, 14 * pixel, facecolor="none",
+                      edgecolor=INK, linewidth=0.9, linestyle=(0, (2.5, 1.5)))
+        )  # fmt: skip
+    colour = SAID if right else FAULT
+    if not right:
+        axes.add_patch(
+            Rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, facecolor="none", edgecolor=colour,
+                      linewidth=1.8)
+        )  # fmt: skip
+    sign, word = ("✓", "right") if right else ("✗", "wrong")
+    answer = "no answer" if sight.answer is None else one_line(sight.answer, 30)
+    lines = [
+        (f"{number}. {sign} {word}", colour, True),
+        (f"answered: {answer}" if sight.answer is not None else answer, INK, False),
+        (f"truth: {one_line(sight.truth, 30)}", FAINT if right else INK, False),
+    ]
+    for row, (text, shade, bold) in enumerate(lines):
+        axes.text(
+            x, y + _SIDE + 0.08 + 0.142 * row, drawable(textwrap.shorten(text, 38, placeholder="…")), color=shade,
+            font=font(8.3, bold=bold), va="top", parse_math=False,
+        )  # fmt: skip
+
+
+def _draw_picture(axes: Axes, pixels: NDArray[np.uint8], x: float, y: float) -> None:
+    axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))

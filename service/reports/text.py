@@ -1,0 +1,64 @@
+"""A grade as plain text, for a terminal, a log or an e-mail: marks, verdict, messages.
+
+It shows all of the grade it is given; pass it a student's view where a student reads it.
+"""
+
+from __future__ import annotations
+
+import textwrap
+
+from service.grading.grade import Grade
+from service.reports.faults import FaultGroup, fault_groups
+from service.reports.readable import number, one_line, readable
+from service.reports.verdict_words import verdict_words
+
+_WIDTH = 96
+
+
+def plain_text(grade: Grade) -> str:
+    """``grade`` in lines of at most 96 characters, without colour or control codes."""
+    title = f"{one_line(grade.assignment_title)}: {one_line(grade.student, 60)}"
+    words = verdict_words(grade.verdict)
+    lines = [title, "=" * min(len(title), _WIDTH), ""]
+    lines += [f"{number(grade.marks)} of {number(grade.max_marks)} marks; {words.short}", ""]
+    for result in grade.criteria:
+        marks = f"{number(result.marks)}/{number(result.max_marks)}"
+        lines += _wrapped(f"{marks:>9}  {one_line(result.title)}", indent=11)
+        lines += _wrapped(" " * 11 + readable(result.message, 600, lines=6), indent=11)
+    lines += ["", *_wrapped(f"{words.happened} {words.whose} {words.next_step}")]
+    for group in fault_groups(grade):
+        lines += ["", *_fault_lines(group)]
+    if grade.accuracy is not None:
+        lines += ["", accuracy_words(grade)]
+    for note in grade.notes[:20]:
+        lines += _wrapped(f"Note: {readable(note, 300)}", indent=6)
+    lines += ["", f"walls: {one_line(grade.walls)}", ""]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def accuracy_words(grade: Grade) -> str:
+    """One sentence with value, interval and n; empty without a classification."""
+    accuracy = grade.accuracy
+    if accuracy is None:
+        return ""
+    return (
+        f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
+        f"{accuracy.n} pictures)."
+    )
+
+
+def _fault_lines(group: FaultGroup) -> list[str]:
+    lines = _wrapped(f"{group.where}: {group.message}", indent=4)
+    if group.hint:
+        lines += _wrapped(f"    {group.hint}", indent=4)
+    return [*lines, f"    ({group.how_often})"]
+
+
+def _wrapped(text: str, indent: int = 0) -> list[str]:
+    lines: list[str] = []
+    for piece in text.split("\n"):
+        first = "" if not lines else " " * indent
+        lines += textwrap.wrap(
+            piece, _WIDTH, initial_indent=first, subsequent_indent=" " * indent, break_on_hyphens=False
+        ) or [""]
+    return lines

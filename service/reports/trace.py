@@ -1,0 +1,112 @@
+"""A recording as plain numbers and strings, for ``robomark run --trace`` and whoever wants to compute with it.
+
+It leaves nothing out but the chain's inner steps, and never holds a number that JSON cannot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from sim.recording import SECOND, TICK, Image, Line, Pose, Recording
+
+
+def trace(recording: Recording) -> dict[str, Any]:
+    """``recording`` as a JSON-serialisable dict: one row a tick under ``ticks``, then what was said and sent.
+
+    Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees
+    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists.
+    """
+    ticks = recording.ticks
+    return {
+        "ticks": {
+            "t": _numbers(ticks.t.tolist()),
+            "x": _numbers(ticks.x.tolist()),
+            "y": _numbers(ticks.y.tolist()),
+            "heading": _numbers(ticks.heading.tolist()),
+            "left_position": _numbers(ticks.left_position.tolist()),
+            "right_position": _numbers(ticks.right_position.tolist()),
+            "left_rgb": [_numbers(row) for row in ticks.left_rgb.tolist()],
+            "right_rgb": [_numbers(row) for row in ticks.right_rgb.tolist()],
+            "ultrasonic": _numbers(ticks.ultrasonic.tolist()),
+            "gyro": _numbers(ticks.gyro.tolist()),
+        },
+        "printed": _lines(recording.printed),
+        "spoken": _lines(recording.spoken),
+        "messages": [
+            {
+                "t": _finite(message.t),
+                "sender": message.sender,
+                "text": storable(message.text),
+                "delivered": None if message.delivered is None else _finite(message.delivered),
+                "reply_to": message.reply_to,
+                "note": message.note,
+            }
+            for message in recording.messages
+        ],
+        "datalog": [
+            {
+                "t": _finite(datum.t),
+                "name": storable(datum.name),
+                "value": _finite(datum.value),
+                "simtime": None if datum.simtime is None else _finite(datum.simtime),
+            }
+            for datum in recording.datalog
+        ],
+        "images": _images(recording),
+        "verdict": recording.verdict.value,
+        "start": {"t": 0.0, **_pose(recording.start)},
+        "end": {"t": _finite(recording.end_t), **_pose(recording.end)},
+        "sha256": recording.sha256,
+    }
+
+
+def storable(text: str) -> str:
+    """``text`` with lone surrogates replaced, so that any JSON reader and any encoding takes it."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def _images(recording: Recording) -> list[dict[str, Any]]:
+    """What ``IMG_DATA`` sent (both sides, with pose) and what ``image_data`` collected (one side), by tick."""
+    rows = [_sent(image) for image in recording.images]
+    for side, csv, tick in recording.image_log:
+        rows.append(
+            {
+                "t": tick * TICK / SECOND,
+                "tick": tick,
+                "source": "image_data",
+                side: [int(value) for value in csv.split(",") if value.strip().isdecimal()],
+            }
+        )
+    return sorted(rows, key=lambda row: int(row["tick"]))
+
+
+def _sent(image: Image) -> dict[str, Any]:
+    return {
+        "t": _finite(image.t),
+        "tick": image.tick,
+        "source": "IMG_DATA",
+        **_pose(image.pose),
+        "side": image.side,
+        "left": list(image.left),
+        "right": list(image.right),
+        "message": image.message,
+        "truth": image.truth,
+    }
+
+
+def _pose(pose: Pose) -> dict[str, float | None]:
+    return {"x": _finite(pose.x), "y": _finite(pose.y), "heading": _finite(pose.heading)}
+
+
+def _lines(lines: Iterable[Line]) -> list[list[float | str | None]]:
+    return [[_finite(line.t), storable(line.text)] for line in lines]
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    return [_finite(value) for value in values]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

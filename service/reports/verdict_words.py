@@ -1,0 +1,121 @@
+"""Each verdict in a student's words: what happened, whose fault it was, what to try next.
+
+It knows no marks and no particular trial; the faults of a recording say where and when.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from sim.recording import Verdict
+
+Tone = Literal["good", "notice", "bad"]
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictWords:
+    """``short`` fits a table cell; the other three are sentences. ``tone`` is how loud a report should be."""
+
+    short: str
+    happened: str
+    whose: str
+    next_step: str
+    tone: Tone
+
+
+_WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
+    {
+        Verdict.FINISHED: VerdictWords(
+            "finished",
+            "Your program ran to its end without an error.",
+            "Nothing went wrong while it ran.",
+            "If marks are missing, compare what each criterion asked for with what your robot did.",
+            "good",
+        ),
+        Verdict.PROGRAM_ERROR: VerdictWords(
+            "error in the robot program",
+            "Your robot program stopped with an error before it was done.",
+            "The error is in your robot program.",
+            "Go to the line named below, mend it, and run the program once in the simulator before handing it in.",
+            "bad",
+        ),
+        Verdict.RESPONDER_ERROR: VerdictWords(
+            "error in the responder",
+            "Your responder raised an error, so the robot got no answer to that message.",
+            "The error is in your responder, or in a function that it calls.",
+            "Call the responder yourself with the message shown below and mend the line that is named.",
+            "bad",
+        ),
+        Verdict.PROTOCOL_ERROR: VerdictWords(
+            "answer could not be read",
+            "Your responder answered, but not in a form that the robot can read.",
+            "The answer that your responder returns is at fault.",
+            "Return a string; one that starts with JSON:: must go on with valid JSON, as json.dumps makes it.",
+            "bad",
+        ),
+        Verdict.TIME_LIMIT: VerdictWords(
+            "still running at the end",
+            "Your program was still running when the simulated time was up.",
+            "That is no fault by itself: a line follower, for one, may run for ever.",
+            "If the program was meant to end, check what its loops wait for, and whether that ever happens.",
+            "notice",
+        ),
+        Verdict.CPU_LIMIT: VerdictWords(
+            "computed for too long",
+            "Your code computed for so long without waiting that it was stopped.",
+            "A loop in your code never waits, so the robot's world cannot move.",
+            "Put a sensor reading or a short time.sleep inside the loop, or make the calculation smaller.",
+            "bad",
+        ),
+        Verdict.MEMORY_LIMIT: VerdictWords(
+            "used too much memory",
+            "Your code asked for more memory than it may use, and was stopped.",
+            "Something in your code keeps growing.",
+            "Look for a list or a string that grows on every turn of a loop and is never emptied.",
+            "bad",
+        ),
+        Verdict.OUTPUT_LIMIT: VerdictWords(
+            "printed too much",
+            "Your code printed more than may be recorded, and was stopped.",
+            "A loop in your code prints on every turn.",
+            "Print only when something changes, or put a short time.sleep inside the loop.",
+            "bad",
+        ),
+        Verdict.STALLED: VerdictWords(
+            "stopped responding",
+            "Your code fell silent: it neither computed nor asked the robot for anything, and was stopped.",
+            "Your code waits for something that never comes.",
+            "Look for a call that waits for a person, a file or another program; none of these exist here.",
+            "bad",
+        ),
+        Verdict.SANDBOX_VIOLATION: VerdictWords(
+            "did something not allowed",
+            "Your code tried something that graded code may not do, and was stopped.",
+            "The attempt came from your code or from a module that it imports.",
+            "Use no network, no other programs, and no files outside your own folder.",
+            "bad",
+        ),
+        Verdict.ASSIGNMENT_ERROR: VerdictWords(
+            "assignment is broken",
+            "The assignment itself has a mistake, so your work could not be marked fairly.",
+            "This is not your fault: the instructor has to mend the assignment.",
+            "You need not do anything but tell your instructor; your work can be graded again.",
+            "notice",
+        ),
+        Verdict.HOST_ERROR: VerdictWords(
+            "grading failed",
+            "The machine that grades your work failed before it was done.",
+            "This is not your fault, and it does not count as an attempt.",
+            "You need not do anything; the grading can be run again.",
+            "notice",
+        ),
+    }
+)
+
+
+def verdict_words(verdict: Verdict) -> VerdictWords:
+    """The words for ``verdict``; every verdict has some."""
+    return _WORDS[verdict]

@@ -1,0 +1,207 @@
+"""The HTML report: what it says, what it hides, and that nothing a student writes becomes markup."""
+
+import base64
+import hashlib
+import re
+from dataclasses import replace
+from decimal import Decimal
+from html.parser import HTMLParser
+
+import pytest
+import report_builders as build
+
+from service.grading.grade import Grade
+from service.reports.html import BatchRow, batch_index, staff_report, student_report
+from service.reports.page import page_of, timeline
+from service.reports.plots import draw_all, plots_of
+from sim.recording import Verdict
+
+#: All that the templates write; anything else came from somewhere it should not.
+TAGS = {
+    "html", "head", "meta", "title", "style", "body", "main", "header", "section", "footer", "div", "span", "p", "b",
+    "i", "h1", "h2", "h3", "table", "thead", "tbody", "tfoot", "tr", "th", "td", "pre", "ol", "li", "dl", "dt", "dd",
+    "svg", "rect", "figure", "figcaption", "img", "details", "summary", "a",
+}  # fmt: skip
+ATTRIBUTES = {
+    "lang", "charset", "http-equiv", "content", "name", "class", "scope", "role", "aria-label", "aria-hidden",
+    "viewbox", "preserveaspectratio", "width", "height", "src", "alt", "href",
+}  # fmt: skip
+VOID = {"meta", "img", "rect"}
+
+
+class Reader(HTMLParser):
+    """Collects tags, attributes and text, and checks that tags nest."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: set[str] = set()
+        self.attributes: list[tuple[str, str, str]] = []
+        self.text = ""
+        self.style = ""
+        self._open: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self._open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self._open and self._open[-1] == "style":
+            self.style += data
+        else:
+            self.text += data
+
+    def values(self, tag: str, name: str) -> list[str]:
+        return [value for found, attribute, value in self.attributes if (found, attribute) == (tag, name)]
+
+
+@pytest.fixture(scope="module")
+def hostile() -> tuple[str, Reader]:
+    page = student_report(build.hostile_grade(), {}, build.faulty_submission())
+    return page, Reader(page)
+
+
+def test_hostile_text_makes_no_tags_and_no_attributes(hostile: tuple[str, Reader]) -> None:
+    _, reader = hostile
+    assert reader.tags <= TAGS
+    assert {name for _, name, _ in reader.attributes} <= ATTRIBUTES
+    assert "<script>alert(1)</script>" in reader.text
+    assert "{{7*7}}" in reader.text
+
+
+def test_hostile_text_is_visible_encodable_and_capped(hostile: tuple[str, Reader]) -> None:
+    page, reader = hostile
+    assert len(page.encode("utf-8")) < 200_000
+    assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(page)
+    assert "\\u202eevil\\ud800\\x00" in reader.text
+    assert page.count("\u0301") <= 6 * 2
+
+
+def test_source_with_hostile_lines_is_escaped() -> None:
+    grade, submission = build.faulty_grade(), build.faulty_submission()
+    assert submission.program is not None
+    program = replace(submission.program, name="</pre><img src=x>", text="a\nb\n" + build.HOSTILE.replace("\u2028", ""))
+    reader = Reader(student_report(grade, {}, replace(submission, program=program)))
+    assert reader.tags <= TAGS
+    assert reader.values("img", "src") == []
+
+
+def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
+    grade = build.shape_grade()
+    reader = Reader(student_report(grade, draw_all(grade)))
+    sources = reader.values("img", "src")
+    assert len(sources) == 6
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    assert base64.b64decode(sources[0].split(",")[1]).startswith(b"\x89PNG")
+    assert all(len(alt) > 20 for alt in reader.values("img", "alt"))
+    digest = base64.b64encode(hashlib.sha256(reader.style.encode()).digest()).decode()
+    policy = next(value for value in reader.values("meta", "content") if value.startswith("default-src"))
+    assert policy.startswith("default-src 'none'; img-src data:; ")
+    assert f"'sha256-{digest}'" in policy
+    assert "unsafe" not in policy
+    assert not re.search(r"url\(|@import", reader.style)
+    assert "@media print" in reader.style
+
+
+def test_students_see_nothing_hidden_and_staff_see_all() -> None:
+    grade = build.hidden_grade()
+    plots = draw_all(grade)
+    student, staff = student_report(grade, plots), staff_report(grade, plots)
+    assert "SECRET" not in student
+    assert "Further parts of the assignment are marked, but not shown" in student
+    assert "SECRETCRITERION" in staff
+    assert "SECRETSCENARIO" in staff
+    assert "staff copy" in staff
+    assert "staff copy" not in student
+    for seed in ("1004", "1005"):
+        assert f">{seed}<" not in student
+        assert f">{seed}<" in staff
+    hidden_pictures = {base64.b64encode(data).decode() for name, data in plots.items() if name.endswith("-staff")}
+    assert hidden_pictures
+    assert not any(picture in student for picture in hidden_pictures)
+    first_hidden = replace(grade, trials=grade.trials[::-1])
+    assert "SECRETSCENARIO" not in student_report(first_hidden, {})
+    after = student_report(grade, plots, released=frozenset({"visible", "hidden"}))
+    assert "SECRETCRITERION" in after
+
+
+def test_headline_criteria_and_stamp() -> None:
+    reader = Reader(student_report(build.shape_grade(), {}))
+    assert "7of 8 marks" in reader.text
+    assert "5 / 6" in reader.text
+    assert "Most is to be gained at “Names the right shape”" in reader.text
+    assert reader.text.count("walls: process limits only") == 2
+    assert "First missed in each-shape, trial 5" in reader.text
+    assert build.shape_grade().assignment_version in reader.text
+    assert "Robomark 0.1.0" in reader.text
+    strong = Reader(student_report(replace(build.shape_grade(), walls="process limits, landlock, seccomp"), {}))
+    assert strong.text.count("walls: ") == 1
+
+
+def test_faults_show_line_numbers_and_the_students_own_line() -> None:
+    with_source = Reader(student_report(build.faulty_grade(), {}, build.faulty_submission())).text
+    assert "Robot program (robot.py), line 3" in with_source
+    assert "3    print(1 / (i - i))" in with_source
+    assert "Did you mean parser?" in with_source
+    without = Reader(student_report(build.faulty_grade(), {})).text
+    assert "Robot program, line 3" in without
+    assert "print(1 / (i - i))" not in without
+
+
+def test_a_line_number_outside_the_file_gives_no_excerpt() -> None:
+    submission = build.faulty_submission()
+    assert submission.responder is not None
+    short = replace(submission, responder=replace(submission.responder, text=""))
+    groups = page_of(build.faulty_grade(), short).faults
+    assert groups[0].excerpt == ()
+    assert groups[0].where == "Responder (responder.py), line 2"
+
+
+def test_timelines_are_capped_and_say_so() -> None:
+    entries = timeline(build.hostile_grade().trials[0].recording)
+    assert len(entries) == 56
+    assert [entry.text for entry in entries if not entry.t] == ["2,950 more entries are not shown"]
+
+
+def test_messages_name_pictures_and_losses() -> None:
+    assert "IMG_DATA::{left, right}" in Reader(student_report(build.shape_grade(), {})).text
+    assert "never (lost)" in Reader(student_report(build.faulty_grade(), {})).text
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_a_grade_with_nothing_in_it_still_has_a_page(verdict: Verdict) -> None:
+    grade = build.faulty_grade()
+    empty = replace(build.line_follower_recording(0), verdict=verdict)
+    trials = (replace(grade.trials[0], recording=empty),)
+    Reader(student_report(replace(grade, trials=trials, criteria=()), {}))
+    bare: Grade = replace(grade, trials=(), criteria=())
+    assert plots_of(bare) == ()
+    assert "0of 0 marks" in Reader(student_report(bare, draw_all(bare))).text
+
+
+def test_batch_index_links_and_escapes() -> None:
+    rows = [
+        BatchRow("s1", Decimal("2.50"), Decimal(8), Verdict.PROGRAM_ERROR, "reports/s 1.html"),
+        BatchRow("<b>s2", Decimal(0), Decimal(8), Verdict.FINISHED, "javascript:alert(1)"),
+        BatchRow("s3", note=build.HOSTILE),
+        BatchRow("s4", Decimal(8), Decimal(8), Verdict.FINISHED, "//evil.example/x"),
+    ]
+    reader = Reader(batch_index(rows, "Batch <1>", "process limits only"))
+    assert reader.values("a", "href") == ["reports/s%201.html", "javascript%3Aalert%281%29", "evil.example/x"]
+    assert reader.tags <= TAGS
+    assert "2.5 / 8" in reader.text
+    assert "0 / 8" in reader.text
+    assert "not graded yet" in reader.text
+    assert "3 of 4 graded" in reader.text

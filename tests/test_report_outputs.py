@@ -1,0 +1,148 @@
+"""A grade as text, JSON, Gradescope, JUnit and CSV."""
+
+import csv
+import io
+import json
+from dataclasses import replace
+from decimal import Decimal
+from xml.etree import ElementTree
+
+import pytest
+import report_builders as build
+from rich.console import Console
+
+from service.reports.audience import student_view, worst_trial
+from service.reports.csv_output import marks_csv, moodle_csv
+from service.reports.gradescope import gradescope_document, gradescope_text
+from service.reports.json_output import json_document, json_text
+from service.reports.junit import junit_text
+from service.reports.rich_text import rich_report
+from service.reports.text import plain_text
+from service.reports.verdict_words import verdict_words
+from sim.recording import Verdict
+
+
+def test_json_has_exactly_the_keys_of_the_schema() -> None:
+    document = json.loads(json_text(build.shape_grade()))
+    assert list(document) == ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy"]
+    assert document["schema"] == 1
+    assert list(document["criteria"][0]) == ["id", "title", "marks", "max_marks", "message"]
+    assert list(document["trials"][0]) == ["scenario", "seed", "verdict", "sha256", "spoken", "messages"]
+    assert list(document["trials"][0]["messages"][0]) == ["t", "sender", "text"]
+    assert document["accuracy"] == {"value": 5 / 6, "low": 0.4365, "high": 0.9699, "n": 6}
+    assert (document["marks"], document["max_marks"], document["verdict"]) == (7, 8, "finished")
+    assert document["trials"][4]["spoken"] == ["Is that a diamond"]
+
+
+def test_json_without_classification_and_with_half_marks() -> None:
+    document = json_document(build.line_follower_grade())
+    assert document["accuracy"] is None
+    assert document["marks"] == 4.5
+    assert isinstance(document["max_marks"], int)
+
+
+def test_hostile_text_survives_strict_json() -> None:
+    text = json_text(build.hostile_grade())
+    assert text.isascii()
+    assert json.loads(text)["criteria"][0]["title"].encode()  # no lone surrogate is left
+
+
+def test_gradescope_leaves_hiding_to_gradescope_but_tells_nothing_at_the_top() -> None:
+    document = gradescope_document(build.hidden_grade())
+    assert [test["visibility"] for test in document["tests"]] == ["visible", "visible", "hidden"]
+    assert sum(test["score"] for test in document["tests"]) == document["score"] == 8
+    assert [test["status"] for test in document["tests"]] == ["failed", "passed", "failed"]
+    assert "SECRET" not in document["output"]
+    assert document["output_format"] == "text"
+    json.loads(gradescope_text(build.hostile_grade()))
+
+
+def test_junit_counts_failures_and_is_well_formed_whatever_was_printed() -> None:
+    suite = ElementTree.fromstring(junit_text(build.shape_grade()))[0]
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
+    failure = suite.find("testcase/failure")
+    assert failure is not None
+    assert failure.get("message") == "5 of 6 marks"
+    hostile = ElementTree.fromstring(junit_text(build.hostile_grade()))
+    assert "<script>alert(1)</script>" in hostile[0][1].attrib["name"]
+
+
+def test_junit_calls_an_unmarked_grade_an_error() -> None:
+    grade = build.faulty_grade()
+    trial = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=Verdict.HOST_ERROR))
+    suite = ElementTree.fromstring(junit_text(replace(grade, trials=(trial,))))[0]
+    assert (suite.get("failures"), suite.get("errors")) == ("0", "1")
+
+
+def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
+    evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
+    rows = list(csv.DictReader(io.StringIO(marks_csv([build.shape_grade(), evil]))))
+    assert rows[0]["student"] == "s1234567"
+    assert rows[0]["accuracy"] == "0.8333"
+    assert rows[0]["marks: names-the-right-shape"] == "5"
+    assert rows[0]["marks: echoes"] == ""
+    assert rows[1]["student"] == "'=HYPERLINK(1)"
+
+
+def test_moodle_feedback_says_nothing_of_hidden_criteria() -> None:
+    row = next(csv.DictReader(io.StringIO(moodle_csv([build.hidden_grade()]))))
+    assert row["Grade"] == "8"
+    assert "SECRET" not in row["Feedback comments"]
+    assert "Names the right shape: 5 of 6" in row["Feedback comments"]
+
+
+def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
+    text = plain_text(build.faulty_grade())
+    assert "0 of 4 marks; error in the responder" in text
+    assert "Responder, line 2: NameError" in text
+    assert "2 times in 2 of 3 trials" in text
+    assert "walls: process limits only" in text
+    assert max(len(line) for line in text.split("\n")) <= 96
+
+
+def test_terminals_get_no_control_codes_from_students() -> None:
+    grade = build.hostile_grade()
+    console = Console(file=io.StringIO(), width=100, color_system=None)
+    console.print(rich_report(grade))
+    assert isinstance(console.file, io.StringIO)
+    for shown in (plain_text(grade), console.file.getvalue()):
+        assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(shown)
+        assert "[red]x[/red]" in shown
+
+
+def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
+    view = student_view(build.hidden_grade())
+    assert [result.id for result in view.criteria] == ["names-the-right-shape", "asks-aloud"]
+    assert {trial.scenario for trial in view.trials} == {"each-shape"}
+    assert [sight.trial for sight in view.criteria[0].sights] == [0, 1, 2, 3]
+    assert view.criteria[0].accuracy is not None
+    assert view.criteria[0].accuracy.confusion == ()
+    released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"}))
+    assert (len(released.criteria), len(released.trials)) == (3, 6)
+
+
+def test_student_view_where_the_first_trial_is_hidden() -> None:
+    grade = build.shape_grade()
+    view = student_view(replace(grade, trials=(replace(grade.trials[0], visibility="hidden"), *grade.trials[1:])))
+    sights = view.criteria[0].sights
+    assert [(sight.trial, sight.truth) for sight in sights] == [(i, build.SHAPES[i + 1]) for i in range(5)]
+    assert worst_trial(view, "each-shape") == 3
+
+
+def test_worst_trial_is_the_one_that_lost_most() -> None:
+    assert worst_trial(build.shape_grade(), "each-shape") == 4
+    assert worst_trial(build.faulty_grade(), "talk") == 1
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_every_verdict_has_words(verdict: Verdict) -> None:
+    words = verdict_words(verdict)
+    assert all((words.short, words.happened, words.whose, words.next_step))
+    ours = verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+    assert ("not your fault" in words.whose) is ours
+
+
+def test_marks_are_not_rounded_on_the_way() -> None:
+    grade = build.line_follower_grade()
+    tenth = replace(grade.criteria[0], marks=Decimal("0.1"))
+    assert json_document(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2")))))["marks"] == 0.3

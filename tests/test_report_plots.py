@@ -1,0 +1,183 @@
+"""Plots: which there are, what they tell, and that the same grade gives the same bytes."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import report_builders as build
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image
+
+from service.grading.grade import Accuracy, TrialResult
+from service.reports.confusion_plot import confusion_table, draw_confusion
+from service.reports.conversation_plot import draw_conversation
+from service.reports.figure import DPI, WIDTH
+from service.reports.path_plot import draw_path
+from service.reports.plots import draw_all, plots_of
+from service.reports.sensor_plot import draw_sensors, panels_of, strips_of
+from service.reports.sequence import Gap, Step, conversation
+from service.reports.sights_plot import chosen_sights, focus_picture, sensor_picture
+from sim.recording import Call, Message, Pose, Recording
+
+
+def _texts(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.findobj(Text) if isinstance(text, Text) and text.get_text()]
+
+
+def _talk(*messages: Message, calls: tuple[Call, ...] = ()) -> Recording:
+    return replace(build.line_follower_recording(60), messages=messages, calls=calls)
+
+
+def test_names_of_all_plots() -> None:
+    assert set(draw_all(build.shape_grade())) == {
+        "confusion-names-the-right-shape",
+        "sights-names-the-right-shape",
+        "path-each-shape-5",
+        "sensors-each-shape-5",
+        "conversation-each-shape-1",
+        "conversation-each-shape-5",
+    }
+
+
+def test_bytes_repeat_and_sizes_are_small() -> None:
+    first, second = draw_all(build.line_follower_grade()), draw_all(build.line_follower_grade())
+    assert first == second
+    for data in first.values():
+        with Image.open(io.BytesIO(data)) as picture:
+            assert picture.format == "PNG"
+            assert picture.width == round(WIDTH * DPI)
+            assert 300 < picture.height < 2600
+            assert "Software" not in picture.info
+        assert len(data) < 150_000
+
+
+def test_hidden_trials_are_in_staff_plots_only() -> None:
+    for plot in plots_of(build.hidden_grade()):
+        if "SECRET" in plot.title or plot.kind in ("confusion", "sights"):
+            assert plot.name.endswith("-staff")
+    students = {name for name in draw_all(build.hidden_grade()) if not name.endswith("-staff")}
+    assert "sights-names-the-right-shape" in students
+    assert not any("SECRET" in name for name in students)
+
+
+def test_hostile_text_is_drawn_not_interpreted() -> None:
+    drawn = draw_all(build.hostile_grade())
+    assert all(len(data) < 150_000 for data in drawn.values())
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_trials_that_hardly_began(count: int) -> None:
+    trial = TrialResult("short", 0, 1, 0, 0, "visible", build.line_follower_recording(count))
+    for figure in (draw_path(trial, "t", None), draw_sensors(trial, "t"), draw_conversation(trial, "t")):
+        figure.draw_without_rendering()
+    assert ("no time passed" in _texts(draw_sensors(trial, "t"))) is (count == 0)
+
+
+def test_a_path_that_leaves_the_floor_says_so() -> None:
+    recording = build.line_follower_recording(90, "Empty_Map")
+    far = replace(
+        recording,
+        ticks=replace(recording.ticks, x=np.linspace(100, 9000, 90), y=np.full(90, np.nan)),
+        end=Pose(9000, 800, 0),
+    )
+    ticks = replace(far.ticks, y=np.full(90, 800.0))
+    shown = _texts(draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None))
+    assert "the path goes on outside this picture" in shown
+    draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # not a finite tick but the start
+
+
+def test_path_tells_units_start_end_and_pictures() -> None:
+    shown = _texts(draw_path(build.shape_grade().trials[4], "Shapes: path", None))
+    assert {"x, mm", "y, mm", "start", "end", "picture sent", "Shapes: path", "1"} <= set(shown)
+    assert any("from (520, 900) heading 0°" in text for text in shown)
+
+
+def test_sensor_panels_and_events() -> None:
+    recording = build.line_follower_grade().trials[1].recording
+    light, distance, _, wheels = panels_of(recording)
+    assert [curve.label for curve in light.curves] == ["left", "right"]
+    assert distance.curves[0].values[0] == recording.ticks.ultrasonic[0] / 10
+    assert np.array_equal(wheels.curves[1].values, recording.ticks.right_position)
+    assert [strip.label for strip in strips_of(recording)] == ["said", "touch"]
+    shown = _texts(draw_sensors(build.line_follower_grade().trials[1], "t"))
+    assert {"Ultrasonic, cm", "Reflected light, red 0–255", "simulated time, s"} <= set(shown)
+
+
+def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
+    trial = build.shape_grade().trials[4]
+    told = conversation(trial.recording)
+    assert told.parties == ("robot", "responder", "parser", "agent", "logger", "network")
+    arrows = [(step.kind, step.source, step.target) for step in told.steps if isinstance(step, Step)]
+    assert arrows == [
+        ("message", "robot", "responder"),
+        ("call", "responder", "parser"),
+        ("return", "parser", "responder"),
+        ("call", "responder", "agent"),
+        ("call", "agent", "network"),
+        ("return", "network", "agent"),
+        ("return", "agent", "responder"),
+        ("call", "responder", "logger"),
+        ("message", "responder", "robot"),
+    ]
+    shown = _texts(draw_conversation(trial, "t"))
+    assert all(shown.count(party) == 1 for party in told.parties)
+
+
+def test_lost_messages_are_told_apart() -> None:
+    told = conversation(build.faulty_grade().trials[1].recording)
+    kinds = [step.kind for step in told.steps if isinstance(step, Step)]
+    assert kinds == ["message", "lost", "message", "silence", "lost"]
+    assert _texts(draw_conversation(build.faulty_grade().trials[1], "t")).count("lost") == 2
+
+
+def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
+    messages: list[Message] = []
+    for count in range(40):
+        messages.append(Message(float(count), "robot", f"PY::{count}", float(count)))
+        arrived = None if count == 30 else count + 0.1
+        messages.append(
+            Message(float(count), "responder", f"saw {count}", arrived, 2 * count, "" if arrived else "lost")
+        )
+    told = conversation(_talk(*messages))
+    assert (told.shown, told.total) == (6, 40)
+    labels = [step.label for step in told.steps if isinstance(step, Step)]
+    assert "PY::0" in labels
+    assert "saw 30" in labels
+    gaps = [step.exchanges for step in told.steps if isinstance(step, Gap)]
+    assert sum(gaps) == 34
+    trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
+    assert any("6 of 40 exchanges" in text for text in _texts(draw_conversation(trial, "t")))
+
+
+def test_answers_to_nothing_and_strange_indices_are_shown_too() -> None:
+    told = conversation(_talk(Message(0.0, "responder", "hello", 0.1, 7), Message(0.2, "responder", "again", 0.3)))
+    assert [step.label for step in told.steps if isinstance(step, Step)] == ["hello", "again"]
+
+
+def test_confusion_counts_totals_and_missing_answers() -> None:
+    accuracy = Accuracy(0.5, 0.2, 0.8, 4, ("a", "b"), (("a", "a", 2), ("b", None, 1), ("b", "zebra", 1)))
+    table = confusion_table(accuracy)
+    assert table.answers == ("a", "b", "zebra", "no answer")
+    assert table.counts == ((2, 0, 0, 0), (0, 0, 1, 1))
+    assert table.totals == (2, 2)
+    shown = _texts(draw_confusion(build.shape_grade().criteria[0], accuracy, "t"))
+    assert any("accuracy 0.50, 95 % interval 0.20 to 0.80, n = 4" in text for text in shown)
+    assert "no answer" in shown
+
+
+def test_sensor_pictures_and_focus() -> None:
+    image = build.shape_grade().trials[0].recording.images[0]
+    assert sensor_picture(image).size == (20, 20)
+    focus = focus_picture(image)
+    assert (focus.size, focus.mode) == ((14, 14), "L")
+    assert focus.getpixel((7, 7)) == 0
+    assert focus.getpixel((0, 0)) == 255
+
+
+def test_wrong_pictures_come_first_when_not_all_fit() -> None:
+    sights = build.shape_grade().criteria[0].sights * 10
+    chosen = chosen_sights(sights)
+    assert len(chosen) == 12
+    assert [index for index in chosen if index % 6 == 4] == list(range(4, 60, 6))
