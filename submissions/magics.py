@@ -1,7 +1,7 @@
 """The flags of the notebook's magics, and the set-up that they give a fresh simulator.
 
-The order, the clamps and the side effects are the original's (robolab sections 1.2 and 8); a flag that does not mean
-what it seems to say is pointed out in ``notes``.
+The order, the clamps and the side effects are the original's (robolab sections 1.2 and 8); a flag that does
+not mean what it seems to say is pointed out in ``notes``.
 """
 
 from __future__ import annotations

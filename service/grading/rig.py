@@ -37,6 +37,11 @@ class Rig:
             order, self._arena(obstacles), self._cameras.camera(order.floor.picture), self._sandboxes, pulse
         )
 
+    @property
+    def children_cpu_seconds(self) -> float:
+        """CPU seconds that students' processes have used so far."""
+        return self._sandboxes.children_cpu_seconds
+
     def close(self) -> None:
         self._sandboxes.close()
         self._cameras.close()

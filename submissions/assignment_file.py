@@ -1,0 +1,128 @@
+"""From an assignment's folder (``assignment.toml`` and the files it gives) to an ``Assignment``, and the catalogue.
+
+All mistakes are found in one go, each with file, line and what was expected; nothing of the folder is run.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+
+from sim.errors import AssignmentError, UsageError
+from submissions.assignment import Assignment
+from submissions.assignment_parts import build_assignment
+from submissions.assignment_tables import did_you_mean
+from submissions.problems import Problems
+from submissions.toml_lines import find_lines
+
+FILE_NAME = "assignment.toml"
+_MAX_FOLDER_BYTES = 128 * 1024 * 1024
+_MAX_TOML_BYTES = 1024 * 1024
+_SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
+
+
+class AssignmentProblems(AssignmentError):
+    """Everything that is wrong with an assignment; ``problems`` has one ``file:line: sentence`` each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+    def __reduce__(self) -> tuple[type[AssignmentProblems], tuple[tuple[str, ...]]]:
+        return type(self), (self.problems,)
+
+
+def catalogue() -> tuple[str, ...]:
+    """The ids of the assignments that come with Robomark, sorted."""
+    return tuple(sorted(folder.name for folder in _catalogue_folder().iterdir() if (folder / FILE_NAME).is_file()))
+
+
+def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
+    """The assignment with this id in the catalogue, or in this folder.
+
+    Raises UsageError if there is neither, AssignmentProblems for an assignment that cannot be used.
+    """
+    name = os.fspath(name_or_path)
+    ids = catalogue()
+    if name in ids:
+        return read_assignment(_catalogue_folder() / name)
+    path = Path(name)
+    if path.name == FILE_NAME and path.is_file():
+        path = path.parent
+    if path.is_dir():
+        return read_assignment(path)
+    hint = did_you_mean(name, ids) or f"; the catalogue has {', '.join(ids)}"
+    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}.")
+
+
+def read_assignment(folder: Path) -> Assignment:
+    """The assignment in ``folder``. Raises AssignmentProblems, with all mistakes, if it cannot be used."""
+    folder = Path(os.path.abspath(folder))  # noqa: PTH100 - resolve() would change the name that is shown
+    where = f"{folder.name}/{FILE_NAME}"
+    if not folder.is_dir():
+        raise AssignmentProblems((f"{folder}: is not there, expected a folder with {FILE_NAME} in it",))
+    files = _folder_files(folder)
+    if FILE_NAME not in files:
+        raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
+    text, document = _parse(files[FILE_NAME], where)
+    problems = Problems(where, find_lines(text))
+    assignment = build_assignment(document, files, problems)
+    if assignment is None or problems.found:
+        raise AssignmentProblems(problems.sorted())
+    return assignment
+
+
+def _catalogue_folder() -> Path:
+    return Path(str(resources.files("submissions"))) / "catalogue"
+
+
+def _parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
+    if len(data) > _MAX_TOML_BYTES:
+        raise AssignmentProblems((f"{where}:1: the file is too large, expected at most 1 MB",))
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise AssignmentProblems((f"{where}:{line}: the text is not UTF-8, expected a file saved as UTF-8",)) from None
+    try:
+        return text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise AssignmentProblems((_syntax_problem(str(error), where, text),)) from None
+    except (ValueError, RecursionError):
+        raise AssignmentProblems((f"{where}:1: has a value that is too large, expected ordinary TOML",)) from None
+
+
+def _syntax_problem(message: str, where: str, text: str) -> str:
+    match = _SYNTAX.match(message)
+    what = match["what"] if match else message
+    if match and match["line"]:
+        line, column = int(match["line"]), f" (column {match['column']})"
+    else:
+        line, column = text.count("\n") + 1, " (at the end)"
+    return f"{where}:{line}: {what[:1].lower()}{what[1:]}{column}, expected TOML"
+
+
+def _folder_files(folder: Path) -> Mapping[str, bytes]:
+    """Everything in the folder by its path within it, but for dot files and what Python leaves behind."""
+    files: dict[str, bytes] = {}
+    size = 0
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        if any(part.startswith(".") or part == "__pycache__" for part in parts) or not path.is_file():
+            continue
+        size += path.stat().st_size
+        if size > _MAX_FOLDER_BYTES:
+            most = _MAX_FOLDER_BYTES // (1024 * 1024)
+            raise AssignmentProblems((f"{folder}: is too large, expected at most {most} MB of files",))
+        try:
+            files["/".join(parts)] = path.read_bytes()
+        except OSError as error:
+            raise AssignmentProblems(
+                (f"{path}: cannot be read ({error.strerror}), expected a readable file",)
+            ) from None
+    return MappingProxyType(files)

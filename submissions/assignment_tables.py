@@ -1,0 +1,245 @@
+"""What may stand in an assignment file: one schema a table, and what is wrong with a table in words.
+
+A table by itself; what has to fit between tables, and the files beside them, is ``assignment_file.py``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic_core import ErrorDetails
+
+from sim.backgrounds import OBSTACLE_PRESETS
+from sim.robot import ROBOTS
+
+T = TypeVar("T", bound=BaseModel)
+Rectangle = tuple[float, float, float, float]
+Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
+
+
+class Table(BaseModel):
+    """A table of the file: no unknown keys, no texts where numbers belong."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class HeadTable(Table):
+    """The keys before the first table."""
+
+    id: str = Slug
+    title: str = Field(min_length=1, max_length=200)
+    description: str = Field(default="", max_length=20_000)
+    given: tuple[str, ...] = ()
+    given_models: dict[str, str] = Field(default_factory=dict)
+    aliases: dict[str, tuple[str, ...]] = Field(default_factory=dict)  # of labels, for every classification
+
+
+class WorldTable(Table):
+    background: str = "Empty_Map"
+    labels: bool = True
+    obstacles: tuple[Rectangle, ...] = ()
+    robot: str = "Default_Robot"
+
+    @field_validator("obstacles", mode="before")
+    @classmethod
+    def _preset(cls, value: object) -> object:
+        if not isinstance(value, str):
+            return _as_tuples(value)
+        if value not in OBSTACLE_PRESETS:
+            presets = listed(OBSTACLE_PRESETS)
+            raise ValueError(f"names no set of obstacles, expected {presets} or a list of [x, y, width, height]")
+        return OBSTACLE_PRESETS[value]
+
+    @field_validator("robot")
+    @classmethod
+    def _known_robot(cls, value: str) -> str:
+        if value not in ROBOTS:
+            raise ValueError(f"names no robot, expected {listed(ROBOTS)}")
+        return value
+
+
+class PartsTable(Table):
+    program: str = Field(default="student", min_length=1)
+    responder: str = Field(default="student", min_length=1)
+
+
+class ChannelTable(Table):
+    delay: float = Field(default=0.1, ge=0, le=60)
+    jitter: float = Field(default=0.0, ge=0, le=60)
+    loss: float = Field(default=0.0, ge=0, le=1)
+    duplication: float = Field(default=0.0, ge=0, le=1)
+    reordering: float = Field(default=0.0, ge=0, le=1)
+
+
+class ScenarioTable(Table):
+    id: str = Slug
+    title: str = Field(default="", max_length=200)
+    poses: tuple[tuple[float, float, float], ...] = Field(default=(), min_length=1)
+    choose: Literal["each", "random"] = "each"
+    trials: int = Field(default=1, ge=1, le=1000)
+    seconds: float = Field(default=60.0, gt=0, le=3600)
+    light_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
+    motor_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
+    channel: ChannelTable = ChannelTable()
+    visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
+
+    @field_validator("light_noise", "motor_noise", mode="before")
+    @classmethod
+    def _one_or_many(cls, value: object) -> object:
+        return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else _as_tuples(value)
+
+    @field_validator("light_noise")
+    @classmethod
+    def _light_range(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        return _in_range(value, 128)
+
+    @field_validator("motor_noise")
+    @classmethod
+    def _motor_range(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        return _in_range(value, 500)
+
+
+class LimitsTable(Table):
+    program_cpu: float = Field(default=5.0, gt=0, le=120)
+    responder_cpu: float = Field(default=10.0, gt=0, le=120)
+    program_memory_mb: int = Field(default=128, ge=64, le=4096)
+    responder_memory_mb: int = Field(default=512, ge=64, le=4096)
+    output_bytes: int = Field(default=1_000_000, ge=1000, le=50_000_000)
+
+
+@dataclass(frozen=True, slots=True)
+class TableProblem:
+    """Where in the table, and what is wrong with it."""
+
+    path: tuple[str | int, ...]
+    sentence: str
+
+
+def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
+    """The table as the schema has it, or all that is wrong with it."""
+    try:
+        # JSON is strict about types, and lets a list be a tuple.
+        return schema.model_validate_json(json.dumps(table, default=_foreign), strict=True)
+    except ValidationError as error:
+        return [_problem(schema, details) for details in error.errors(include_url=False)]
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``; did you mean "x"?`` if there is a name like it."""
+    by_lower = {k.lower(): k for k in known}
+    near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
+    return f'; did you mean "{by_lower[near[0]]}"?' if near else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """``"a", "b" or "c"``."""
+    quoted = [f'"{name}"' for name in names]
+    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} or {quoted[-1]}"
+
+
+def _as_tuples(value: object) -> object:
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+def _in_range(values: tuple[float, ...], most: float) -> tuple[float, ...]:
+    for value in values:
+        if not 0 <= value <= most:
+            raise ValueError(f"has {value:g} in it, expected numbers from 0 to {most:g}")
+    return values
+
+
+def _foreign(value: object) -> dict[str, str]:
+    """Dates and times, which no key takes: made into something that no key takes either."""
+    return {"date": str(value)}
+
+
+_TYPES: Mapping[str, str] = {
+    "string_type": "a text in quotes",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "decimal_type": "a number",
+    "decimal_parsing": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+    "string_too_short": "a text that is not empty",
+    "string_pattern_mismatch": "small letters, digits, - and _, beginning with a letter or digit",
+}
+
+
+def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
+    path = tuple(part for part in details["loc"])
+    name = str(path[-1]) if path else ""
+    context: Mapping[str, Any] = details.get("ctx", {})
+    kind = details["type"]
+    if kind == "extra_forbidden":
+        return TableProblem(path, _unknown_key(schema, path))
+    if kind == "missing":
+        if isinstance(path[-1], int):
+            sentence = f"{_called(path[:-1])} has too few numbers{_shape(path)}"
+            return TableProblem(path[:-1], sentence)
+        return TableProblem(path[:-1], f"{name} is missing, expected {name} = ...")
+    if kind in ("value_error", "assertion_error"):
+        sentence = details["msg"].partition(", ")[2]
+        return TableProblem(path, f"{_called(path)} {sentence}" if path else sentence)
+    value = _short(details["input"])
+    if kind in _TYPES:
+        return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
+    if kind == "literal_error":
+        choices = str(context.get("expected", "")).replace("'", '"')
+        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}")
+    bounds = {"greater_than": ("gt", "more than"), "greater_than_equal": ("ge", "at least")}
+    bounds |= {"less_than": ("lt", "less than"), "less_than_equal": ("le", "at most")}
+    if kind in bounds:
+        key, words = bounds[kind]
+        return TableProblem(path, f"{_called(path)} is {value}, expected {words} {context[key]:g}")
+    if kind == "decimal_max_places":
+        return TableProblem(path, f"{_called(path)} is {value}, expected at most two decimal places")
+    if kind == "too_short":
+        return TableProblem(path, f"{_called(path)} has too few entries, expected at least {context['min_length']}")
+    if kind == "too_long":
+        return TableProblem(path, f"{_called(path)} has too many numbers{_shape((*path, 0))}")
+    if kind == "string_too_long":
+        return TableProblem(path, f"{_called(path)} is too long, expected at most {context['max_length']} characters")
+    return TableProblem(path, f"{_called(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
+
+
+def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
+    if path[:-1] == ("channel",):
+        schema = ChannelTable
+    known = [field.alias or name for name, field in schema.model_fields.items()]
+    name = str(path[-1])
+    hint = did_you_mean(name, known)
+    return f'"{name[:60]}" is not a key of this table, expected {listed(known)}{hint}'
+
+
+def _called(path: tuple[str | int, ...]) -> str:
+    """``poses[2]``, ``channel.delay``."""
+    words = ""
+    for part in path:
+        words += f"[{part}]" if isinstance(part, int) else f".{part}" if words else part
+    return words or "this table"
+
+
+def _shape(path: tuple[str | int, ...]) -> str:
+    shapes = {"poses": "[x, y, heading]", "obstacles": "[x, y, width, height]", "zone": "[left, bottom, right, top]"}
+    shape = shapes.get(str(path[0]))
+    return f", expected {shape}" if shape else ", expected another number of them"
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "..."

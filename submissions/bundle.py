@@ -1,0 +1,251 @@
+"""From what a student handed in (a .py file, a folder, a .zip) to one ``Submission``, and to the bytes kept.
+
+Reading files safely is ``raw_files.py``; what a submission is marked against is the assignment's business.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import re
+import tomllib
+import unicodedata
+import zipfile
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
+
+from sim.errors import UsageError
+from submissions.assignment import Parts
+from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
+from submissions.source_text import decode_source
+from submissions.submission import Source, Submission
+
+Part = Literal["program", "responder"]
+
+_NAMES: Mapping[str, Part] = MappingProxyType(
+    {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
+)
+_CANONICAL: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
+_WORDS: Mapping[Part, str] = MappingProxyType({"program": "a robot program", "responder": "a responder"})
+_META = "submission.toml"
+_LOOKS_LIKE_RESPONDER = re.compile(
+    r"^def[ \t]+(?:responder|\w+_responder)[ \t]*\("
+    r"|^responder[ \t]*="
+    r"|^[ \t]*roboSim\.pyresponder[ \t]*=",
+    re.MULTILINE,
+)
+_MAX_META_BYTES = 64 * 1024
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
+
+
+def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
+    """What one student handed in at ``path``: a .py file, a folder or a .zip.
+
+    ``student`` wins over the hand-in's own submission.toml, and that over the name of the file or folder.
+    With ``asked`` a lone .py is the part that the assignment asks for, and a missing part is refused;
+    without it what a lone .py is follows from its name or its text.
+
+    Raises UsageError, one sentence, for whatever cannot be read as a hand-in.
+    """
+    path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
+    where = shown(path.name)
+    if path.is_symlink():
+        raise UsageError(f"{where}: is a link, expected the file or folder itself.")
+    if not path.exists():
+        raise UsageError(f"{where}: does not exist, expected a .py file, a folder or a .zip.")
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        raw, name, candidate = read_folder(path), path.name, path.parent.name
+    elif suffix == ".zip":
+        raw, name, candidate = read_zip(path), path.stem, path.parent.name
+    elif suffix == ".py":
+        raw = RawFiles({path.name: read_single_file(path)})
+        candidate = path.parent.name
+        name = candidate if path.name.lower() in _NAMES else path.stem
+    elif suffix == ".ipynb":
+        raise UsageError(f"{where}: is a notebook, expected robot.py and responder.py as files of their own.")
+    else:
+        raise UsageError(f"{where}: is of a kind that cannot be read, expected a .py file, a folder or a .zip.")
+    submission = _assemble(raw, where, name, candidate)
+    if student is not None:
+        submission = dataclasses.replace(submission, student=clean_name(student))
+    return submission if asked is None else fit_parts(submission, asked, where=where)
+
+
+def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None) -> Submission:
+    """The submission as an assignment with these parts takes it.
+
+    A lone file that is not called robot.py or responder.py becomes the one part that is asked for; a part
+    that the assignment gives itself, or has no use for, is left out with a note. Raises UsageError if a
+    part is missing.
+    """
+    where = where or submission.student
+    notes = list(submission.notes)
+    parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
+    givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
+    wanted = [part for part, who in givers.items() if who == "student"]
+    handed_in = [part for part, source in parts.items() if source is not None]
+    if len(wanted) == 1 and len(handed_in) == 1 and wanted != handed_in:
+        lone = parts[handed_in[0]]
+        if lone is not None and lone.name.lower() not in _NAMES:
+            parts = {handed_in[0]: None, wanted[0]: lone}
+            notes = [note for note in notes if not note.startswith(f"{shown(lone.name)} was taken for")]
+            notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
+    missing = [part for part in wanted if parts.get(part) is None]
+    if missing:
+        names = " and ".join(_CANONICAL[part] for part in missing)
+        expected = " and ".join(f"{_CANONICAL[part]} ({_WORDS[part]})" for part in wanted)
+        raise UsageError(f"{where}: has no {names}, expected {expected}.")
+    for part, source in parts.items():
+        if source is not None and part not in wanted:
+            notes.append(f"{shown(source.name)} was left out: {_WORDS[part]} is not asked for.")
+            parts[part] = None
+    return dataclasses.replace(
+        submission, program=parts.get("program"), responder=parts.get("responder"), notes=tuple(notes)
+    )
+
+
+def clean_name(name: str) -> str:
+    """A student's name as it can be shown, sorted and filed: one line, no control characters, no slashes."""
+    normal = unicodedata.normalize("NFC", name).replace("/", "_").replace("\\", "_")
+    kept = "".join(" " if c.isspace() else c for c in normal if c.isspace() or unicodedata.category(c)[0] != "C")
+    clean = " ".join(kept.split())[:100].strip()
+    return clean if clean.strip(". ") else "unnamed"
+
+
+def pack_submission(submission: Submission) -> bytes:
+    """A zip archive, the same byte for byte for the same submission; it can be handed in again as it is.
+
+    The parts are called robot.py and responder.py; submission.toml keeps who, what for, the notes, and what
+    the parts were called.
+    """
+    meta = [f"student = {_toml_text(submission.student)}"]
+    if submission.assignment is not None:
+        meta.append(f"assignment = {_toml_text(submission.assignment)}")
+    meta.append(f"notes = [{', '.join(map(_toml_text, submission.notes))}]")
+    entries = dict(submission.files)
+    for part, source in (("program", submission.program), ("responder", submission.responder)):
+        if source is not None:
+            meta.append(f"{part} = {_toml_text(source.name)}")
+            entries[_CANONICAL[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
+    entries[_META] = "\n".join([*meta, ""]).encode()
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for name in sorted(entries):
+            info = zipfile.ZipInfo(name, _EPOCH)
+            info.external_attr = 0o100644 << 16
+            info.create_system = 3
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, entries[name])
+    return buffer.getvalue()
+
+
+def unpack_submission(data: bytes) -> Submission:
+    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
+    files = unzip(data, "the kept hand-in").files
+    meta = _read_meta(files.pop(_META, b""), "the kept hand-in")
+    sources: dict[Part, Source | None] = {}
+    for part, canonical in _CANONICAL.items():
+        name = meta.get(part)
+        text = files.pop(canonical, None) if isinstance(name, str) else None
+        sources[part] = None if text is None else Source(str(name), text.decode("utf-8", "surrogatepass"))
+    notes = meta.get("notes", [])
+    assignment = meta.get("assignment")
+    return Submission(
+        student=str(meta.get("student", "unnamed")),
+        program=sources["program"],
+        responder=sources["responder"],
+        files=MappingProxyType(dict(sorted(files.items()))),
+        assignment=assignment if isinstance(assignment, str) else None,
+        notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
+    )
+
+
+def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
+    files = dict(raw.files)
+    notes = list(raw.notes)
+    meta = _read_meta(files.pop(_META, b""), where)
+    if not files:
+        raise UsageError(f"{where}: has no files in it, expected robot.py and responder.py.")
+    parts = _find_parts(files, where, notes)
+    sources: dict[Part, Source] = {}
+    for part, file_name in parts.items():
+        decoded = decode_source(files.pop(file_name), shown(file_name))
+        sources[part] = Source(file_name, decoded.text)
+        if decoded.note:
+            notes.append(decoded.note)
+    for file_name in [file_name for file_name in files if file_name.lower().endswith(".ipynb")]:
+        notes.append(f"{shown(file_name)} is a notebook and was left out.")
+        del files[file_name]
+    assignment = _text_of(meta, "assignment", where)
+    return Submission(
+        student=clean_name(_text_of(meta, "student", where) or name),
+        program=sources.get("program"),
+        responder=sources.get("responder"),
+        files=MappingProxyType(dict(sorted(files.items()))),
+        assignment=clean_name(assignment or candidate),
+        notes=tuple(notes),
+    )
+
+
+def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str]) -> dict[Part, str]:
+    """Which file is which part: by name, else by what a lone file (or one of a pair) looks like."""
+    parts: dict[Part, str] = {}
+    for name in sorted(files):
+        part = _NAMES.get(name.lower())
+        if part is None:
+            continue
+        if part in parts:
+            raise UsageError(f"{where}: has both {parts[part]} and {name}, expected one {_CANONICAL[part]}.")
+        parts[part] = name
+    if parts:
+        return parts
+    python = sorted(name for name in files if name.lower().endswith(".py"))
+    looks: dict[Part, list[str]] = {"program": [], "responder": []}
+    for name in python[:3]:
+        looks[_looks_like(files[name], name)].append(name)
+    if len(python) == 1 or (len(python) == 2 and all(len(names) == 1 for names in looks.values())):
+        found: dict[Part, str] = {part: names[0] for part, names in looks.items() if names}
+        for part, name in found.items():
+            notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
+        return found
+    if any(name.lower().endswith(".ipynb") for name in files) and not python:
+        raise UsageError(f"{where}: has only a notebook in it, expected robot.py and responder.py.")
+    found_names = ", ".join(shown(name) for name in sorted(files)[:5])
+    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both.")
+
+
+def _looks_like(data: bytes, name: str) -> Part:
+    text = decode_source(data, shown(name)).text
+    return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"
+
+
+def _read_meta(data: bytes, where: str) -> dict[str, object]:
+    if not data:
+        return {}
+    if len(data) > _MAX_META_BYTES:
+        raise UsageError(f"{where}: {_META} is too large, expected a few lines.")
+    try:
+        return tomllib.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise UsageError(
+            f'{where}: {_META} cannot be read ({problem[:200]}), expected lines like assignment = "echo-responder".'
+        ) from None
+
+
+def _text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
+    value = meta.get(key)
+    if value is not None and (not isinstance(value, str) or not value.strip()):
+        raise UsageError(f'{where}: {key} in {_META} is not a text, expected {key} = "..." there.')
+    return value
+
+
+def _toml_text(text: str) -> str:
+    """A TOML basic string; JSON's escapes are TOML's, but for DEL."""
+    printable = text.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(printable, ensure_ascii=False).replace("\x7f", "\\u007f")

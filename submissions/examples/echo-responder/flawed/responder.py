@@ -1,0 +1,2 @@
+def responder(text):
+    return f"Python saw >> {text} << that..."

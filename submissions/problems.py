@@ -1,0 +1,27 @@
+"""What is wrong with an assignment file, gathered while it is read, each mistake with its line.
+
+Only a list that knows where things stand; what is a mistake is decided by those who read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from submissions.toml_lines import Path, line_of
+
+
+@dataclass(slots=True)
+class Problems:
+    """``where`` is the file as it is shown, ``lines`` where its keys stand."""
+
+    where: str
+    lines: Mapping[Path, int]
+    found: list[tuple[int, str]] = field(default_factory=list)
+
+    def add(self, path: Path, sentence: str) -> None:
+        self.found.append((line_of(self.lines, path), sentence))
+
+    def sorted(self) -> tuple[str, ...]:
+        """``file:line: sentence``, in the order of the lines."""
+        return tuple(f"{self.where}:{line}: {sentence}" for line, sentence in sorted(dict.fromkeys(self.found)))

@@ -1,0 +1,265 @@
+"""The files of a hand-in, from a folder or a zip archive, by flat name: nothing trusted, everything capped.
+
+What the files mean is decided in ``bundle.py``; nothing here is unpacked to disk, followed or run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import lzma
+import os
+import stat
+import struct
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+from sim.errors import UsageError
+
+MEGABYTE = 1024 * 1024
+MAX_TOTAL_BYTES = 32 * MEGABYTE
+MAX_FILE_BYTES = 16 * MEGABYTE
+MAX_FILES = 256
+_MAX_NAME_BYTES = 200
+_CHUNK = 64 * 1024
+
+#: Leftovers of tools and systems; they are no part of a hand-in, in whatever folder they lie.
+_IGNORED_NAMES = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini", "Icon\r"}
+_EXPECTED_FLAT = "expected robot.py, responder.py and the files they use side by side"
+
+#: What ``zipfile`` and its decompressors raise on archives that were made to break them.
+_BROKEN_ARCHIVE = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    UnicodeError,
+    ValueError,
+    IndexError,
+    KeyError,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RawFiles:
+    """Flat names and bytes, and what was left out or stepped into on the way."""
+
+    files: dict[str, bytes]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Budget:
+    """What is left of the caps while a hand-in is read."""
+
+    where: str
+    total: int = 0
+    count: int = 0
+
+    def one_more(self) -> None:
+        self.count += 1
+        if self.count > MAX_FILES:
+            raise UsageError(f"{self.where}: has too many files, expected at most {MAX_FILES}.")
+
+    def read(self, name: str, stream: BinaryIO) -> bytes:
+        """All of ``stream``, counted while it comes, whatever size it claims to have."""
+        chunks = []
+        size = 0
+        while chunk := stream.read(_CHUNK):
+            size += len(chunk)
+            self.total += len(chunk)
+            if size > MAX_FILE_BYTES:
+                raise UsageError(
+                    f"{self.where}: {shown(name)} is too large, expected at most "
+                    f"{MAX_FILE_BYTES // MEGABYTE} MB a file."
+                )
+            if self.total > MAX_TOTAL_BYTES:
+                raise UsageError(
+                    f"{self.where}: is too large, expected at most {MAX_TOTAL_BYTES // MEGABYTE} MB in all."
+                )
+            chunks.append(chunk)
+        return b"".join(chunks)
+
+
+def shown(name: str) -> str:
+    """A name of a student's making, safe and short enough for a sentence."""
+    clean = "".join("?" if unicodedata.category(c)[0] in "CZ" and c != " " else c for c in name)
+    return clean if len(clean) <= 80 else clean[:77] + "..."
+
+
+def read_single_file(path: Path) -> bytes:
+    """The bytes of one regular file. Raises UsageError if it is none, or too large."""
+    budget = _Budget(shown(path.name))
+    with _regular_file(path.name, os.fspath(path), None) as stream:
+        return budget.read(path.name, stream)
+
+
+def read_folder(path: Path) -> RawFiles:
+    """The files that lie in a folder, or in the only folder in it. Links and devices are never opened.
+
+    Raises UsageError for nested folders, and for more or larger files than a hand-in may have.
+    """
+    where = shown(path.name)
+    notes: list[str] = []
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError as error:
+        raise UsageError(f"{where}: cannot be opened ({error.strerror}), expected a readable folder.") from None
+    try:
+        names, folders = _list_folder(descriptor, where, notes)
+        if not names and len(folders) == 1:
+            inner = os.open(folders[0], os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=descriptor)
+            os.close(descriptor)
+            descriptor = inner
+            notes.append(f"The files were read from the folder {shown(folders[0])} in it.")
+            names, folders = _list_folder(descriptor, where, notes)
+        if folders:
+            raise UsageError(f"{where}: has the folder {shown(folders[0])} in it, {_EXPECTED_FLAT}.")
+        budget = _Budget(where)
+        files = {}
+        for name in names:
+            _check_name(where, name)
+            budget.one_more()
+            with _regular_file(f"{where}/{name}", name, descriptor) as stream:
+                files[name] = budget.read(name, stream)
+        return RawFiles(files, tuple(notes))
+    except OSError as error:
+        raise UsageError(f"{where}: cannot be read ({error.strerror}), expected a readable folder.") from None
+    finally:
+        os.close(descriptor)
+
+
+def read_zip(path: Path) -> RawFiles:
+    """The files in a zip archive, or in the one top folder that all of them lie in.
+
+    Raises UsageError for anything that is no plain archive of flat files: paths that lead elsewhere, links,
+    encrypted or nested entries, two of one name, too many, too large once they are decompressed.
+    """
+    return unzip(read_single_file(path), shown(path.name))
+
+
+def unzip(data: bytes, where: str) -> RawFiles:
+    """Like ``read_zip``, from the archive's bytes; ``where`` names it in the sentences."""
+    if not data:
+        raise UsageError(f"{where}: is an empty file, expected a zip archive with robot.py and responder.py.")
+    # zipfile builds an object for each entry before anything can be counted.
+    if data.count(b"PK\x01\x02") > 8 * MAX_FILES:
+        raise UsageError(f"{where}: has too many files, expected at most {MAX_FILES}.")
+    try:
+        archive = zipfile.ZipFile(BytesIO(data))
+    except (*_BROKEN_ARCHIVE, NotImplementedError):
+        raise UsageError(f"{where}: is not a zip archive that can be read, expected an ordinary .zip.") from None
+    with archive:
+        entries = _plain_entries(archive.infolist(), where)
+        notes: list[str] = []
+        tops = {parts[0] for parts, _ in entries}
+        if len(tops) == 1 and all(len(parts) > 1 for parts, _ in entries):
+            notes.append(f"The files were read from the folder {shown(next(iter(tops)))} in it.")
+            entries = [(parts[1:], info) for parts, info in entries]
+        budget = _Budget(where)
+        files: dict[str, bytes] = {}
+        for parts, info in entries:
+            if len(parts) > 1:
+                raise UsageError(f"{where}: has {shown('/'.join(parts))} in a folder, {_EXPECTED_FLAT}.")
+            if parts[0] in files:
+                raise UsageError(f"{where}: has {shown(parts[0])} twice, expected every file once.")
+            budget.one_more()
+            files[parts[0]] = _decompress(archive, info, parts[0], where, budget)
+    return RawFiles(files, tuple(notes))
+
+
+def _decompress(archive: zipfile.ZipFile, info: zipfile.ZipInfo, name: str, where: str, budget: _Budget) -> bytes:
+    try:
+        with archive.open(info) as stream:
+            return budget.read(name, stream)  # type: ignore[arg-type]
+    except UsageError:
+        raise
+    except (*_BROKEN_ARCHIVE, NotImplementedError):
+        raise UsageError(
+            f"{where}: {shown(name)} is damaged in the archive, expected one that unpacks without errors."
+        ) from None
+
+
+def _plain_entries(infos: Iterable[zipfile.ZipInfo], where: str) -> list[tuple[tuple[str, ...], zipfile.ZipInfo]]:
+    """The path, in parts, of every file that counts; the hostile ones are refused before any is read."""
+    entries = []
+    for info in infos:
+        original = info.orig_filename.replace("\\", "/")
+        parts = tuple(part for part in original.split("/") if part not in ("", "."))
+        if original.startswith("/") or ".." in parts or any(len(p) > 1 and p[1] == ":" for p in parts[:1]):
+            raise UsageError(
+                f"{where}: has an entry that leads outside ({shown(original)}), expected plain file names."
+            )
+        kind = stat.S_IFMT(info.external_attr >> 16)
+        if kind == stat.S_IFLNK:
+            raise UsageError(f"{where}: has a link in it ({shown(original)}), expected the file itself.")
+        if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+            raise UsageError(f"{where}: has something in it that is no file ({shown(original)}), expected files.")
+        if info.flag_bits & (0x1 | 0x40 | 0x2000):
+            raise UsageError(f"{where}: is encrypted ({shown(original)}), expected a zip without a password.")
+        if original.endswith("/") or kind == stat.S_IFDIR or not parts or _is_ignored(parts):
+            continue
+        for part in parts:
+            _check_name(where, part)
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise UsageError(f"{where}: {shown(original)} is compressed in an unusual way, expected an ordinary .zip.")
+        entries.append((parts, info))
+    return entries
+
+
+def _is_ignored(parts: Iterable[str]) -> bool:
+    return any(part.startswith(".") or part in _IGNORED_NAMES for part in parts)
+
+
+def _check_name(where: str, name: str) -> None:
+    try:
+        length = len(name.encode())
+    except UnicodeEncodeError:
+        length = 0
+    if not 0 < length <= _MAX_NAME_BYTES or any(unicodedata.category(c) == "Cc" for c in name):
+        raise UsageError(
+            f"{where}: has a file name that cannot be used ({shown(name)}), expected printable characters, "
+            f"at most {_MAX_NAME_BYTES} bytes."
+        )
+
+
+def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[str], list[str]]:
+    """Names of the regular files and of the folders, sorted; what is neither is noted and left out."""
+    files, folders = [], []
+    with os.scandir(descriptor) as found:
+        for number, entry in enumerate(found):
+            if number > 64 * MAX_FILES:
+                raise UsageError(f"{where}: has too many files, expected at most {MAX_FILES}.")
+            if _is_ignored([entry.name]):
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                folders.append(entry.name)
+            elif entry.is_file(follow_symlinks=False):
+                files.append(entry.name)
+            elif entry.is_symlink():
+                notes.append(f"{shown(entry.name)} is a link and was left out.")
+            else:
+                notes.append(f"{shown(entry.name)} is no ordinary file and was left out.")
+    return sorted(files), sorted(folders)
+
+
+def _regular_file(where: str, name: str, folder: int | None) -> contextlib.AbstractContextManager[BinaryIO]:
+    """Open without following a link, and without waiting for anybody at the other end of a pipe."""
+    try:
+        descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
+    except OSError as error:
+        raise UsageError(f"{shown(where)}: cannot be opened ({error.strerror}), expected a readable file.") from None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise UsageError(f"{shown(where)}: is no ordinary file, expected one that can be read.")
+    return os.fdopen(descriptor, "rb")

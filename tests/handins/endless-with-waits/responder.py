@@ -1,0 +1,2 @@
+def responder(text):
+    return "Python saw >> " + text[4:] + " << that..."

@@ -1,0 +1,2 @@
+def responder(text):
+    return "Python saw " + str(len([0] * 10**10))

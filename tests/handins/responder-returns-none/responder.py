@@ -1,0 +1,2 @@
+def responder(text):
+    response = "Python saw >> " + text[4:] + " << that..."
