@@ -8,7 +8,7 @@ from benchmarks.measurement import Measurement, cpu_seconds, median_of
 from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
-from responders.sandbox.manager import ChildLimits
+from responders.sandbox.running_child import ChildLimits
 from service.grading.rig import Rig
 from sim.arena import Arena
 from sim.backgrounds import floor
@@ -18,12 +18,14 @@ from sim.robot import robot
 from sim.world import Chain, Noise, World
 
 _SECONDS = 60
-_START = Pose(141, 125, 90)
-_FLOOR = "Line_Following_Test"
+_START = Pose(320, 500, 90)
+_FLOOR = "Loop"
+#: Stays at the edge of the loop for the whole minute.
 _FOLLOWER = """
 while True:
-    left, right = colorLeft.reflected_light_intensity, colorRight.reflected_light_intensity
-    tank_drive.on(20 + (right - left) * 0.05, 20 - (right - left) * 0.05)
+    turn = (colorLeft.reflected_light_intensity - 128) * 0.15
+    colorRight.reflected_light_intensity
+    tank_drive.on(25 - turn, 25 + turn)
 """
 _LIMITS = ChildLimits(30, 512 << 20)
 
@@ -62,9 +64,8 @@ def _follow(arena: Arena, camera: LightCamera) -> None:
     right.run("run-forever", 0)
     for _ in range(_SECONDS * 30):
         for _ in range(3):
-            difference = (world.right_sums[0] - world.left_sums[0]) / 305
-            left.speed_sp = 210 + difference * 0.5
-            right.speed_sp = 210 - difference * 0.5
+            turn = (world.left_sums[0] // 305 - 128) * 0.15
+            left.speed_sp, right.speed_sp = 10.5 * (25 - turn), 10.5 * (25 + turn)
         world.tick()
 
 

@@ -19,8 +19,9 @@ from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Conversation, Responder, ResponderOrder, error_fault
-from responders.sandbox.manager import WALLS, Child, ChildLimits, ChildStopped, Sandboxes
+from responders.conversation import Code, Conversation, Responder, ResponderOrder, error_fault, refusal
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.arena import Arena
 from sim.backgrounds import Floor
 from sim.camera import LightCamera
@@ -38,6 +39,7 @@ _WORDS_A_MINUTE = 130
 _FREE_ACTS = 100_100
 _LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
+_MOST_NOTES = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,7 @@ class _Bridge:
         self.spoken: list[Line] = []
         self.images: list[Image] = []
         self.image_log: list[tuple[str, str, int]] = []
+        self.notes: list[str] = []
         self._limit = round(order.seconds * SECOND)
         self._said_until = 0
         self._arrived: list[Any] = []
@@ -160,6 +163,8 @@ class _Bridge:
                 self._reply(None)
             case "stuck":
                 self._never_waits(frame["line"])
+            case "refused":
+                self.notes.append(refusal("program", frame))
 
     def _advance(self, units: int) -> None:
         """Let simulated time pass; a tick that is due at the very end of a wait still runs."""
@@ -349,7 +354,7 @@ def run_trial(
     bridge.conversation.finish()
     faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
     faults.sort(key=lambda each: each.t)
-    return _recording(order, bridge, responder, tuple(faults), log)
+    return _recording(order, bridge, responder, tuple(faults), log, program.walls)
 
 
 @contextlib.contextmanager
@@ -367,7 +372,7 @@ def _private_folder() -> Iterator[Path]:
 
 
 def _recording(
-    order: TrialOrder, bridge: _Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str
+    order: TrialOrder, bridge: _Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str, walls: str
 ) -> Recording:
     world = bridge.world
     data = (messages.datum(line.text, line.t) for line in bridge.printed)
@@ -393,7 +398,8 @@ def _recording(
         pen=((0, True),) if order.pen_down else (),
         responder_output="\n".join(responder.output) if responder is not None else "",
         responder_log=log,
-        walls=WALLS,
+        walls=walls,
+        notes=tuple(bridge.notes + (responder.notes if responder is not None else []))[:_MOST_NOTES],
     )
 
 

@@ -13,7 +13,8 @@ from typing import Any
 
 from responders import messages, wire
 from responders.channel import Channel, Line
-from responders.sandbox.manager import Child, ChildLimits, ChildStopped, Sandboxes
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.chance import Stream
 from sim.recording import SECOND, Call, Fault, Message, Verdict
 from sim.world import Chain
@@ -50,6 +51,7 @@ class Responder:
         self.output: list[str] = []
         self._output_left = order.output_bytes
         self.calls: list[Call] = []
+        self.notes: list[str] = []
         for name, data in order.files.items():
             (folder / name).write_bytes(data)
         self._child: Child | None = sandboxes.spawn("responder", order.limits, folder)
@@ -114,6 +116,8 @@ class Responder:
             match frame["do"]:
                 case "print":
                     self._print(frame["text"])
+                case "refused":
+                    self.notes.append(refusal("responder", frame))
                 case "sleep":
                     slept.append(frame["units"])
                 case "call":
@@ -247,6 +251,12 @@ def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
     return Fault(now / SECOND, verdict, _who(who), sentence, error["line"], hint)
+
+
+def refusal(who: str, frame: wire.Frame) -> str:
+    """What the walls refused, as a sentence for the report."""
+    where = f"line {frame['line']} of the {who}" if frame["line"] is not None else f"the {who}"
+    return f"{where}: {frame['what'][:200]}"
 
 
 def _who(who: str) -> Any:

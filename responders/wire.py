@@ -60,9 +60,22 @@ _units = _whole(0, 10**15)
 
 Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 
+#: The first frame of every child, before any student code: which walls stand round it.
+WALLS: Schema = MappingProxyType(
+    {
+        "walls": (
+            {"landlock": _whole(0, 99), "seccomp": lambda value: type(value) is bool, "missing": _or_none(_text)},
+            {},
+        )
+    }
+)
+
+_REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, "line": _line}, {})
+
 #: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
 ROBOT: Schema = MappingProxyType(
     {
+        "refused": _REFUSED,
         "print": ({"text": _text}, {}),
         "say": ({"text": _text}, {}),
         "motor": (
@@ -96,6 +109,7 @@ ROBOT: Schema = MappingProxyType(
 #: What a responder's process may say.
 RESPONDER: Schema = MappingProxyType(
     {
+        "refused": _REFUSED,
         "ready": ({"error": _or_none(_error)}, {}),
         "print": ({"text": _text}, {}),
         "sleep": ({"units": _units}, {}),

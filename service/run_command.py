@@ -13,7 +13,7 @@ from models import weights_bytes
 from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
-from responders.sandbox.manager import ChildLimits
+from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
 from service.grading.rig import Rig
 from service.reports.figure import png

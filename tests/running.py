@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from responders.bridge import Preamble, ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
-from responders.sandbox.manager import ChildLimits
+from responders.sandbox.running_child import ChildLimits
 from service.grading.rig import Rig
 from sim.arena import Rectangle
 from sim.backgrounds import floor

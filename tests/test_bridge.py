@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from responders.channel import Channel, Line
+from responders.sandbox.manager import NONE
 from running import run_program
 from service.grading.rig import Rig
 from sim.recording import SECOND, Verdict
@@ -170,10 +171,13 @@ def test_lost_texts_are_recorded_as_lost(rig: Rig) -> None:
 
 
 def test_the_logfile_is_read_and_nothing_else(rig: Rig) -> None:
-    responder = (
-        "import os\nos.symlink('/etc/passwd', 'secret')\n"
-        "def responder(m):\n    open('logger.txt', 'a').write('seen ' + m + '\\n')\n    return 'ok'\n"
-    )
+    responder = "def responder(m):\n    open('logger.txt', 'a').write('seen ' + m + '\\n')\n    return 'ok'\n"
     assert run_program(rig, "print('PY::1')", responder=responder).responder_log == "seen PY::1\n"
-    link = "import os\nos.symlink('/etc/passwd', 'logger.txt')\ndef responder(m): return 'ok'\n"
-    assert run_program(rig, "print('PY::1')", responder=link).responder_log == ""
+
+
+@pytest.mark.parametrize("trick", ["os.symlink('/etc/passwd', 'logger.txt')", "os.mkfifo('logger.txt')"])
+def test_a_logfile_that_is_no_file_is_not_read_even_without_walls(trick: str) -> None:
+    with Rig(NONE) as unwalled:
+        recording = run_program(unwalled, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n")
+    assert recording.faults == ()
+    assert recording.responder_log == ""

@@ -18,8 +18,9 @@ from sim.world import Noise
 
 FOLLOWER = """
 while True:
-    left, right = colorLeft.reflected_light_intensity, colorRight.reflected_light_intensity
-    tank_drive.on(20 + (right - left) * 0.05, 20 - (right - left) * 0.05)
+    turn = (colorLeft.reflected_light_intensity - 128) * 0.15
+    colorRight.reflected_light_intensity
+    tank_drive.on(25 - turn, 25 + turn)
 """
 SHOW_AND_TELL = """
 import random, time
@@ -36,7 +37,7 @@ def chain(name: str, rig: Rig) -> str:
     """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
     if name == "follower":
         recording = run_program(
-            rig, FOLLOWER, Pose(141, 125, 90), background="Line_Following_Test", noise=Noise(10, 20)
+            rig, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20)
         )
         assert recording.verdict is Verdict.TIME_LIMIT
         assert len(recording.ticks) == 1800

@@ -78,7 +78,7 @@ def silence(recording: Recording, index: int) -> str:
     """That the message at ``index`` had no answer, and why, where the recording tells."""
     asked = recording.messages[index].t
     faults = [fault for fault in recording.faults if fault.who == "responder"]
-    fault = next((fault for fault in faults if fault.t >= asked - 1e-9), faults[0] if faults else None)
+    fault = next((fault for fault in faults if fault.t >= asked - 1e-9), faults[-1] if faults else None)
     return "there was no answer" + (f": {fault_words(fault)}" if fault else "")
 
 

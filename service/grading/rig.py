@@ -10,7 +10,7 @@ from collections.abc import Callable
 from types import TracebackType
 
 from responders.bridge import TrialOrder, run_trial
-from responders.sandbox.manager import Sandboxes
+from responders.sandbox.manager import FULL, Sandboxes, Walls
 from sim.arena import Arena, Rectangle
 from sim.camera import Cameras
 from sim.recording import Recording
@@ -21,8 +21,8 @@ _MOST_ARENAS = 8
 class Rig:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed."""
 
-    def __init__(self) -> None:
-        self._sandboxes = Sandboxes()
+    def __init__(self, walls: Walls = FULL) -> None:
+        self._sandboxes = Sandboxes(walls)
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
 
@@ -36,6 +36,10 @@ class Rig:
         return run_trial(
             order, self._arena(obstacles), self._cameras.camera(order.floor.picture), self._sandboxes, pulse
         )
+
+    def check_walls(self) -> str:
+        """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""
+        return self._sandboxes.check()
 
     @property
     def children_cpu_seconds(self) -> float:

@@ -34,14 +34,12 @@ def class_predict_from_image(
     confidence: bool = False,
     signature: bool = False,
 ) -> Any:
-    """The class that the network gives the image; with ``confidence`` also the highest probability."""
+    """The class that the network gives the image; what ``zoomview`` and ``confidence`` draw is left out."""
     values = generate_signature(img, linear=True) if signature else get_image_features(img)
     row = normalize([values], norm="max")
     prediction = MLP.predict(row)[0]
     if not quiet:
         print(f"MLP predicts {prediction}")
-    if confidence:
-        return prediction, float(np.max(MLP.predict_proba(row)))
     return prediction
 
 
@@ -129,17 +127,17 @@ def quick_progress_tracked_training(
 
 
 def resized_images_pipeline(
-    images: Sequence[Image.Image],
+    images_list: Sequence[Image.Image],
     size: tuple[int, int] = (14, 14),
     bw: bool = True,
     normalise: bool = False,
-    image_list: bool = True,
+    images: bool = True,
 ) -> Any:
-    """The images resized, and cut to black and white at a grey of 100."""
-    resized = [image.resize(size, Image.Resampling.LANCZOS) for image in images]
+    """The images resized, and cut to black and white at a grey of 100; rows of values with ``images=False``."""
+    resized = [image.resize(size, Image.Resampling.LANCZOS) for image in images_list]
     if bw:
         resized = [make_image_black_and_white(image, 100).convert("L") for image in resized]
-    if image_list and not normalise:
+    if images and not normalise:
         return resized
     rows = [get_image_features(image) for image in resized]
     return normalize(rows, axis=1) if normalise else rows
@@ -160,7 +158,11 @@ def test_and_report_image_data(MLP: Any, images: Sequence[Image.Image], labels: 
 
 
 def test_and_report_random_images(
-    MLP: Any, images: Sequence[Image.Image], labels: Sequence[Any], num_samples: int = 10, **_: Any
+    MLP: Any,
+    images: Sequence[Image.Image],
+    labels: Sequence[Any],
+    num_samples: int = 10,  # noqa: PT028
+    **_: Any,
 ) -> None:
     """Print what the network makes of images drawn by chance."""
     for place in random.sample(range(len(images)), min(num_samples, len(images))):

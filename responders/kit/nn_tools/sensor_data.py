@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,7 @@ def load_MNIST_images_array(fn: str) -> np.ndarray:
 
 
 def load_MNIST_labels(fn: str) -> list[int]:
-    with open(fn) as file:
-        labels: list[int] = json.load(file)
+    labels: list[int] = json.loads(Path(fn).read_text())
     return labels
 
 
@@ -50,9 +50,7 @@ def report_light_sensor(state: Any, side: str) -> None:
     )
 
 
-def sensor_image_focus(
-    img: Image.Image, centre: Box = _FOCUS, resize: Any = None, bw: bool = False
-) -> Image.Image:
+def sensor_image_focus(img: Image.Image, centre: Box = _FOCUS, resize: Any = None, bw: bool = False) -> Image.Image:
     """The part of a sensor image that lies inside the round window: 14 x 14 pixels unless told otherwise."""
     size = img.size
     img = img.crop(centre)
@@ -97,8 +95,8 @@ def get_resized_images_array(images: Sequence[Image.Image], size: tuple[int, int
 
 
 def array_from_image(img: Image.Image, size: tuple[int, int] = (28, 28)) -> np.ndarray:
-    """The pixels of an ``L`` image as bytes, in the shape given."""
-    return np.asarray(img.convert("L"), dtype=np.uint8).reshape(size)
+    """The pixels of an ``L`` image as bytes, shape (height, width) for a ``size`` of (width, height)."""
+    return np.asarray(img.convert("L"), dtype=np.uint8).reshape(size[1], size[0])
 
 
 def get_images_list_from_images_array(images_array: np.ndarray) -> list[Image.Image]:
@@ -159,7 +157,7 @@ def generate_image(
     fill: int = 255,
     threshold: int = 127,
 ) -> Image.Image:
-    """The logged image in row ``index``: greyscale, ``bw``, or colour for any other mode; then cropped, then resized."""
+    """The logged image in row ``index``: greyscale, ``bw``, or colour for any other mode; cropped, then resized."""
     image = collected_image(df, index, size)
     if image is None:
         raise IndexError(f"there is no image {index}")
@@ -170,7 +168,7 @@ def generate_image(
     if crop is not None:
         image = image.crop(crop)
     if resize is not None:
-        image = image.resize(size[:2] if resize == "auto" else resize, Image.Resampling.LANCZOS)
+        image = image.resize((size[0], size[1]) if resize == "auto" else resize, Image.Resampling.LANCZOS)
     return image
 
 
@@ -241,7 +239,7 @@ def background_column(column: Sequence[int], background: int = 255) -> bool:
 
 def clear_columns(df: pd.DataFrame, background: int = 255) -> pd.DataFrame:
     """Without the uniform columns at either side."""
-    keep = [place for place in range(df.shape[1]) if not background_column(df.iloc[:, place], background)]
+    keep = [place for place in range(df.shape[1]) if not background_column(df.iloc[:, place].tolist(), background)]
     return df.iloc[:, keep[0] : keep[-1] + 1] if keep else df
 
 

@@ -12,25 +12,33 @@ import signal
 from collections.abc import Callable
 from typing import Any
 
-from .frames import Wire
+from . import lockdown
+from .frames import Frame, Wire
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
-_PR_SET_NO_NEW_PRIVS = 38
 
 _WIRE, _FOLDER = 3, 4
+#: All that student code finds: libraries loaded late must not start threads either.
+_ENVIRONMENT = {"HOME": "/", "LANG": "C.UTF-8", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-def start(order: dict[str, Any], descriptors: list[int], role: Callable[[Wire], None]) -> None:
+def start(
+    order: dict[str, Any],
+    descriptors: list[int],
+    grants: lockdown.Grants,
+    role: Callable[[Wire, lockdown.Grants], None],
+) -> None:
     """Never returns. ``descriptors`` are the wire and, if the order has a folder, the folder."""
     try:
         _own_session()
         _descriptors(descriptors, bool(order["folder"]))
         _limits(order)
-        _walls()
+        wire = Wire(_WIRE)
+        wire.send(_walls(order, grants))
         os.environ.clear()
-        os.environ["HOME"] = "/"
-        role(Wire(_WIRE))
+        os.environ.update(_ENVIRONMENT)
+        role(wire, grants)
     finally:
         os._exit(0)
 
@@ -44,7 +52,6 @@ def _own_session() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
     prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-    prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
 
 
 def _descriptors(descriptors: list[int], has_folder: bool) -> None:
@@ -77,5 +84,37 @@ def _limits(order: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_MSGQUEUE, (0, 0))
 
 
-def _walls() -> None:
-    """Where the kernel's own walls go up: after every limit, before any student code. None stand yet."""
+def _walls(order: dict[str, Any], grants: lockdown.Grants) -> Frame:
+    """Put up the layers that the order names, try each, and say what stands; nothing of the student's has run yet."""
+    missing = None
+    landlock, seccomp = 0, False
+    try:
+        lockdown.forbid_new_privileges()
+        if order["landlock"]:
+            landlock = _files(order, grants)
+        if order["seccomp"]:
+            lockdown.restrict_system_calls()
+            _must_fail("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
+            _must_fail("seccomp", lambda: os.kill(os.getppid(), 0))
+            seccomp = True
+    except lockdown.WallMissing as wall:
+        missing = str(wall)
+    return {"do": "walls", "landlock": landlock, "seccomp": seccomp, "missing": missing}
+
+
+def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:
+    folder = os.open(".", os.O_PATH) if order["folder"] else None
+    version = lockdown.restrict_files(lockdown.Grants(grants.read, grants.list_only, folder), order["landlock"])
+    if folder is not None:
+        os.close(folder)
+    _must_fail("Landlock", lambda: os.open("/etc/passwd", os.O_RDONLY))
+    _must_fail("Landlock", lambda: os.listdir("/"))
+    return version
+
+
+def _must_fail(wall: str, attempt: Callable[[], object]) -> None:
+    try:
+        attempt()
+    except OSError:
+        return
+    raise lockdown.WallMissing(f"{wall}: it is in place and lets through what it must refuse")

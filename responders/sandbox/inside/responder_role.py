@@ -15,8 +15,9 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, student_code
+from . import determinism, refusals, student_code
 from .frames import Frame, Wire, clip, fits, fitted
+from .lockdown import Grants
 
 _PRELOADED = (
     "joblib",
@@ -55,8 +56,9 @@ def preload() -> None:
 class Responder:
     """The student's module, and the calls inside it that the sequence diagram shows."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire, grants: Grants) -> None:
         self._wire = wire
+        self._grants = grants
         self._name = ""
         self._function: str | None = None
         self._units = 0
@@ -73,6 +75,7 @@ class Responder:
         student_code.install_output(self._emit)
         determinism.install_clock(lambda: self._units, self._sleep)
         determinism.install_chance(job["seed"])
+        refusals.install(self._grants.read, self._name, self._refused)
         self._wire.send({"do": "ready", "error": self._load(job["text"])})
         while True:
             message = self._wire.receive()
@@ -189,6 +192,9 @@ class Responder:
     def _emit(self, text: str) -> None:
         self._wire.send({"do": "print", "text": fitted(text)})
 
+    def _refused(self, what: str, line: int | None) -> None:
+        self._wire.send({"do": "refused", "what": what, "line": line})
+
     def _busy(self, _: int, frame: FrameType | None) -> None:
         try:
             self._wire.send({"do": "busy", "line": student_code.line_of(frame, self._name)})
@@ -204,5 +210,5 @@ def _shown(value: Any) -> str:
         return f"<{type(value).__name__}>"
 
 
-def run(wire: Wire) -> None:
-    Responder(wire).run()
+def run(wire: Wire, grants: Grants) -> None:
+    Responder(wire, grants).run()

@@ -12,8 +12,9 @@ import types
 from types import FrameType
 from typing import Any
 
-from . import determinism, student_code
+from . import determinism, refusals, student_code
 from .frames import Frame, Wire, clip, fitted
+from .lockdown import Grants
 
 
 def preload() -> None:
@@ -23,7 +24,7 @@ def preload() -> None:
     import ev3dev2_glue  # noqa: F401
 
 
-def run(wire: Wire) -> None:
+def run(wire: Wire, grants: Grants) -> None:
     """Receive a program, run it to its end, and report that."""
     from brick_link import link
     from brick_preambles import PREAMBLES
@@ -52,6 +53,7 @@ def run(wire: Wire) -> None:
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(job["seed"])
+    refusals.install(grants.read, name, lambda what, line: wire.send({"do": "refused", "what": what, "line": line}))
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
     wire.send({"do": "end", "error": _execute(job, PREAMBLES[job["preamble"]], module.__dict__)})

@@ -27,13 +27,14 @@ def main(role_name: str, roots: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import child, determinism, student_code  # noqa: F401
+    from . import child, determinism, grants, lockdown, refusals, student_code  # noqa: F401
 
     if role_name == "robot":
         from . import robot_role as role
     else:
         from . import responder_role as role  # type: ignore[no-redef]
     role.preload()
+    allowed = lockdown.Grants(grants.readable(roots), grants.listable())
     _one_thread()
     gc.collect()
     gc.freeze()
@@ -46,7 +47,7 @@ def main(role_name: str, roots: list[str]) -> None:
         if order["do"] == "spawn":
             pid = os.fork()
             if pid == 0:
-                child.start(order, descriptors, role.run)
+                child.start(order, descriptors, allowed, role.run)
             pidfd = os.pidfd_open(pid)
             _reply(control, {"pid": pid}, [pidfd])
             for fd in (*descriptors, pidfd):

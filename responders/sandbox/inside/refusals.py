@@ -1,0 +1,60 @@
+"""Turns what the walls refuse into an ordinary Python error with a sentence, and tells the worker where it happened.
+
+This is courtesy, not protection: the kernel refuses all the same.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from .student_code import line_of
+
+NETWORK = "programs here may not open network connections"
+PROGRAMS = "programs here may not start other programs"
+FILES = "programs here may only open files in their own folder"
+_MOST_TOLD = 20
+
+_SENTENCES = {
+    "socket.__new__": NETWORK,
+    "socket.connect": NETWORK,
+    "socket.bind": NETWORK,
+    "socket.getaddrinfo": NETWORK,
+    "os.fork": PROGRAMS,
+    "os.forkpty": PROGRAMS,
+    "os.exec": PROGRAMS,
+    "os.posix_spawn": PROGRAMS,
+    "os.spawn": PROGRAMS,
+    "os.system": PROGRAMS,
+    "subprocess.Popen": PROGRAMS,
+    "pty.spawn": PROGRAMS,
+}
+
+
+def install(readable: tuple[str, ...], name: str, tell: Callable[[str, int | None], None]) -> None:
+    """Refuse with a sentence from now on; ``tell(sentence, line)`` for the first few, line being the student's."""
+    folders = tuple(path.rstrip("/") + "/" for path in readable)
+    files = frozenset(readable)
+    told: set[tuple[str, int | None]] = set()
+
+    def refuse(sentence: str) -> PermissionError:
+        line = line_of(sys._getframe(), name)
+        if (sentence, line) not in told and len(told) < _MOST_TOLD:
+            told.add((sentence, line))
+            tell(sentence, line)
+        return PermissionError(1, sentence)
+
+    def hook(event: str, args: tuple[Any, ...]) -> None:
+        sentence = _SENTENCES.get(event)
+        if sentence is not None:
+            raise refuse(sentence)
+        if event == "open" and isinstance(args[0], str) and args[0].startswith("/"):
+            path = args[0]
+            if path not in files and not path.startswith(folders):
+                if sys._getframe(1).f_code.co_filename == name:
+                    raise refuse(FILES)
+                # A library that looks round by itself is refused too, but that is no news for a report.
+                raise PermissionError(1, FILES)
+
+    sys.addaudithook(hook)

@@ -1,0 +1,246 @@
+"""One process with student code in it: listening to it, and ending it at its limits.
+
+A child's word is never taken for how it ended: that is read from the scheduler's clock and the wait status.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from responders import wire
+from sim.recording import Verdict
+
+_POLL_SECONDS = 0.02
+_STALLED_SECONDS = 5.0
+_LAST_WORD_SECONDS = 0.1
+#: What is read at most while a child that is to be stopped has its last word.
+_UNREAD_BYTES = 1 << 20
+#: Frames that a program sends thousands of times to the letter; each is checked once.
+_REPEATED = frozenset({"read", "wait", "motor_state", "until"})
+_MOST_KNOWN = 100
+#: What a responder may keep in its folder.
+_FOLDER_BYTES = 16 << 20
+_FOLDER_FILES = 256
+
+
+@dataclass(frozen=True, slots=True)
+class ChildLimits:
+    """CPU seconds and bytes of memory beyond the interpreter's own."""
+
+    cpu_seconds: float
+    memory_bytes: int
+
+
+class ChildStopped(Exception):
+    """A child that will say no more: why, in a sentence, and the line of its file where that is known."""
+
+    def __init__(self, verdict: Verdict, message: str, line: int | None = None) -> None:
+        super().__init__(message)
+        self.verdict, self.message, self.line = verdict, message, line
+
+
+class Child:
+    """One forked process with student code in it. Always ``close`` it."""
+
+    def __init__(
+        self,
+        reap: Callable[[int], int],
+        pid: int,
+        pidfd: int,
+        connection: socket.socket,
+        limits: ChildLimits,
+        folder: Path | None,
+    ) -> None:
+        """``reap(pid)`` waits for the child's end and gives its wait status."""
+        self.walls = ""
+        self._reap = reap
+        self._folder = folder
+        self._pid = pid
+        self._pidfd = pidfd
+        self._socket = connection
+        self._limits = limits
+        self._pending = b""
+        self._known: dict[bytes, wire.Frame] = {}
+        self._closed = False
+        self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
+        self._checked = 0.0
+        connection.settimeout(_POLL_SECONDS)
+
+    def send(self, frame: dict[str, Any]) -> None:
+        """Send one frame; a child that does not read it shows up at the next ``receive``."""
+        data = memoryview(wire.encode(frame))
+        deadline = time.monotonic() + _STALLED_SECONDS
+        while data:
+            try:
+                data = data[self._socket.send(data) :]
+            except TimeoutError:
+                self._check_cpu()
+                if time.monotonic() > deadline:
+                    raise self._stalled() from None
+            except OSError:
+                return
+
+    def receive(self, schema: wire.Schema, pulse: Callable[[], None]) -> wire.Frame:
+        """The next frame; ``pulse`` is called now and then while waiting. Raises ChildStopped."""
+        line, newline, rest = self._pending.partition(b"\n")
+        if not newline:
+            line, rest = self._read_line(pulse)
+        self._pending = rest
+        frame = self._known.get(line)
+        if frame is not None:
+            return frame
+        try:
+            frame = wire.parse(line, schema)
+        except wire.WireError as error:
+            raise ChildStopped(
+                Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
+            ) from None
+        if frame["do"] == "busy":
+            raise self._too_busy(frame["line"])
+        if frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN:
+            self._known[line] = frame
+        return frame
+
+    def cpu_seconds(self) -> float:
+        """What the child has used so far, by the scheduler's clock."""
+        try:
+            return time.clock_gettime(self._clock)
+        except OSError:
+            return 0.0
+
+    def close(self) -> None:
+        """Kill the child and wait until it is gone."""
+        if self._closed:
+            return
+        self._closed = True
+        self._kill()
+        self._socket.close()
+        os.close(self._pidfd)
+        self._reap(self._pid)
+
+    def _read_line(self, pulse: Callable[[], None]) -> tuple[bytes, bytes]:
+        last_cpu, still_since = -1.0, time.monotonic()
+        pieces = [self._pending]
+        size = len(self._pending)
+        while True:
+            try:
+                data = self._socket.recv(wire.MOST)
+            except TimeoutError:
+                pulse()
+                used = self._check_cpu()
+                if used != last_cpu or self._runnable():
+                    last_cpu, still_since = used, time.monotonic()
+                elif time.monotonic() - still_since > _STALLED_SECONDS:
+                    raise self._stalled() from None
+                continue
+            except OSError:
+                data = b""
+            if not data:
+                raise self._gone()
+            now = time.monotonic()
+            if now - self._checked > _POLL_SECONDS:
+                self._checked = now
+                pulse()
+                self._check_cpu()
+            pieces.append(data)
+            size += len(data)
+            if b"\n" in data:
+                line, _, rest = b"".join(pieces).partition(b"\n")
+                return line, rest
+            if size > wire.MOST:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the program's process sent an endless frame")
+
+    def _check_cpu(self) -> float:
+        """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
+        self._check_folder()
+        used = self.cpu_seconds()
+        if used > self._limits.cpu_seconds:
+            raise self._too_busy(self._last_word())
+        return used
+
+    def _check_folder(self) -> None:
+        """One flat look: the walls let no folder be made in it, and follow no link."""
+        if self._folder is None:
+            return
+        size = count = 0
+        with contextlib.suppress(OSError), os.scandir(self._folder) as entries:
+            for entry in entries:
+                count += 1
+                with contextlib.suppress(OSError):
+                    size += entry.stat(follow_symlinks=False).st_size
+                if size > _FOLDER_BYTES or count > _FOLDER_FILES:
+                    raise ChildStopped(
+                        Verdict.OUTPUT_LIMIT,
+                        f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
+                    )
+
+    def _last_word(self) -> int | None:
+        """Ask the child which line it is on, and give it a moment to say so."""
+        with contextlib.suppress(OSError):
+            signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
+        deadline = time.monotonic() + _LAST_WORD_SECONDS
+        data = self._pending
+        while time.monotonic() < deadline and len(data) < _UNREAD_BYTES:
+            try:
+                more = self._socket.recv(wire.MOST)
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+            if not more:
+                break
+            data += more
+        for line in reversed(data.splitlines()):
+            with contextlib.suppress(wire.WireError):
+                frame = wire.parse(line, {"busy": wire.ROBOT["busy"]})
+                return None if frame["line"] is None else int(frame["line"])
+        return None
+
+    def _too_busy(self, line: int | None) -> ChildStopped:
+        return ChildStopped(
+            Verdict.CPU_LIMIT,
+            f"it computed for more than {self._limits.cpu_seconds:g} seconds of CPU time",
+            line,
+        )
+
+    def _stalled(self) -> ChildStopped:
+        return ChildStopped(
+            Verdict.STALLED,
+            f"it did nothing for {_STALLED_SECONDS:g} seconds of real time: it waits for something that never comes",
+        )
+
+    def _runnable(self) -> bool:
+        """Whether the child would run if it got a processor: then a busy machine is to blame, not the program."""
+        try:
+            state = Path(f"/proc/{self._pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except (OSError, IndexError):
+            return False
+        return state == "R"
+
+    def _gone(self) -> ChildStopped:
+        """What the wait status says of a child that has closed the wire."""
+        self._kill()
+        self._closed = True
+        self._socket.close()
+        os.close(self._pidfd)
+        status = self._reap(self._pid)
+        if os.WIFSIGNALED(status):
+            number = os.WTERMSIG(status)
+            if number in (signal.SIGXCPU,):
+                return self._too_busy(None)
+            if number == signal.SIGSYS:
+                return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
+            name = signal.Signals(number).name
+            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({name})")
+        return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
+
+    def _kill(self) -> None:
+        with contextlib.suppress(OSError):
+            signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)

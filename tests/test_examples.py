@@ -1,0 +1,104 @@
+"""Every example and every failing hand-in, graded for real: marks, verdict and what the student is told."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from sim.errors import UsageError
+from submissions.assignment_file import catalogue, find_assignment
+from submissions.bundle import pack_submission, read_submission, unpack_submission
+from submissions.example_folder import examples
+
+TESTS = Path(__file__).parent
+EXPECTED = TESTS / "expected"
+HANDINS = TESTS / "handins"
+FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((HANDINS / "expected.toml").read_text())
+EXAMPLES = [(name, folder.name) for name in catalogue() for folder in sorted(examples(name).iterdir())]
+
+
+def graded(folder: Path, assignment: str, rig: Rig) -> Grade:
+    asked = find_assignment(assignment)
+    return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
+
+
+def assert_as_expected(result: Grade, expected: Mapping[str, Any]) -> None:
+    told = "\n".join(criterion.message for criterion in result.criteria)
+    assert (str(result.verdict), result.marks) == (expected["verdict"], Decimal(expected["marks"])), told
+    for phrase in expected["feedback"]:
+        assert phrase in told
+
+
+@pytest.mark.parametrize(("assignment", "name"), EXAMPLES)
+def test_example_is_marked_as_expected(assignment: str, name: str, rig: Rig) -> None:
+    expected = tomllib.loads((EXPECTED / assignment / f"{name}.toml").read_text())
+    assert_as_expected(graded(examples(assignment) / name, assignment, rig), expected)
+
+
+def test_every_expectation_has_an_example() -> None:
+    expected = {(path.parent.name, path.stem) for path in EXPECTED.glob("*/*.toml")}
+    assert expected == set(EXAMPLES)
+
+
+def test_every_assignment_has_good_flawed_broken_and_endless_examples() -> None:
+    for assignment in catalogue():
+        names = {folder.name for folder in examples(assignment).iterdir()}
+        assert {"seed", "good", "flawed", "broken", "endless"} <= names
+
+
+@pytest.mark.parametrize("name", sorted(FAILING))
+def test_failing_hand_in_gets_a_verdict_or_one_sentence(name: str, rig: Rig) -> None:
+    expected = FAILING[name]
+    if "refused" in expected:
+        with pytest.raises(UsageError) as refusal:
+            graded(HANDINS / name, "echo-responder", rig)
+        assert str(refusal.value) == expected["refused"]
+    else:
+        assert_as_expected(graded(HANDINS / name, "echo-responder", rig), expected)
+
+
+def test_every_failing_hand_in_has_an_expectation() -> None:
+    assert {path.name for path in HANDINS.iterdir() if path.is_dir()} == set(FAILING)
+
+
+def test_what_the_database_keeps_is_graded_alike(rig: Rig) -> None:
+    asked = find_assignment("shape-at-random")
+    submission = read_submission(examples("shape-at-random") / "flawed", asked=asked.parts)
+    kept = unpack_submission(pack_submission(submission))
+    first, second = grade(submission, asked, rig=rig), grade(kept, asked, rig=rig)
+    assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
+    assert (first.submission, first.criteria) == (second.submission, second.criteria)
+
+
+def test_seed_echo_has_three_exchanges_and_ends_with_all_done(rig: Rig) -> None:
+    recording = graded(examples("echo-responder") / "seed", "echo-responder", rig).trials[0].recording
+    assert [(message.sender, message.text) for message in recording.messages] == [
+        (sender, text)
+        for number in (0, 2, 4)
+        for sender, text in (("robot", f"PY::{number}"), ("responder", f"Python saw >> {number} << that..."))
+    ]
+    assert [line.text for line in recording.spoken] == ["all done"]
+    assert recording.responder_log.count("---") == 3
+
+
+def test_seed_json_queue_grows_by_one_a_message(rig: Rig) -> None:
+    recording = graded(examples("json-queue") / "seed", "json-queue", rig).trials[0].recording
+    queues = [line.text.count("Py saw") for line in recording.printed if line.text.startswith("Message queue")]
+    assert queues == [0, 1, 1, 2, 2, 3]
+    assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
+
+
+def test_seed_names_all_six_shapes_and_says_so(rig: Rig) -> None:
+    result = graded(examples("shape-recognition") / "seed", "shape-recognition", rig)
+    assert result.accuracy is not None
+    assert (result.accuracy.value, result.accuracy.n) == (1.0, 6)
+    said = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}
+    assert said[520, 900] == "Is that a upwards facing triangle"

@@ -1,0 +1,307 @@
+"""What responders import: the course's helpers for sensor data and networks, on what a sensor really sees."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from sklearn.neural_network import MLPClassifier
+
+from models import weights_bytes
+from sim import backgrounds
+
+KIT = Path(__file__).parent.parent / "responders" / "kit"
+KIT_MODULES = ("nbev3devsim.load_nbev3devwidget", "nn_tools.sensor_data", "nn_tools.network_views")
+
+#: Black pixels in the 14 x 14 focus of each shape, and the rows and columns that they fill.
+SHAPES = [
+    (49, (4, 10), (4, 10)),
+    (51, (2, 12), (4, 12)),
+    (51, (2, 12), (2, 10)),
+    (53, (4, 12), (2, 12)),
+    (60, (2, 11), (2, 12)),
+    (51, (2, 12), (2, 10)),
+]
+
+
+class Kit(NamedTuple):
+    robo_sim: Any
+    data: ModuleType
+    views: ModuleType
+
+
+@pytest.fixture
+def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
+    """The kit as a path root, fresh, and forgotten afterwards."""
+    monkeypatch.syspath_prepend(str(KIT))
+    widget, data, views = (importlib.import_module(name) for name in KIT_MODULES)
+    yield Kit(widget.roboSim, data, views)
+    for name in [name for name in sys.modules if name.split(".")[0] in ("nbev3devsim", "nn_tools")]:
+        del sys.modules[name]
+
+
+def raw(column: int, row: int) -> str:
+    """The numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
+    window = backgrounds.floor("Simple_Shapes").picture[row : row + 20, column : column + 20]
+    rows, columns = np.mgrid[0:20, 0:20]
+    seen = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
+    rgb = np.where(seen[:, :, None], window, np.array([245, 226, 225]))
+    rgba = np.concatenate([rgb, np.full((20, 20, 1), 255)], axis=2)
+    return ",".join(str(number) for number in rgba.ravel())
+
+
+def log_shapes(kit: Kit, codes: range = range(6)) -> pd.DataFrame:
+    """The data frame of both sensors over the shapes, in the course's poses."""
+    kit.robo_sim.clear_datalog()
+    for code in codes:
+        kit.robo_sim.raw_image_data.append(f"left {raw(220 + 80 * code, 213)} {10 * code}")
+        kit.robo_sim.raw_image_data.append(f"right {raw(220 + 80 * code, 253)} {10 * code}")
+    frame: pd.DataFrame = kit.robo_sim.image_data()
+    return frame
+
+
+def grey(image: Image.Image) -> NDArray[np.uint8]:
+    return np.asarray(image)
+
+
+def test_images_of_the_log(kit: Kit) -> None:
+    frame = log_shapes(kit)
+    assert list(frame.columns) == ["side", "vals", "clock"]
+    assert frame["side"].tolist() == ["left", "right"] * 6
+    assert frame["clock"].tolist()[-1] == "50"
+    assert len(frame["vals"][0].split(",")) == 1200
+    assert kit.robo_sim.image_data("raw") is kit.robo_sim.raw_image_data
+    kit.robo_sim.clear_datalog()
+    assert kit.robo_sim.image_data().empty
+    assert kit.data.get_sensor_image_pair(kit.robo_sim.image_data()) is None
+
+
+@pytest.mark.parametrize("code", range(6))
+def test_a_pair_is_the_shape_and_its_label(kit: Kit, code: int) -> None:
+    left, right = kit.data.get_sensor_image_pair(log_shapes(kit), code)
+    black, rows, columns = SHAPES[code]
+    assert (left.mode, left.size) == ("L", (14, 14))
+    dark = grey(left) == 0
+    assert dark.sum() == black
+    assert tuple(np.flatnonzero(dark.any(axis=1))[[0, -1]]) == rows
+    assert tuple(np.flatnonzero(dark.any(axis=0))[[0, -1]]) == columns
+    assert np.unique(grey(right)).tolist() == [backgrounds.LABEL_GREYS[code]]
+
+
+def test_which_pair(kit: Kit) -> None:
+    frame = log_shapes(kit)
+    last = [kit.data.get_sensor_image_pair(frame, index) for index in (5, -1, None)]
+    assert len({(left.tobytes(), right.tobytes()) for left, right in last}) == 1
+    black_white, _ = kit.data.get_sensor_image_pair(frame, 0, mode="bw")
+    assert (black_white.mode, kit.data.get_sensor_image_pair(frame, 0, mode="rgb")[0].mode) == ("1", "L")
+    with pytest.raises(TypeError):
+        kit.data.get_sensor_image_pair(frame.head(1))
+
+
+def test_raw_numbers(kit: Kit) -> None:
+    numbers = "10,20,30,255,3,4,5,255"
+    process = kit.robo_sim.process_raw_image_data
+    assert process(numbers) == "10,20,30,3,4,5"
+    assert process(numbers, to_str=False) == ["10", "20", "30", "3", "4", "5"]
+    assert process(numbers, mode="greyscale") == process(numbers, mode="reflected") == "10,3"
+    assert process(numbers, mode="bw") == "1,0"
+    assert kit.robo_sim.pyresponder is None
+
+
+@pytest.mark.parametrize(
+    ("options", "mode", "size"),
+    [
+        ({}, "L", (20, 20)),
+        ({"mode": "bw"}, "1", (20, 20)),
+        ({"mode": "rgb"}, "RGB", (20, 20)),
+        ({"crop": (3, 3, 17, 17)}, "L", (14, 14)),
+        ({"crop": (3, 3, 17, 17), "resize": (28, 28)}, "L", (28, 28)),
+        ({"crop": (3, 3, 17, 17), "resize": "auto"}, "L", (20, 20)),
+    ],
+)
+def test_generate_image(kit: Kit, options: dict[str, Any], mode: str, size: tuple[int, int]) -> None:
+    image = kit.data.generate_image(log_shapes(kit, range(1)), 0, **options)
+    assert (image.mode, image.size) == (mode, size)
+
+
+def test_generate_image_shows_the_rim_and_the_shape(kit: Kit) -> None:
+    frame = log_shapes(kit, range(1))
+    image = grey(kit.data.generate_image(frame))
+    assert image[0, 0] == 232  # luma of the original's 245, 226, 225 outside the round window
+    assert (image == 0).sum() == 49
+    black_white = kit.data.generate_bw_image(frame, crop=(3, 3, 17, 17))
+    assert (grey(black_white) == 0).sum() == 49
+    state = kit.data.get_image_from_state(raw(220, 213))
+    assert (state.mode, state.getpixel((0, 0))) == ("RGB", (245, 226, 225))
+    assert grey(kit.data.sensor_image_focus(state.convert("L"))).shape == (14, 14)
+
+
+def test_black_and_white_is_above_the_threshold(kit: Kit) -> None:
+    image = kit.data.image_from_array(np.array([[0, 127, 128, 255]]))
+    assert grey(kit.data.make_image_black_and_white(image)).tolist() == [[False, False, True, True]]
+    assert grey(kit.data.make_image_black_and_white(image, 200)).tolist() == [[False, False, False, True]]
+
+
+def block(rows: slice, columns: slice, background: int = 255, ink: int = 0) -> Image.Image:
+    pixels = np.full((14, 14), background, np.uint8)
+    pixels[rows, columns] = ink
+    return Image.fromarray(pixels)
+
+
+def test_trim_and_pad(kit: Kit) -> None:
+    image = block(slice(1, 5), slice(9, 14))
+    assert kit.data.trim_image(image).size == (5, 4)
+    assert kit.data.trim_image(kit.data.df_from_image(image)).shape == (4, 5)
+    padded = grey(kit.data.crop_and_pad_to_fit(image))
+    assert (padded == grey(block(slice(5, 9), slice(4, 9)))).all()  # 9 columns to spare: 4 left, 5 right
+    white_on_black = block(slice(0, 7), slice(0, 7), 0, 255)
+    assert (grey(kit.data.crop_and_zoom_to_fit(white_on_black)) == 255).all()
+
+
+def test_jiggle_moves_and_keeps(kit: Kit) -> None:
+    image = block(slice(5, 8), slice(5, 9), 0, 200)
+    moved = [grey(kit.data.jiggle(image)) for _ in range(40)]
+    assert {int((each == 200).sum()) for each in moved} == {12}
+    assert len({each.tobytes() for each in moved}) > 5
+
+
+def test_images_arrays_and_frames_lead_back(kit: Kit) -> None:
+    image = block(slice(2, 6), slice(3, 13), 240, 17)
+    frame = kit.data.df_from_image(image)
+    assert frame.shape == (14, 14)
+    assert (grey(kit.data.image_from_df(frame)) == grey(image)).all()
+    assert (kit.data.array_from_image(image, size=image.size) == grey(image)).all()
+    assert (grey(kit.data.image_from_array(grey(image))) == grey(image)).all()
+    wide = image.crop((0, 0, 14, 10))
+    assert (kit.data.array_from_image(wide, size=wide.size) == grey(wide)).all()
+    assert kit.data.get_images_features([image]).shape == (1, 196)
+    assert np.linalg.norm(kit.data.get_images_features([image])) == pytest.approx(1)
+    colours = kit.data.image_data_to_array(list(range(12)), 0, size=(2, 2, 3))
+    assert (colours.shape, colours.dtype) == ((2, 2, 3), np.uint8)
+
+
+def test_an_image_that_is_not_there_is_said(kit: Kit, capsys: pytest.CaptureFixture[str]) -> None:
+    assert kit.data.raw_image_data_to_array(log_shapes(kit, range(1)), 2) is None
+    assert "2" in capsys.readouterr().out
+
+
+def test_signature_counts_a_row(kit: Kit) -> None:
+    image = block(slice(0, 1), slice(3, 5))
+    signature = kit.data.generate_signature(image)
+    assert signature.shape == (14, 4)
+    assert signature.iloc[0].tolist() == [2, 255, 9, 2]
+    assert signature.iloc[1].tolist() == [0, 255, 14, 0]
+    assert len(kit.data.generate_signature(image, linear=True)) == 56
+
+
+class Network:
+    """Remembers what it is asked."""
+
+    def __init__(self) -> None:
+        self.rows: list[Any] = []
+
+    def predict(self, rows: Any) -> NDArray[np.int64]:
+        self.rows.append(np.asarray(rows))
+        return np.array([3])
+
+    def predict_proba(self, rows: Any) -> NDArray[np.float64]:
+        return np.array([[0.1, 0.2, 0.1, 0.6]])
+
+
+@pytest.mark.parametrize("options", [{}, {"confidence": True}, {"zoomview": True}, {"quiet": False}])
+def test_prediction_divides_by_the_brightest(kit: Kit, options: dict[str, Any]) -> None:
+    network = Network()
+    assert kit.views.class_predict_from_image(network, block(slice(0, 7), slice(0, 14), 100, 50), **options) == 3
+    assert network.rows[0].shape == (1, 196)
+    assert np.unique(network.rows[0]).tolist() == [0.5, 1.0]
+
+
+def test_prediction_of_a_signature(kit: Kit) -> None:
+    network = Network()
+    kit.views.class_predict_from_image(network, block(slice(0, 7), slice(0, 14)), signature=True)
+    assert network.rows[0].shape == (1, 56)
+    assert network.rows[0].max() == 1
+
+
+@pytest.mark.parametrize(
+    ("size", "options", "values"),
+    [((20, 20), {}, 225), ((14, 14), {}, 196), ((20, 20), {"size": (14, 14)}, 196), ((28, 28), {}, 784)],
+)
+def test_image_class_predictor_prints(
+    kit: Kit,
+    capsys: pytest.CaptureFixture[str],
+    size: tuple[int, int],
+    options: dict[str, Any],
+    values: int,
+) -> None:
+    network = Network()
+    assert kit.views.image_class_predictor(network, Image.new("RGB", size, (9, 9, 9)), 3, **options) is None
+    assert network.rows[0].shape == (1, values)
+    assert capsys.readouterr().out == "Predicted label: 3\n"
+
+
+def test_the_packaged_network_names_every_shape(kit: Kit, tmp_path: Path) -> None:
+    import joblib
+
+    file = tmp_path / "mlp_shapes_14x14.joblib"
+    file.write_bytes(weights_bytes("shapes"))
+    network = joblib.load(file)
+    frame = log_shapes(kit)
+    answers = [
+        kit.views.class_predict_from_image(network, kit.data.get_sensor_image_pair(frame, code)[0]) for code in range(6)
+    ]
+    assert answers == list(range(6))
+    assert "MLPClassifier" in repr(network)
+    assert network.predict_proba(np.ones((1, 196))).sum() == pytest.approx(1)
+
+
+def test_training_learns_rows_of_length_one(kit: Kit, capsys: pytest.CaptureFixture[str]) -> None:
+    frame = log_shapes(kit)
+    images = [kit.data.get_sensor_image_pair(frame, code)[0] for code in (0, 4)] * 20
+    labels = [0, 4] * 20
+    network = kit.views.quick_progress_tracked_training(
+        images, labels, MLP=MLPClassifier((20,), random_state=1), max_iterations=60, report=True
+    )
+    assert "accuracy" in capsys.readouterr().out
+    assert network.predict(kit.data.get_images_features(images[:2])).tolist() == [0, 4]
+    kit.views.test_and_report_random_images(network, images, labels, num_samples=3)
+    assert capsys.readouterr().out.count("MLP predicts") == 3
+
+
+def test_resizing_cuts_to_black_and_white_at_one_hundred(kit: Kit) -> None:
+    images = [Image.new("L", (28, 28), level) for level in (100, 101)]
+    resized = kit.views.resized_images_pipeline(images)
+    assert [(image.size, np.unique(grey(image)).tolist()) for image in resized] == [
+        ((14, 14), [0]),
+        ((14, 14), [255]),
+    ]
+
+
+@pytest.mark.parametrize("name", ["network_structure", "show_loss", "preview_weights"])
+def test_what_only_shows_does_nothing(kit: Kit, name: str) -> None:
+    assert getattr(kit.views, name)(Network(), retval=True) is None
+    assert kit.data.zoom_img(Image.new("L", (2, 2)), size=(3, 3), grid=False) is None
+
+
+def test_convolutional_networks_are_refused_in_a_sentence(kit: Kit) -> None:
+    with pytest.raises(NotImplementedError, match="TensorFlow Lite"):
+        kit.views.cnn_load("mnist.tflite", "labels.txt")
+
+
+def test_the_kit_needs_nothing_of_ours_and_nothing_that_draws() -> None:
+    loads = "; ".join(f"import {name}" for name in KIT_MODULES)
+    code = f"import sys; sys.path.insert(0, {str(KIT)!r}); {loads}; print(*{{n.split('.')[0] for n in sys.modules}})"
+    done = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert not loaded & {"sim", "models", "submissions", "responders", "service"}
+    assert not loaded & {"matplotlib", "IPython", "tqdm", "tensorflow"}

@@ -1,0 +1,112 @@
+"""The reference responders inside the walls: they answer by the course's protocol, and take hostile text calmly."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from running import run_program
+
+from models import weights_bytes
+from responders import library
+from service.grading.rig import Rig
+from sim.backgrounds import SHAPES
+from sim.recording import Pose, Recording, Verdict
+from sim.world import Noise
+
+NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
+
+SAY = """
+import time
+for text in {texts!r}:
+    print(text)
+    time.sleep(0.3)
+"""
+
+
+def converse(rig: Rig, name: str, texts: list[str], **options: Any) -> Recording:
+    recording = run_program(
+        rig, SAY.format(texts=texts), responder=library.source(name), files=NETWORK, preamble="none", **options
+    )
+    assert recording.verdict is Verdict.FINISHED, recording.faults
+    return recording
+
+
+def answers(recording: Recording) -> list[Any]:
+    """What the responder answered, unwrapped where it is JSON."""
+    texts = [message.text for message in recording.messages if message.sender == "responder"]
+    return [json.loads(text[6:])["message"] if text.startswith("JSON::") else text for text in texts]
+
+
+TEXTS = [
+    "PY::1",
+    "PY:: [1, 2]",
+    "PY:: {'int': 1}",
+    "PY::my message",
+    "PY::__import__('os').getcwd()",
+    "PY::" + "(" * 500,
+]
+
+
+def test_echo_evaluates_literals_and_nothing_else(rig: Rig) -> None:
+    recording = converse(rig, "echo_responder", TEXTS)
+    assert answers(recording) == [
+        f"Python saw >> {seen} << that..."
+        for seen in ("1", "[1, 2]", "{'int': 1}", "my message", "__import__('os').getcwd()", "(" * 500)
+    ]
+    assert recording.responder_log.count("---") == len(TEXTS)
+
+
+def test_json_wraps_the_agents_answer(rig: Rig) -> None:
+    assert answers(converse(rig, "json_responder", TEXTS[:3])) == ["Py saw: 1", "Py saw: [1, 2]", "Py saw: {'int': 1}"]
+
+
+def test_image_parser_says_which_kind(rig: Rig) -> None:
+    text, image = answers(converse(rig, "image_parser", ["PY::{'test_key':'test value'}", "IMG_DATA"]))
+    assert text == "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"
+    assert image.startswith("Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,")
+
+
+@pytest.mark.parametrize("name", ["shape_responder", "rule_responder"])
+@pytest.mark.parametrize("code", range(6))
+def test_shapes_are_named_in_the_courses_poses_and_a_millimetre_off(rig: Rig, name: str, code: int) -> None:
+    for dx, dy, noise in ((0, 0, 0.0), (1, -1, 0.0), (-1, 1, 32.0), (0, 1, 10.0)):
+        recording = converse(
+            rig,
+            name,
+            ["IMG_DATA"],
+            start=Pose(200 + 80 * code + dx, 900 + dy, 0),
+            background="Simple_Shapes",
+            noise=Noise(light=noise),
+        )
+        shape = SHAPES[code]
+        assert answers(recording) == [{"report": f"Agent says: I saw {shape}", "shape": shape}], (dx, dy, noise)
+        assert recording.images[0].truth == shape
+
+
+def test_the_unlabelled_row_is_named_too(rig: Rig) -> None:
+    for column, code in enumerate((1, 5, 0, 2)):
+        recording = converse(
+            rig, "rule_responder", ["IMG_DATA"], start=Pose(200 + 80 * column, 700, 0), background="Simple_Shapes"
+        )
+        assert answers(recording)[0]["shape"] == SHAPES[code]
+
+
+@pytest.mark.parametrize("name", ["shape_responder", "rule_responder"])
+def test_texts_get_an_answer_without_a_shape(rig: Rig, name: str) -> None:
+    assert answers(converse(rig, name, ["PY::hello", "PY::3"])) == [
+        {"report": "Agent says: I heard hello"},
+        {"report": "Agent says: I heard 3"},
+    ]
+
+
+def test_an_empty_floor_is_no_shape(rig: Rig) -> None:
+    recording = converse(rig, "rule_responder", ["IMG_DATA"], noise=Noise(light=32.0))
+    assert answers(recording) == [{"report": "Agent says: I see no shape"}]
+
+
+def test_the_library_gives_only_its_own_files() -> None:
+    assert all(library.source(name).startswith('"""') for name in library.NAMES)
+    with pytest.raises(KeyError):
+        library.source("../kit/nn_tools/sensor_data")
