@@ -110,7 +110,7 @@ def run(
 
 
 def _source(path: Path) -> str:
-    return decode_source(_read(path), path.name)[0]
+    return decode_source(_read(path), path.name).text
 
 
 def _read(path: Path) -> bytes:

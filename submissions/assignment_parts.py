@@ -60,7 +60,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     aliases = head.aliases if head else {}
     criteria = _criteria(document, scenarios, ground, parts, aliases, problems)
     given_parts = _given_parts(parts, files, problems) if parts else {}
-    given = _given(head, files, problems) if head else {}
+    given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
     assignment = Assignment(
@@ -259,14 +259,17 @@ def _given_parts(parts: PartsTable, files: Files, problems: Problems) -> dict[st
     return sources
 
 
-def _given(head: HeadTable, files: Files, problems: Problems) -> dict[str, bytes]:
+def _given(document: Mapping[str, object], files: Files, problems: Problems) -> dict[str, bytes]:
     given = {}
-    for number, name in enumerate(head.given):
+    for number, name in enumerate(_texts(document.get("given"))):
         if name in files and "/" not in name:
             given[name] = files[name]
         else:
             problems.add(("given", number), f'given names "{name[:60]}", expected a file beside this file')
-    for name, model in head.given_models.items():
+    models = document.get("given_models")
+    for name, model in models.items() if isinstance(models, dict) else ():
+        if not isinstance(model, str):
+            continue
         place = ("given_models", name)
         data = packaged_model(model)
         if not re.fullmatch(r"[\w][\w.-]*", name):

@@ -107,7 +107,10 @@ def test_a_motor_left_on_at_the_end_moves_nothing(rig: Rig) -> None:
 
 
 def test_simulated_time_begins_in_2020_and_moves_with_the_world(rig: Rig) -> None:
-    program = "import time, datetime\nprint(time.time())\ntime.sleep(1.5)\nprint(time.time(), time.monotonic(), datetime.datetime.now())"
+    program = (
+        "import time, datetime\nprint(time.time())\ntime.sleep(1.5)\n"
+        "print(time.time(), time.monotonic(), datetime.datetime.now())"
+    )
     first, second = (line.text for line in run_program(rig, program).printed)
     assert first == "1577836800.0"
     assert second == "1577836801.5 1.5 2020-01-01 00:00:01.500000"
@@ -129,7 +132,8 @@ def test_nothing_leaks_from_one_run_into_the_next(rig: Rig) -> None:
 
 def test_the_datalog_is_read_from_what_is_printed(rig: Rig) -> None:
     program = (
-        "print('Light_left: 42 1.5')\nprint('Gyro: 7')\nprint('Color: 3')\nprint('Light_left:5')\nprint('Ultrasonic: far')\n"
+        "print('Light_left: 42 1.5')\nprint('Gyro: 7')\nprint('Color: 3')\n"
+        "print('Light_left:5')\nprint('Ultrasonic: far')\n"
         "print('image_data both')\n"
     )
     recording = run_program(rig, program, background="Simple_Shapes")

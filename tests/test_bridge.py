@@ -47,7 +47,8 @@ def test_only_a_text_that_begins_with_the_prefix_is_a_message(rig: Rig, text: st
 def test_several_answers_in_one_tick_queue_up_in_order(rig: Rig) -> None:
     program = (
         LISTEN
-        + "for i in range(5): print('PY::' + str(i))\ntime.sleep(1)\nprint([m['heard'] for m in glue.pyState()['messages']])"
+        + "for i in range(5): print('PY::' + str(i))\ntime.sleep(1)\n"
+        + "print([m['heard'] for m in glue.pyState()['messages']])"
     )
     recording = run_program(rig, program, responder=ECHO)
     assert recording.printed[-1].text == "['0', '1', '2', '3', '4']"
@@ -178,6 +179,8 @@ def test_the_logfile_is_read_and_nothing_else(rig: Rig) -> None:
 @pytest.mark.parametrize("trick", ["os.symlink('/etc/passwd', 'logger.txt')", "os.mkfifo('logger.txt')"])
 def test_a_logfile_that_is_no_file_is_not_read_even_without_walls(trick: str) -> None:
     with Rig(NONE) as unwalled:
-        recording = run_program(unwalled, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n")
+        recording = run_program(
+            unwalled, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n"
+        )
     assert recording.faults == ()
     assert recording.responder_log == ""

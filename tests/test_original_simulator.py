@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from running import run_program
 from service.grading.rig import Rig
 from sim.arena import Arena
 from sim.backgrounds import floor
@@ -15,8 +16,6 @@ from sim.camera import CachedCamera
 from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World
-
-from running import run_program
 
 GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("original_simulator.toml").read_text())
 

@@ -6,10 +6,10 @@ import json
 from typing import Any
 
 import pytest
-from running import run_program
 
 from models import weights_bytes
 from responders import library
+from running import run_program
 from service.grading.rig import Rig
 from sim.backgrounds import SHAPES
 from sim.recording import Pose, Recording, Verdict

@@ -8,8 +8,8 @@ from decimal import Decimal
 from html.parser import HTMLParser
 
 import pytest
-import report_builders as build
 
+import report_builders as build
 from service.grading.grade import Grade
 from service.reports.html import BatchRow, batch_index, staff_report, student_report
 from service.reports.page import page_of, timeline

@@ -8,9 +8,9 @@ from decimal import Decimal
 from xml.etree import ElementTree
 
 import pytest
-import report_builders as build
 from rich.console import Console
 
+import report_builders as build
 from service.reports.audience import student_view, worst_trial
 from service.reports.csv_output import marks_csv, moodle_csv
 from service.reports.gradescope import gradescope_document, gradescope_text

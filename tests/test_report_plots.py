@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import report_builders as build
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
+import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
 from service.reports.confusion_plot import confusion_table, draw_confusion
 from service.reports.conversation_plot import draw_conversation

@@ -4,8 +4,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import report_builders as build
 
+import report_builders as build
 from service.reports.trace import trace
 from sim.recording import Datum, Line
 

@@ -36,9 +36,7 @@ SEED = Path(__file__).with_name("seed")
 def chain(name: str, rig: Rig) -> str:
     """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
     if name == "follower":
-        recording = run_program(
-            rig, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20)
-        )
+        recording = run_program(rig, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT
         assert len(recording.ticks) == 1800
     else:

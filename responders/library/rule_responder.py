@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+
 from nbev3devsim.load_nbev3devwidget import roboSim
 from nn_tools.sensor_data import get_sensor_image_pair
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 from joblib import load
+
 from nbev3devsim.load_nbev3devwidget import roboSim
 from nn_tools.network_views import class_predict_from_image
 from nn_tools.sensor_data import get_sensor_image_pair

@@ -99,7 +99,7 @@ class Responder:
         return None
 
     def _find(self) -> Callable[[str], Any]:
-        """The function asked for; else ``roboSim.pyresponder`` if assigned, ``responder``, or the only ``*_responder``."""
+        """The function asked for; else ``roboSim.pyresponder``, ``responder``, or the only ``*_responder``."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
         if self._function is not None:
@@ -107,7 +107,7 @@ class Responder:
                 raise LookupError(f"there is no function called {self._function}")
             return self._namespace[self._function]  # type: ignore[no-any-return]
         if callable(roboSim.pyresponder):
-            return roboSim.pyresponder  # type: ignore[no-any-return]
+            return roboSim.pyresponder
         if callable(self._namespace.get("responder")):
             return self._namespace["responder"]  # type: ignore[no-any-return]
         found = {

@@ -93,8 +93,8 @@ def install_output(emit: Callable[[str], None]) -> None:
     import sys
 
     stream = Output(emit)
-    sys.stdout = sys.stderr = stream  # type: ignore[assignment]
-    sys.stdin = None  # type: ignore[assignment]
+    sys.stdout = sys.stderr = stream
+    sys.stdin = None
     real_print = builtins.print
 
     def one_text(
@@ -111,5 +111,5 @@ def install_output(emit: Callable[[str], None]) -> None:
         raise EOFError("nobody is at the keyboard: input() cannot be used in a graded program")
 
     one_text.__name__, no_input.__name__ = "print", "input"
-    builtins.print = one_text  # type: ignore[assignment]
+    builtins.print = one_text
     builtins.input = no_input

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 from brick_link import link
-
 from ev3dev2.sensor import colour
 
 

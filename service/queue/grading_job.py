@@ -1,0 +1,142 @@
+"""One job from claim to stored marks, and one job's plots: what a worker does when it is nudged.
+
+Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from enum import Enum
+from typing import TypeVar
+
+import structlog
+from sqlalchemy.exc import DBAPIError
+
+from service.grading.grader import Progress, grade
+from service.grading.rig import Rig
+from service.queue.plotting import draw
+from service.settings import Settings
+from service.store import grades, intake, jobs
+from service.store.engine import Store
+from sim.errors import Cancelled, HostError, UsageError
+from sim.recording import Verdict
+
+_log = structlog.get_logger(__name__)
+Result = TypeVar("Result")
+#: Whoever waits sees progress so often, however long the lease.
+_PROGRESS_SECONDS = 2.0
+
+
+class Outcome(Enum):
+    """What came of a nudge."""
+
+    NOTHING_DUE = "nothing due"
+    GRADED = "graded"
+    STOPPED = "stopped"  # cancelled, or another worker has the job
+    UNUSABLE = "unusable"  # the job is dead: no attempt could grade it
+    HOST_FAULT = "host fault"  # ours; the job is tried again, or dead
+
+
+def grade_next(store: Store, settings: Settings, rig: Rig, worker: str) -> Outcome:
+    """Claim the job whose turn it is, grade it and store its marks.
+
+    Only trouble with the database itself raises: whatever else happens to a claimed job is written into its row.
+    """
+    claim = jobs.claim(store, worker, settings.lease_seconds)
+    if claim is None:
+        return Outcome.NOTHING_DUE
+    with structlog.contextvars.bound_contextvars(job=claim.job_id, worker=worker):
+        try:
+            _grade(store, settings, rig, claim)
+        except Cancelled as error:
+            _log.info("job.stopped", reason=str(error))
+            return Outcome.STOPPED
+        except UsageError as error:
+            reason = str(error)
+            _end(lambda: jobs.bury(store, claim, reason))
+            return Outcome.UNUSABLE
+        except Exception as error:
+            # Whatever it was, it was not the student: their faults come back as verdicts.
+            _log.exception("job.host_error")
+            reason = str(error) if isinstance(error, HostError) else f"{type(error).__name__}: {error}"
+            _end(lambda: jobs.fail(store, claim, reason, jobs.Retry(settings.backoff_seconds)))
+            return Outcome.HOST_FAULT
+        return Outcome.GRADED
+
+
+def plot_next(store: Store, settings: Settings) -> str | None:
+    """Draw and keep the plots of the job that has waited longest. Returns its id; None when none is due."""
+    job_id = jobs.claim_plots(store, settings.job_seconds)
+    if job_id is None:
+        return None
+    with store.reading() as session:
+        graded = grades.load(session, job_id)
+        hand_in = intake.load_hand_in(session, job_id)
+    files = draw(graded, hand_in.assignment)
+    _persistent(lambda: jobs.finish_plots(store, job_id, files), settings.lease_seconds)
+    return job_id
+
+
+def _grade(store: Store, settings: Settings, rig: Rig, claim: jobs.Claim) -> None:
+    with store.reading() as session:
+        hand_in = intake.load_hand_in(session, claim.job_id)
+    watch = _Heartbeat(store, settings, claim)
+    graded = grade(hand_in.submission, hand_in.assignment, observe=watch, rig=rig)
+    graded_at = datetime.now(UTC)
+    broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
+    if broken is not None:
+        faults = broken.recording.faults
+        raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
+    prepared = grades.prepare(graded)
+    # The work is done: a database that is away for a moment must not lose it.
+    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at), settings.lease_seconds)
+
+
+class _Heartbeat:
+    """Keeps a job's lease while it is graded, and stops the grading when the lease is lost or time is up."""
+
+    def __init__(self, store: Store, settings: Settings, claim: jobs.Claim) -> None:
+        self._store = store
+        self._settings = settings
+        self._claim = claim
+        self._begun = time.monotonic()
+        self._kept = self._begun
+
+    def __call__(self, progress: Progress, /) -> None:
+        moment = time.monotonic()
+        if moment - self._begun > self._settings.job_seconds:
+            raise HostError(f"grading took longer than {self._settings.job_seconds:.0f} s")
+        if moment - self._kept < min(self._settings.lease_seconds / 3, _PROGRESS_SECONDS):
+            return
+        share = progress.trials_done / max(1, progress.trials)
+        try:
+            jobs.heartbeat(self._store, self._claim, self._settings.lease_seconds, share)
+        except DBAPIError as error:
+            # The next pulse tries again; should the lease run out meanwhile, the token tells.
+            _log.warning("heartbeat.failed", error=str(error))
+        else:
+            self._kept = moment
+
+
+def _persistent(change: Callable[[], Result], seconds: float) -> Result:
+    """Try a change again while the database cannot be reached, for as long as ``seconds``."""
+    until = time.monotonic() + seconds
+    pause = 0.1
+    while True:
+        try:
+            return change()
+        except DBAPIError as error:
+            if time.monotonic() + pause > until:
+                raise
+            _log.warning("database.retry", error=str(error))
+            time.sleep(pause)
+            pause = min(2 * pause, 5.0)
+
+
+def _end(change: Callable[[], object]) -> None:
+    try:
+        change()
+    except jobs.Fenced as error:
+        _log.info("job.stopped", reason=str(error))

@@ -1,0 +1,77 @@
+"""Tells workers through the broker that there is work. A nudge that is lost, doubled or late does no harm.
+
+Nothing here fails when the broker does: the sweeper nudges again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import structlog
+from celery import Celery
+from kombu.exceptions import OperationalError as BrokerError
+from redis.exceptions import RedisError
+
+from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS
+from service.settings import Settings
+from service.store.engine import Store
+from service.store.jobs import Retry
+from service.store.models import Lane
+from service.store.sweep import due_plots, note_nudges, take_back_lost, wanting_nudges
+
+_log = structlog.get_logger(__name__)
+#: What a broker that is not there can raise.
+_AWAY = (BrokerError, RedisError, OSError)
+
+
+@dataclass(frozen=True, slots=True)
+class Nudger:
+    """Publishes nudges, and sweeps up after those that were lost."""
+
+    app: Celery
+    store: Store
+    settings: Settings
+
+    def grade(self, lane: Lane, count: int = 1) -> None:
+        """Nudge for ``count`` jobs of a lane that were just taken in."""
+        if self._publish(GRADE_TASK, lane.value, count):
+            note_nudges(self.store, lane, count)
+
+    def plot(self, count: int = 1) -> None:
+        """Nudge for the plots of ``count`` jobs."""
+        self._publish(PLOT_TASK, PLOTS, count)
+
+    def sweep(self) -> None:
+        """Take back lost jobs, and nudge for what is due and not nudged for.
+
+        No more nudges are published than there are due jobs without one in the broker's queue, so that a day
+        without a worker leaves no heap of them.
+        """
+        take_back_lost(self.store, Retry(self.settings.backoff_seconds))
+        for lane, wanting in wanting_nudges(self.store, self.settings.nudge_seconds).items():
+            self.grade(lane, min(wanting.stale, self._lacking(lane.value, wanting.due)))
+        waiting = due_plots(self.store)
+        if waiting:
+            self.plot(self._lacking(PLOTS, waiting))
+
+    def _lacking(self, queue: str, due: int) -> int:
+        try:
+            with self.app.connection_for_write() as connection, connection.channel() as channel:
+                depth: int = cast(Any, channel).queue_declare(queue=queue).message_count
+        except _AWAY as error:
+            _log.warning("broker.unreachable", error=str(error))
+            return 0
+        return max(0, due - depth)
+
+    def _publish(self, task: str, queue: str, count: int) -> bool:
+        if count <= 0:
+            return False
+        try:
+            with self.app.connection_for_write() as connection, connection.Producer() as producer:
+                for _ in range(count):
+                    self.app.send_task(task, queue=queue, producer=producer, ignore_result=True)
+        except _AWAY as error:
+            _log.warning("nudge.failed", task=task, count=count, error=str(error))
+            return False
+        return True

@@ -1,0 +1,114 @@
+"""The two Celery tasks, and what a pool child keeps warm for them: the rig and the database.
+
+A task is a nudge and carries nothing; what to do is claimed in the database.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from dataclasses import dataclass
+from functools import cached_property
+
+import structlog
+from celery import Task, shared_task, signals
+
+from service.grading.rig import Rig
+from service.queue.celery_app import GRADE_TASK, PLOT_TASK
+from service.queue.grading_job import Outcome, grade_next, plot_next
+from service.queue.logs import configure_logging
+from service.queue.nudges import Nudger
+from service.settings import Settings, load_settings
+from service.store.engine import Store, open_store
+
+_log = structlog.get_logger(__name__)
+#: Set by the worker for its pool children: one name for all of them, so that a dead worker's jobs can be found.
+WORKER_VARIABLE = "ROBOMARK_WORKER_NAME"
+
+
+def worker_name() -> str:
+    """The name of the worker that this process is part of."""
+    return os.environ.get(WORKER_VARIABLE) or f"{socket.gethostname()}:{os.getpid()}"
+
+
+@dataclass(frozen=True, slots=True)
+class PoolChild:
+    """What one pool child holds from its first task to its end."""
+
+    settings: Settings
+    store: Store
+    rig: Rig
+
+    def close(self) -> None:
+        self.rig.close()
+        self.store.close()
+
+
+class WarmTask(Task):  # type: ignore[type-arg]
+    """A task with its pool child's things; they are made in the child, never before the fork of one."""
+
+    abstract = True
+
+    @property
+    def child(self) -> PoolChild:
+        return _children.child
+
+
+class _Children:
+    """The pool child of this process, made when first asked for."""
+
+    @cached_property
+    def child(self) -> PoolChild:
+        settings = load_settings()
+        return PoolChild(settings, open_store(settings), Rig())
+
+    def drop(self) -> None:
+        """Close what there is; the next task makes it afresh."""
+        if "child" in vars(self):
+            self.child.close()
+            del self.child
+
+
+_children = _Children()
+
+
+@shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
+def grade_nudge(task: WarmTask) -> None:
+    """Grade the job whose turn it is, then ask for its plots."""
+    child = task.child
+    outcome = grade_next(child.store, child.settings, child.rig, worker_name())
+    if outcome is Outcome.GRADED:
+        Nudger(task.app, child.store, child.settings).plot()
+    elif outcome is Outcome.HOST_FAULT:
+        # Whatever broke may be something that was kept warm.
+        _children.drop()
+
+
+@shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
+def plot_nudge(task: WarmTask) -> None:
+    """Draw the plots that have waited longest."""
+    child = task.child
+    try:
+        plot_next(child.store, child.settings)
+    except Exception:
+        # The row says that they are still due; they are tried again, a bounded number of times.
+        _log.exception("plots.failed")
+
+
+@signals.setup_logging.connect
+def _log_as_we_do(**_: object) -> None:
+    configure_logging(load_settings().log_level)
+
+
+@signals.worker_process_init.connect
+def _begin(**_: object) -> None:
+    # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
+    try:
+        _children.child  # noqa: B018
+    except Exception:
+        _log.exception("pool_child.cold")
+
+
+@signals.worker_process_shutdown.connect
+def _end(**_: object) -> None:
+    _children.drop()

@@ -1,0 +1,53 @@
+"""Writes reports of grades that are stored, with the plots that are stored beside them.
+
+What a report says is ``service.reports``'; what is not drawn yet is drawn there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.queue.plotting import PREFIX, draw
+from service.reports.html import student_report
+from service.reports.written import file_name, write_page
+from service.store import artifacts, grades, intake
+from service.store.engine import Store
+from service.store.models import Job, PlotState
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The report of one job."""
+
+    job_id: str
+    path: Path
+
+
+def write_reports(store: Store, job_ids: Iterable[str], folder: Path) -> list[Written]:
+    """A page for each graded job, named after its student; two of one name keep apart by the job's id.
+
+    Raises UsageError when the folder cannot be written to.
+    """
+    used: set[str] = set()
+    written = []
+    for job_id in job_ids:
+        student, page = _page(store, job_id)
+        name = file_name(student)
+        if name.casefold() in used:
+            name = f"{name.removesuffix('.html')}-{job_id}.html"
+        used.add(name.casefold())
+        written.append(Written(job_id, write_page(folder, name, page)))
+    return written
+
+
+def _page(store: Store, job_id: str) -> tuple[str, str]:
+    with store.reading() as session:
+        grade = grades.load(session, job_id)
+        hand_in = intake.load_hand_in(session, job_id)
+        job = session.get_one(Job, job_id)
+        kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
+    files = kept if job.plots is PlotState.DONE else draw(grade, hand_in.assignment)
+    plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
+    return grade.student, student_report(grade, plots, hand_in.submission)

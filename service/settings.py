@@ -1,0 +1,108 @@
+"""What an operator can set, read once from the environment (``ROBOMARK_...``) and handed down as a frozen value.
+
+Nothing else in Robomark reads the environment; nothing here opens a file or a connection.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Self
+
+from pydantic import Field, ValidationError, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
+
+from sim.errors import UsageError
+
+PREFIX = "ROBOMARK_"
+
+
+def default_home() -> Path:
+    """The user's data directory, as the XDG base directory specification has it."""
+    data = os.environ.get("XDG_DATA_HOME", "")
+    base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
+    return base / "robomark"
+
+
+class Settings(BaseSettings):
+    """All settings. An empty ``broker_url`` means the bundled server, an empty ``database_url`` SQLite in ``home``."""
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, frozen=True, extra="forbid")
+
+    home: Path = Field(default_factory=default_home)
+    broker_url: str = ""
+    database_url: str = ""
+    concurrency: int = Field(default_factory=lambda: len(os.sched_getaffinity(0)), ge=1, le=256)
+    #: A worker that has not been heard of for this long has lost its job.
+    lease_seconds: float = Field(default=60.0, ge=0.5, le=3600)
+    #: How often a job is begun, at most, when machines fail under it.
+    max_attempts: int = Field(default=3, ge=1, le=20)
+    #: The wait before a second attempt; it doubles with each further one.
+    backoff_seconds: float = Field(default=5.0, ge=0, le=3600)
+    #: How long one whole job may take in real time: the backstop behind all other limits.
+    job_seconds: float = Field(default=900.0, ge=1, le=86_400)
+    #: A queued job whose nudge is older than this may be nudged again.
+    nudge_seconds: float = Field(default=10.0, ge=0.1, le=3600)
+    log_level: str = "WARNING"
+
+    @field_validator("home")
+    @classmethod
+    def _absolute(cls, home: Path) -> Path:
+        return home.expanduser().absolute()
+
+    @field_validator("broker_url")
+    @classmethod
+    def _known_broker(cls, url: str) -> str:
+        if url and url.partition("://")[0] not in {"redis", "rediss", "redis+socket"}:
+            raise ValueError("expected redis://host:port/number, rediss://... or redis+socket:///path")
+        return url
+
+    @field_validator("database_url")
+    @classmethod
+    def _known_database(cls, url: str) -> str:
+        if not url:
+            return url
+        try:
+            kind = make_url(url).get_backend_name()
+        except ArgumentError as error:
+            raise ValueError("expected sqlite:///path or postgresql://user@host/name") from error
+        if kind not in {"sqlite", "postgresql"}:
+            raise ValueError("expected sqlite:///path or postgresql://user@host/name")
+        return url
+
+    @field_validator("log_level")
+    @classmethod
+    def _known_level(cls, level: str) -> str:
+        if level.upper() not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
+            raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
+        return level.upper()
+
+    @property
+    def database(self) -> str:
+        """The URL of the database in use."""
+        return self.database_url or f"sqlite:///{self.home / 'robomark.db'}"
+
+    def with_broker(self, url: str) -> Self:
+        """The same settings, with a broker that is known to be there."""
+        return self.model_copy(update={"broker_url": url})
+
+    def environment(self) -> dict[str, str]:
+        """The variables that make a child process read these same settings."""
+        return {f"{PREFIX}{name.upper()}": str(value) for name, value in self.model_dump().items() if value != ""}
+
+
+def load_settings(**overrides: object) -> Settings:
+    """Settings from the environment; ``overrides`` win.
+
+    Raises:
+        UsageError: naming the variable, its value and what was expected.
+    """
+    try:
+        return Settings(**overrides)  # type: ignore[arg-type]
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"]).upper()
+        message = first["msg"].removeprefix("Value error, ")
+        raise UsageError(f"{PREFIX}{name} is {first['input']!r}: {message[:1].lower()}{message[1:]}") from None

@@ -1,0 +1,169 @@
+"""What an instructor asks about batches and jobs: how far, what marks, what went wrong. Only reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+
+from sqlalchemy import Row, Select, func, select
+from sqlalchemy.orm import Session
+
+from service.store import models
+from service.store.models import UNFINISHED, AssignmentVersion, Batch, CriterionRow, Enrolment, Job, JobState, PlotState
+from sim.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class JobLine:
+    """One job, as a table shows it."""
+
+    id: str
+    student: str
+    source: str
+    assignment: str
+    state: JobState
+    verdict: str | None
+    marks: Decimal | None
+    max_marks: Decimal
+    accuracy: float | None  # of the first criterion that classifies
+    attempt: int  # the student's
+    error: str | None
+    plots: PlotState
+    worker: str | None
+    queued_at: datetime
+    finished_at: datetime | None
+
+    @property
+    def ended(self) -> bool:
+        return self.state not in UNFINISHED
+
+
+@dataclass(frozen=True, slots=True)
+class BatchLine:
+    """A batch, and how many of its jobs are in each state."""
+
+    id: str
+    name: str
+    created_at: datetime
+    problems: tuple[tuple[str, str], ...]  # the rows that were refused: name, sentence
+    jobs: int
+    states: dict[JobState, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far jobs have come; ``partial`` is what the running ones have done, in jobs."""
+
+    jobs: int
+    ended: int
+    partial: float
+    plots_due: int
+
+
+def find_batch(session: Session, start: str) -> str:
+    """The id of the batch that begins so. Raises UsageError where none or several do."""
+    return _find(session, select(Batch.id).where(Batch.id.startswith(start, autoescape=True)), start, "batch")
+
+
+def find_job(session: Session, start: str) -> str:
+    """The id of the job that begins so. Raises UsageError where none or several do."""
+    return _find(session, select(Job.id).where(Job.id.startswith(start, autoescape=True)), start, "grade")
+
+
+def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
+    """The newest batches first."""
+    query = select(Batch.id).order_by(Batch.created_at.desc(), Batch.id).limit(limit)
+    return [batch(session, batch_id) for batch_id in session.scalars(query)]
+
+
+def batch(session: Session, batch_id: str) -> BatchLine:
+    """One batch. Raises UsageError if there is none of this id."""
+    row = session.get(Batch, batch_id)
+    if row is None:
+        raise UsageError(f"there is no batch {batch_id}")
+    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
+    states = dict(session.execute(counted).tuples().all())
+    problems = tuple((name, sentence) for name, sentence in row.problems)
+    return BatchLine(row.id, row.name, row.created_at, problems, sum(states.values()), states)
+
+
+def job_lines(session: Session, batch_id: str) -> list[JobLine]:
+    """Every job of a batch, by student."""
+    query = _job_lines().where(Job.batch_id == batch_id).order_by(Enrolment.student, Job.id)
+    return [_line(row) for row in session.execute(query)]
+
+
+def job_line(session: Session, job_id: str) -> JobLine:
+    """One job. Raises UsageError if there is none of this id."""
+    row = session.execute(_job_lines().where(Job.id == job_id)).one_or_none()
+    if row is None:
+        raise UsageError(f"there is no grade {job_id}")
+    return _line(row)
+
+
+def progress(session: Session, batch_id: str) -> Progress:
+    """How far a batch has come."""
+    of_batch = Job.batch_id == batch_id
+    states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).tuples().all())
+    running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
+    waiting = select(func.count()).select_from(Job).where(of_batch, Job.plots == PlotState.DUE)
+    return Progress(
+        jobs=sum(states.values()),
+        ended=sum(count for state, count in states.items() if state not in UNFINISHED),
+        partial=session.scalar(running) or 0.0,
+        plots_due=session.scalar(waiting) or 0,
+    )
+
+
+def _find(session: Session, query: Select[str], start: str, what: str) -> str:
+    found = session.scalars(query.limit(2)).all()
+    if not found:
+        raise UsageError(f"there is no {what} {start!r}")
+    if len(found) > 1:
+        raise UsageError(f"more than one {what} begins with {start!r}; give more of its id")
+    return found[0]
+
+
+def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None]:
+    accuracy = (
+        select(CriterionRow.accuracy)
+        .where(CriterionRow.job_id == Job.id, CriterionRow.accuracy.is_not(None))
+        .order_by(CriterionRow.position)
+        .limit(1)
+        .scalar_subquery()
+    )
+    return (
+        select(
+            Job,
+            Enrolment.student,
+            models.Submission.source,
+            AssignmentVersion,
+            models.Submission.attempt,
+            accuracy,
+        )
+        .join(models.Submission, Job.submission_id == models.Submission.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+    )
+
+
+def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None]) -> JobLine:
+    job, student, source, version, attempt, accuracy = row._tuple()
+    return JobLine(
+        id=job.id,
+        student=student,
+        source=source,
+        assignment=version.assignment,
+        state=job.state,
+        verdict=job.verdict,
+        marks=job.marks,
+        max_marks=version.max_marks,
+        accuracy=accuracy,
+        attempt=attempt,
+        error=job.error,
+        plots=job.plots,
+        worker=job.worker,
+        queued_at=job.queued_at,
+        finished_at=job.finished_at,
+    )

@@ -1,0 +1,65 @@
+"""Brings a database's tables up to this release, once, however many processes start at the same time.
+
+There is no way down: an older Robomark refuses a newer database.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Engine, text
+from sqlalchemy.engine import Connection
+
+from sim.errors import HostError
+
+#: An arbitrary number that all Robomarks share: PostgreSQL's advisory lock for migrations.
+_LOCK = 0x526F626F
+
+
+def configuration(connection: Connection) -> Config:
+    """Alembic's configuration for the scripts inside this package, on an open connection."""
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    config.attributes["connection"] = connection
+    return config
+
+
+def newest_revision() -> str:
+    """The revision that this release needs."""
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    head = ScriptDirectory.from_config(config).get_current_head()
+    assert head is not None
+    return head
+
+
+def current_revision(engine: Engine) -> str | None:
+    """The revision the database is at; None for an empty one."""
+    with engine.begin() as connection:
+        return MigrationContext.configure(connection).get_current_revision()
+
+
+def upgrade(engine: Engine) -> None:
+    """Apply what is missing, in one transaction under a lock.
+
+    Raises HostError if the database was made by a newer Robomark.
+    """
+    with engine.begin() as connection:
+        # SQLite holds its write lock since BEGIN IMMEDIATE.
+        if engine.dialect.name == "postgresql":
+            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
+        config = configuration(connection)
+        present = MigrationContext.configure(connection).get_current_revision()
+        if present == newest_revision():
+            return
+        known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+        if present is not None and present not in known:
+            raise HostError(
+                f"The database was made by a newer Robomark (its tables are at {present}); "
+                "upgrade this Robomark, or restore a backup: there is no way down."
+            )
+        command.upgrade(config, "head")

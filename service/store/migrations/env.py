@@ -1,0 +1,16 @@
+"""Runs revisions on the connection that ``service.store.migrate`` hands over; opens none itself."""
+
+from __future__ import annotations
+
+from alembic import context
+
+from service.store.models import Base
+
+context.configure(
+    connection=context.config.attributes["connection"],
+    target_metadata=Base.metadata,
+    render_as_batch=True,
+    compare_type=True,
+)
+with context.begin_transaction():
+    context.run_migrations()

@@ -1,0 +1,300 @@
+"""The tables: who, what was handed in, the jobs, and what came of them.
+
+Only shapes and constraints; what is done with them stands in the modules beside this one.
+"""
+
+from __future__ import annotations
+
+import secrets
+from datetime import datetime
+from decimal import Decimal
+from enum import StrEnum
+from typing import Any
+
+from sqlalchemy import BigInteger, CheckConstraint, Enum, ForeignKey, Index, LargeBinary, MetaData, String
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
+
+ID_ALPHABET = "0123456789abcdefghjkmnpqrstvwxyz"
+ID_LENGTH = 12
+
+
+def new_id() -> str:
+    """A name that is hard to guess (60 bits) and easy to read out."""
+    return "".join(secrets.choice(ID_ALPHABET) for _ in range(ID_LENGTH))
+
+
+class Role(StrEnum):
+    STUDENT = "student"
+    STAFF = "staff"
+
+
+class Lane(StrEnum):
+    """Who waits for the job: a person now, or a batch."""
+
+    INTERACTIVE = "interactive"
+    BATCH = "batch"
+
+
+class JobState(StrEnum):
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"  # has a grade
+    DEAD = "dead"  # could not be graded; ``error`` says why
+    CANCELLED = "cancelled"
+    SUPERSEDED = "superseded"  # a newer hand-in came while it waited
+
+
+UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
+
+
+class PlotState(StrEnum):
+    """Plots come after the marks and never change them."""
+
+    NONE = "none"
+    DUE = "due"
+    DONE = "done"
+    FAILED = "failed"
+
+
+class BatchState(StrEnum):
+    OPEN = "open"
+    PAUSED = "paused"
+    CANCELLED = "cancelled"
+
+
+def _enum(kind: type[StrEnum]) -> Enum:
+    return Enum(
+        kind,
+        native_enum=False,
+        length=16,
+        create_constraint=False,
+        values_callable=lambda values: [value.value for value in values],
+    )
+
+
+class Base(DeclarativeBase):
+    metadata = MetaData(
+        naming_convention={
+            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+            "pk": "pk_%(table_name)s",
+        }
+    )
+    type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it as a class attribute
+        datetime: UtcDateTime(),
+        Decimal: ExactDecimal(),
+        str: SafeText(),
+        Any: SafeJson(),
+        Role: _enum(Role),
+        Lane: _enum(Lane),
+        JobState: _enum(JobState),
+        PlotState: _enum(PlotState),
+        BatchState: _enum(BatchState),
+    }
+
+
+class Course(Base):
+    __tablename__ = "course"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(unique=True)
+    created_at: Mapped[datetime]
+
+
+class Person(Base):
+    __tablename__ = "person"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    email: Mapped[str | None]
+    created_at: Mapped[datetime]
+
+
+class Enrolment(Base):
+    """A student is a course and an id in it: from the roster, else the name of the folder or file."""
+
+    __tablename__ = "enrolment"
+    __table_args__ = (Index(None, "course_id", "student", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
+    person_id: Mapped[int] = mapped_column(ForeignKey("person.id"))
+    student: Mapped[str]
+    role: Mapped[Role]
+
+
+class AssignmentVersion(Base):
+    """An assignment, frozen: ``content`` is all a worker on another machine needs."""
+
+    __tablename__ = "assignment_version"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    assignment: Mapped[str] = mapped_column(index=True)
+    sha256: Mapped[str] = mapped_column(String(64), unique=True)  # of the content
+    version: Mapped[str]  # what the assignment calls itself: the hash of its folder
+    title: Mapped[str]
+    max_marks: Mapped[Decimal]
+    content: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+    created_at: Mapped[datetime]
+
+
+class Batch(Base):
+    __tablename__ = "batch"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
+    name: Mapped[str]
+    state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
+    problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that preflight refused
+    created_at: Mapped[datetime]
+
+
+class Submission(Base):
+    """What a student handed in; ``attempt`` counts within the student and the assignment."""
+
+    __tablename__ = "submission"
+    __table_args__ = (
+        Index(None, "enrolment_id", "assignment", "attempt", unique=True),
+        CheckConstraint("attempt > 0", name="attempt"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"))
+    assignment: Mapped[str]
+    batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
+    attempt: Mapped[int]
+    sha256: Mapped[str] = mapped_column(String(64), index=True)  # of what was handed in
+    source: Mapped[str]  # the name it came under
+    size: Mapped[int]
+    packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+    created_at: Mapped[datetime]
+
+
+class Job(Base):
+    """One grading of one submission. The row is the job; the broker only nudges."""
+
+    __tablename__ = "job"
+    __table_args__ = (
+        Index(None, "state", "lane", "due_at"),
+        Index(None, "state", "lease_until"),
+        Index(None, "started_at"),
+        Index(None, "plots", "plots_due_at"),
+        CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
+    )
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    submission_id: Mapped[int] = mapped_column(ForeignKey("submission.id"), index=True)
+    assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"), index=True)
+    # The two shares that a claim weighs, beside the job so that a claim reads one table.
+    enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"), index=True)
+    batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
+    lane: Mapped[Lane]
+    state: Mapped[JobState] = mapped_column(default=JobState.QUEUED)
+
+    attempt: Mapped[int] = mapped_column(default=0)  # times begun; not the student's attempts
+    max_attempts: Mapped[int]
+    due_at: Mapped[datetime]  # not before this: later than ``queued_at`` after a fault of ours
+    lease: Mapped[str | None] = mapped_column(String(32))
+    lease_until: Mapped[datetime | None]
+    heartbeat_at: Mapped[datetime | None]
+    worker: Mapped[str | None]  # who holds it or held it last
+    progress: Mapped[float] = mapped_column(default=0.0)  # 0 to 1
+    error: Mapped[str | None]  # a sentence, of the last fault of ours or the reason of death
+
+    queued_at: Mapped[datetime]
+    nudged_at: Mapped[datetime | None]
+    started_at: Mapped[datetime | None]
+    graded_at: Mapped[datetime | None]  # grading ended, results not yet stored
+    finished_at: Mapped[datetime | None]  # results stored, or given up
+
+    verdict: Mapped[str | None] = mapped_column(String(32))
+    marks: Mapped[Decimal | None]
+    max_marks: Mapped[Decimal | None]
+    grader_version: Mapped[str | None]
+    walls: Mapped[str | None]
+    notes: Mapped[Any] = mapped_column(default=list)
+
+    plots: Mapped[PlotState] = mapped_column(default=PlotState.NONE)
+    plots_due_at: Mapped[datetime | None]
+    plots_attempt: Mapped[int] = mapped_column(default=0)
+    plotted_at: Mapped[datetime | None]
+
+
+class TrialRow(Base):
+    """One run; its recording is the job's artifact ``recording-<position>``."""
+
+    __tablename__ = "trial"
+    __table_args__ = (Index(None, "job_id", "position", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("job.id", ondelete="CASCADE"))
+    position: Mapped[int]
+    scenario: Mapped[str]
+    scenario_index: Mapped[int]
+    seed: Mapped[int] = mapped_column(BigInteger)
+    light_noise: Mapped[float]
+    motor_noise: Mapped[float]
+    visibility: Mapped[str] = mapped_column(String(32))
+    verdict: Mapped[str] = mapped_column(String(32))
+    sha256: Mapped[str] = mapped_column(String(64))
+    end_t: Mapped[float]
+
+
+class CriterionRow(Base):
+    """One marked line. Accuracy is data of its own, so that a course can be asked about it."""
+
+    __tablename__ = "criterion_result"
+    __table_args__ = (Index(None, "job_id", "position", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("job.id", ondelete="CASCADE"))
+    position: Mapped[int]
+    criterion: Mapped[str]
+    title: Mapped[str]
+    marks: Mapped[Decimal]
+    max_marks: Mapped[Decimal]
+    message: Mapped[str]
+    visibility: Mapped[str] = mapped_column(String(32))
+    evidence: Mapped[Any]
+    accuracy: Mapped[float | None]
+    accuracy_low: Mapped[float | None]
+    accuracy_high: Mapped[float | None]
+    accuracy_n: Mapped[int | None]
+    labels: Mapped[Any | None]  # ["square", ...]
+    confusion: Mapped[Any | None]  # [[truth, answer or null, count], ...]
+    sights: Mapped[Any]
+
+
+class Artifact(Base):
+    """A named file of a job: a recording, a plot. Small ones only; ``artifacts`` caps them."""
+
+    __tablename__ = "artifact"
+    __table_args__ = (Index(None, "job_id", "name", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("job.id", ondelete="CASCADE"))
+    name: Mapped[str]
+    media_type: Mapped[str]
+    sha256: Mapped[str] = mapped_column(String(64))  # of the content before compression
+    size: Mapped[int]  # bytes before compression
+    compressed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)  # zlib
+    created_at: Mapped[datetime]
+
+
+class Audit(Base):
+    """Who did what to which row; never changed, never deleted."""
+
+    __tablename__ = "audit"
+    __table_args__ = (Index(None, "subject", "subject_id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    at: Mapped[datetime] = mapped_column(index=True)
+    actor: Mapped[str]
+    action: Mapped[str]
+    subject: Mapped[str] = mapped_column(String(32))  # a table's name
+    subject_id: Mapped[str]
+    detail: Mapped[Any] = mapped_column(default=dict)

@@ -1,0 +1,118 @@
+"""Trees of frozen dataclasses to JSON values and back, by their type hints; nothing is lost, no code is run.
+
+The one codec of the store, for recordings, assignments and evidence. It writes no files and knows no table.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import types
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from decimal import Decimal
+from enum import Enum
+from functools import cache
+from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel, TypeAdapter
+
+T = TypeVar("T")
+Plain = None | bool | int | float | str | list["Plain"] | dict[str, "Plain"]
+
+
+def to_plain(value: object) -> Plain:
+    """A JSON value for dataclasses, pydantic models, tuples, mappings, enums, decimals and bytes.
+
+    Bytes become base64, floats that JSON has no word for their names. Raises TypeError for anything else.
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    match value:
+        case Enum():
+            return cast(Plain, value.value)
+        case None | bool() | int() | str():
+            return value
+        case float():
+            return value if math.isfinite(value) else str(value)
+        case Decimal():
+            return str(value)
+        case bytes():
+            return base64.b64encode(value).decode("ascii")
+        case BaseModel():
+            return cast(Plain, value.model_dump(mode="json", by_alias=True))
+        case Mapping():
+            return {str(key): to_plain(item) for key, item in value.items()}
+        case Sequence():
+            return [to_plain(item) for item in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def from_plain(kind: type[T], value: Plain) -> T:
+    """The inverse of ``to_plain`` for a value of type ``kind``.
+
+    Unknown fields are ignored, missing ones defaulted. Raises TypeError or ValueError where it does not fit.
+    """
+    return cast(T, _read(kind, value))
+
+
+def arguments_from_plain(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments for the dataclass ``kind`` among the fields that are there; the caller adds the rest."""
+    known = _hints(kind)
+    return {name: _read(known[name], item) for name, item in value.items() if name in known}
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def _read(kind: Any, value: Any) -> Any:
+    origin = get_origin(kind)
+    if origin is Annotated or (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        return _adapter(kind).validate_python(value)
+    if origin is Union or origin is types.UnionType:
+        return _read_union(get_args(kind), value)
+    if origin is Literal:
+        return value
+    if origin is tuple:
+        return _read_tuple(get_args(kind), value)
+    if origin is not None and issubclass(origin, Mapping):
+        return {key: _read(get_args(kind)[1], item) for key, item in value.items()}
+    if is_dataclass(kind):
+        known = _hints(cast(type, kind))
+        return cast(type, kind)(**{name: _read(known[name], item) for name, item in value.items() if name in known})
+    return _read_scalar(kind, value)
+
+
+def _read_union(kinds: tuple[Any, ...], value: Any) -> Any:
+    if value is None and type(None) in kinds:
+        return None
+    rest = [kind for kind in kinds if kind is not type(None)]
+    if len(rest) != 1:
+        raise TypeError(f"cannot tell which of {rest} is meant")
+    return _read(rest[0], value)
+
+
+def _read_tuple(kinds: tuple[Any, ...], value: Sequence[Any]) -> tuple[Any, ...]:
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        return tuple(_read(kinds[0], item) for item in value)
+    return tuple(_read(kind, item) for kind, item in zip(kinds, value, strict=True))
+
+
+def _read_scalar(kind: Any, value: Any) -> Any:
+    if kind is bytes:
+        return base64.b64decode(value, validate=True)
+    if kind in (float, Decimal) or (isinstance(kind, type) and issubclass(kind, Enum)):
+        return kind(value)
+    if isinstance(value, kind):
+        return value
+    raise TypeError(f"expected {kind.__name__}, got {type(value).__name__}")

@@ -1,0 +1,74 @@
+"""Finds jobs that were lost: leases that ran out, nudges that never came. Any number may sweep at any time.
+
+Publishes nothing; it says how many nudges are wanting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+
+from sqlalchemy import func, or_, select, update
+
+from service.store.engine import Store, now
+from service.store.jobs import Retry, after_fault
+from service.store.models import Job, JobState, Lane, PlotState
+
+
+@dataclass(frozen=True, slots=True)
+class Wanting:
+    """How many nudges should be on their way, and how many of those may have been lost."""
+
+    due: int
+    stale: int
+
+
+def take_back_lost(store: Store, retry: Retry) -> int:
+    """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
+    with store.transaction() as session:
+        at = now(session)
+        lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
+        query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
+        rows = session.execute(query.with_for_update(skip_locked=True)).all()
+        for job_id, lease, attempt, max_attempts, worker in rows:
+            reason = f"the worker {worker} fell silent while it graded; its log may tell why"
+            values = after_fault(attempt, max_attempts, reason, retry, at)
+            held = (Job.id == job_id, Job.lease == lease)
+            session.execute(update(Job).where(*held).values(**values))
+        return len(rows)
+
+
+def wanting_nudges(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
+    """By lane, the jobs that are due, and those of them whose nudge is missing or older than ``older_seconds``."""
+    with store.reading() as session:
+        at = now(session)
+        due = (Job.state == JobState.QUEUED, Job.due_at <= at)
+        query = select(Job.lane, func.count()).where(*due).group_by(Job.lane)
+        stale = or_(Job.nudged_at.is_(None), Job.nudged_at < at - timedelta(seconds=older_seconds))
+        all_due = dict(session.execute(query).tuples().all())
+        all_stale = dict(session.execute(query.where(stale)).tuples().all())
+        return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
+
+
+def note_nudges(store: Store, lane: Lane, count: int) -> None:
+    """Remember that the ``count`` longest unnudged jobs of a lane were nudged now."""
+    with store.transaction() as session:
+        at = now(session)
+        oldest = (
+            select(Job.id)
+            .where(Job.state == JobState.QUEUED, Job.due_at <= at, Job.lane == lane)
+            .order_by(func.coalesce(Job.nudged_at, Job.queued_at), Job.id)
+            .limit(count)
+        )
+        session.execute(
+            update(Job).where(Job.id.in_(oldest)).values(nudged_at=at),
+            execution_options={"synchronize_session": False},
+        )
+
+
+def due_plots(store: Store) -> int:
+    """How many jobs wait for their plots."""
+    with store.reading() as session:
+        due = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
+        return session.scalar(select(func.count()).select_from(Job).where(*due)) or 0

@@ -1,0 +1,63 @@
+"""Whose turn it is: the queued job that is due first by lane, by share of batch and student, and by age.
+
+Only reads (and, on PostgreSQL, locks) the row; taking the job is ``jobs.claim``.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from sqlalchemy import Subquery, case, func, or_, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from service.store.models import Batch, BatchState, Job, JobState, Lane
+
+#: Shares are counted over the jobs begun in this time, so that nobody who was served long ago waits for it.
+SHARE_WINDOW = timedelta(seconds=60)
+#: Of so many jobs begun, one is a batch's even while people wait.
+BATCH_EVERY = 5
+
+
+def next_job(session: Session, at: datetime) -> str | None:
+    """The id of the job to take next; None when none is due.
+
+    The lane first: people before batches, but for one job in five. In a lane, the batch and then the student of
+    whom fewest jobs were begun in the last minute; then the oldest job.
+    """
+    recent = (Job.started_at > at - SHARE_WINDOW,)
+    by_lane = dict(session.execute(select(Job.lane, func.count()).where(*recent).group_by(Job.lane)).tuples().all())
+    people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
+    first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
+
+    of_batch = _begun(Job.batch_id, at)
+    of_student = _begun(Job.enrolment_id, at)
+    held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
+    query = (
+        select(Job.id)
+        .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
+        .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
+        .where(
+            Job.state == JobState.QUEUED,
+            Job.due_at <= at,
+            or_(Job.batch_id.is_(None), Job.batch_id.not_in(held_back)),
+        )
+        .order_by(
+            case((Job.lane == first, 0), else_=1),
+            func.coalesce(of_batch.c.begun, 0),
+            func.coalesce(of_student.c.begun, 0),
+            Job.queued_at,
+            Job.id,
+        )
+        .limit(1)
+        .with_for_update(of=Job, skip_locked=True)
+    )
+    return session.scalar(query)
+
+
+def _begun(share: InstrumentedAttribute[str | None] | InstrumentedAttribute[int], at: datetime) -> Subquery:
+    return (
+        select(share.label("share"), func.count().label("begun"))
+        .where(Job.started_at > at - SHARE_WINDOW)
+        .group_by(share)
+        .subquery()
+    )
