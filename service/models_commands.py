@@ -10,7 +10,6 @@ from rich.console import Console
 from rich.table import Table
 
 from models import card, names
-from models.evaluation import evaluate as measure
 from models.training import train as train_model
 
 models_app = typer.Typer(help="List, train and evaluate classifiers.", no_args_is_help=True)
@@ -44,6 +43,9 @@ def train(
 @models_app.command()
 def evaluate(name: Name) -> None:
     """Measure a packaged classifier over offsets and noise."""
+    # scikit-learn takes a second to import, which no other command should have to wait for.
+    from models.evaluation import evaluate as measure
+
     result = measure(name)
     table = Table("condition", "right", "of", "share", box=None, pad_edge=False)
     for column in table.columns[1:]:

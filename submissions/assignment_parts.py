@@ -234,8 +234,8 @@ def _check_criterion(
         if len(criterion.truth) != len(scenario.poses):
             problems.add(
                 (*place, "truth"),
-                f'truth has {len(criterion.truth)} labels, but scenario "{scenario.id}" has {len(scenario.poses)} '
-                "poses, expected one label for each pose",
+                f"truth has {len(criterion.truth)} labels for the {len(scenario.poses)} poses of scenario "
+                f'"{scenario.id}", expected one label for each pose',
             )
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from builders import settings_in
+from databases import fresh_database, postgresql_server
 from service.grading.rig import Rig
+from service.settings import Settings
+from service.store.engine import Store, open_store
 
 # Two cores are shared with whatever else runs: how long an example takes says nothing.
 settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -18,3 +23,24 @@ settings.load_profile("robomark")
 def rig() -> Iterator[Rig]:
     with Rig() as warm:
         yield warm
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[str]:
+    with postgresql_server() as url:
+        yield url
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])
+def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
+    """Settings with an empty database of each kind."""
+    if request.param == "sqlite":
+        return settings_in(tmp_path)
+    return settings_in(tmp_path, database_url=fresh_database(request.getfixturevalue("postgresql")))
+
+
+@pytest.fixture
+def store(service_settings: Settings) -> Iterator[Store]:
+    """The tables in an empty database of each kind."""
+    with open_store(service_settings) as opened:
+        yield opened

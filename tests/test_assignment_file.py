@@ -16,7 +16,9 @@ from sim.backgrounds import HEIGHT, WIDTH
 from sim.errors import AssignmentError, UsageError
 from sim.recording import Pose
 from submissions.assignment_file import AssignmentProblems, catalogue, find_assignment, read_assignment
+from submissions.assignment_parts import build_assignment
 from submissions.criteria import Classification, Finishes
+from submissions.problems import Problems
 from submissions.toml_lines import find_lines, line_of
 
 HEAD = 'id = "a"\ntitle = "A"\n'
@@ -258,7 +260,7 @@ check = "pose"
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "classification") + 'truth = ["a", "b"]\n',
             10,
-            'truth has 2 labels, but scenario "s" has 1 poses',
+            'truth has 2 labels for the 1 poses of scenario "s"',
         ),
         (
             HEAD + '[parts]\nresponder = "none"\n' + SCENARIO + FINISHES.replace("finishes", "replies"),
@@ -309,9 +311,6 @@ def test_problems_survive_a_queue() -> None:
 
 @given(st.floats(-50, 2500), st.floats(-50, 1200))
 def test_a_pose_is_accepted_exactly_when_it_is_on_the_floor(x: float, y: float) -> None:
-    from submissions.assignment_parts import build_assignment
-    from submissions.problems import Problems
-
     document = {
         "id": "a",
         "title": "A",
@@ -368,3 +367,52 @@ t.u = 3
     assert {path: lines[path] for path in expected} == expected
     assert line_of(lines, ("o", 1, "q", "missing")) == 18
     assert line_of(lines, ("nowhere",)) == 1
+
+
+KEYS = st.sampled_from(
+    [
+        "id",
+        "title",
+        "given",
+        "given_models",
+        "aliases",
+        "world",
+        "parts",
+        "limits",
+        "scenario",
+        "criterion",
+        "background",
+        "obstacles",
+        "robot",
+        "program",
+        "responder",
+        "poses",
+        "light_noise",
+        "channel",
+        "check",
+        "marks",
+        "scenarios",
+        "truth",
+        "in_order",
+        "expect",
+        "value",
+        "path",
+        "zone",
+        "at_least",
+    ]
+)
+VALUES = st.recursive(
+    st.none().map(lambda _: "classification")
+    | st.sampled_from(["says", "replies", "pose", "messages", "Loop", "student", "s", "(", ""])
+    | st.booleans()
+    | st.integers(-(10**20), 10**20)
+    | st.floats(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=5),
+    max_leaves=20,
+)
+
+
+@given(st.dictionaries(KEYS, VALUES, max_size=8))
+def test_whatever_a_file_says_the_answer_is_an_assignment_or_sentences(document: dict[str, object]) -> None:
+    found = Problems("f", {})
+    assert build_assignment(document, {}, found) is not None or found.sorted()

@@ -104,7 +104,7 @@ def _log_as_we_do(**_: object) -> None:
 def _begin(**_: object) -> None:
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
-        _children.child  # noqa: B018
+        _children.child.rig.check_walls()
     except Exception:
         _log.exception("pool_child.cold")
 

@@ -83,7 +83,7 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     if row is None:
         raise UsageError(f"there is no batch {batch_id}")
     counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
-    states = dict(session.execute(counted).tuples().all())
+    states = dict(session.execute(counted).all())
     problems = tuple((name, sentence) for name, sentence in row.problems)
     return BatchLine(row.id, row.name, row.created_at, problems, sum(states.values()), states)
 
@@ -105,7 +105,7 @@ def job_line(session: Session, job_id: str) -> JobLine:
 def progress(session: Session, batch_id: str) -> Progress:
     """How far a batch has come."""
     of_batch = Job.batch_id == batch_id
-    states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).tuples().all())
+    states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
     running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
     waiting = select(func.count()).select_from(Job).where(of_batch, Job.plots == PlotState.DUE)
     return Progress(
@@ -149,7 +149,7 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None]:
 
 
 def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None]) -> JobLine:
-    job, student, source, version, attempt, accuracy = row._tuple()
+    job, student, source, version, attempt, accuracy = row
     return JobLine(
         id=job.id,
         student=student,

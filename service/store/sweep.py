@@ -46,8 +46,8 @@ def wanting_nudges(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]
         due = (Job.state == JobState.QUEUED, Job.due_at <= at)
         query = select(Job.lane, func.count()).where(*due).group_by(Job.lane)
         stale = or_(Job.nudged_at.is_(None), Job.nudged_at < at - timedelta(seconds=older_seconds))
-        all_due = dict(session.execute(query).tuples().all())
-        all_stale = dict(session.execute(query.where(stale)).tuples().all())
+        all_due = dict(session.execute(query).all())
+        all_stale = dict(session.execute(query.where(stale)).all())
         return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
 
 

@@ -25,7 +25,7 @@ def next_job(session: Session, at: datetime) -> str | None:
     whom fewest jobs were begun in the last minute; then the oldest job.
     """
     recent = (Job.started_at > at - SHARE_WINDOW,)
-    by_lane = dict(session.execute(select(Job.lane, func.count()).where(*recent).group_by(Job.lane)).tuples().all())
+    by_lane = dict(session.execute(select(Job.lane, func.count()).where(*recent).group_by(Job.lane)).all())
     people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
     first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
 

@@ -2,8 +2,8 @@ import json
 
 
 def responder(text):
-    parts = []
+    start = 0
     # Finds the same :: for ever.
-    while "::" in text:
-        parts.append(text.split("::")[0])
-    return "JSON::" + json.dumps({"message": parts})
+    while text.find("::", start) >= 0:
+        kind = text[: text.find("::", start)]
+    return "JSON::" + json.dumps({"message": kind})

@@ -1,0 +1,59 @@
+"""What tests of the store and the queue start from: a database of their own, hand-ins, and what makes grades alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from service.grading.grade import Grade
+from service.settings import Settings
+from service.store import recordings
+from service.store.engine import Store, open_store
+from service.store.intake import Accepted, HandIn, accept
+from service.store.models import Lane
+from sim.recording import Recording
+from submissions.assignment import Assignment
+from submissions.assignment_file import find_assignment
+from submissions.submission import Source, Submission
+
+PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
+
+
+def settings_in(folder: Path, **changes: Any) -> Settings:
+    """Settings with their home in ``folder``, and waits short enough for a test."""
+    values = {"home": folder, "lease_seconds": 5.0, "backoff_seconds": 0.2, "nudge_seconds": 1.0, "concurrency": 2}
+    return Settings(**(values | changes))
+
+
+@contextmanager
+def opened(settings: Settings) -> Iterator[Store]:
+    with open_store(settings) as store:
+        yield store
+
+
+def echo() -> Assignment:
+    return find_assignment("echo-responder")
+
+
+def hand_in(student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None) -> HandIn:
+    """A small hand-in for the echo assignment."""
+    responder = Source("responder.py", "def responder(msg):\n    return msg\n")
+    submission = Submission(student, Source("robot.py", program), responder)
+    return HandIn(submission, assignment or echo(), f"{student}.zip")
+
+
+def accept_one(store: Store, student: str = "ada", *, lane: Lane = Lane.INTERACTIVE, max_attempts: int = 3) -> Accepted:
+    return accept(store, hand_in(student), lane=lane, max_attempts=max_attempts)
+
+
+def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:
+    """A grade in two parts that can be compared: all but the recordings, and every bit of the recordings."""
+    return replace(grade, trials=()), [_canonical(trial.recording) for trial in grade.trials]
+
+
+def _canonical(recording: Recording) -> bytes:
+    # A builder's 560 and a stored 560.0 are the same number written differently.
+    return recordings.to_bytes(recordings.from_bytes(recordings.to_bytes(recording)))

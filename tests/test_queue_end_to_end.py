@@ -1,0 +1,273 @@
+"""Hand-ins through a real broker, a real worker process and a real database: each is graded once, whatever is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+from builders import comparable, hand_in, settings_in
+from rich.console import Console
+from sqlalchemy import func, select
+
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.preflight import preflight
+from service.queue.celery_app import make_celery
+from service.queue.embedded import EmbeddedBroker, EmbeddedServices, broker_answers, socket_path
+from service.queue.nudges import Nudger
+from service.queue.worker import worker_lives
+from service.settings import Settings
+from service.store import artifacts, batches, grades, jobs
+from service.store.engine import Store, open_store
+from service.store.intake import HandIn, accept_batch, load_hand_in
+from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
+from service.waiting import wait_for_batch
+from submissions.example_folder import examples
+
+#: Costs its whole limit of processor time, so that something can be killed while it runs.
+SPIN = "print('begun')\nwhile True:\n    pass\n"
+PATIENCE = 120
+
+
+@dataclass(frozen=True)
+class Service:
+    """What runs, and how to use it."""
+
+    settings: Settings
+    store: Store
+    services: EmbeddedServices
+
+    def submit(self, hand_ins: list[HandIn]) -> str:
+        accepted = accept_batch(self.store, "test", hand_ins, [], max_attempts=3)
+        self.nudger.grade(Lane.BATCH, len(hand_ins))
+        return accepted.id
+
+    def wait(self, batch: str) -> list[Job]:
+        begun = time.monotonic()
+
+        def keep_up() -> None:
+            assert time.monotonic() - begun < PATIENCE, "the batch does not end"
+            self.services.ensure()
+
+        wait_for_batch(self.store, self.nudger, batch, Console(quiet=True), keep_up)
+        return self.jobs(batch)
+
+    def jobs(self, batch: str) -> list[Job]:
+        with self.store.reading() as session:
+            return list(session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)))
+
+    @property
+    def nudger(self) -> Nudger:
+        return Nudger(make_celery(self.services.settings), self.store, self.services.settings)
+
+    def until_running(self, batch: str) -> Job:
+        """A job of the batch that a worker has in hand."""
+        return _until(lambda: next((job for job in self.jobs(batch) if job.state is JobState.RUNNING), None))
+
+    def assert_graded_once(self, batch: str) -> None:
+        with self.store.reading() as session:
+            for job in self.jobs(batch):
+                assert (job.state, job.error, job.plots) == (JobState.DONE, None, PlotState.DONE)
+                positions = session.scalars(select(TrialRow.position).where(TrialRow.job_id == job.id)).all()
+                assert sorted(positions) == list(range(len(positions)))
+                assert positions
+                marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
+                assert session.scalar(marked) == len(load_hand_in(session, job.id).assignment.criteria)
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    settings = settings_in(tmp_path_factory.mktemp("home"), concurrency=1, lease_seconds=6.0)
+    with open_store(settings) as store, EmbeddedServices(settings, store) as services:
+        yield Service(settings, store, services)
+
+
+def _until(look: Callable[[], Job | int | None]) -> Job:
+    begun = time.monotonic()
+    while (found := look()) is None:
+        assert time.monotonic() - begun < PATIENCE, "it does not come"
+        time.sleep(0.05)
+    return found  # type: ignore[return-value]
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def _pool_children(worker: int) -> list[int]:
+    pids = Path(f"/proc/{worker}/task/{worker}/children").read_text().split()
+    return [int(pid) for pid in pids if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def _descendants(pid: int) -> list[int]:
+    try:
+        children = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except FileNotFoundError:
+        return []
+    return children + [below for child in children for below in _descendants(child)]
+
+
+def _spinning(count: int) -> list[HandIn]:
+    return [hand_in(f"spinner-{number}", SPIN) for number in range(count)]
+
+
+def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, rig: Rig) -> None:
+    checked = preflight(examples("echo-responder"), "echo-responder")
+    assert checked.problems == ()
+    batch = service.submit(list(checked.hand_ins))
+    graded = service.wait(batch)
+    service.assert_graded_once(batch)
+    assert {job.attempt for job in graded} == {1}
+    with service.store.reading() as session:
+        for job in graded:
+            taken_in = load_hand_in(session, job.id)
+            direct = grade(taken_in.submission, taken_in.assignment, rig=rig)
+            assert comparable(grades.load(session, job.id)) == comparable(direct)
+            assert (job.marks, job.verdict) == (direct.marks, direct.verdict.value)
+            plots = artifacts.get(session, job.id, prefix="plot-")
+            assert plots
+            assert all(plot.data.startswith(b"\x89PNG") for plot in plots.values())
+
+
+def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service: Service) -> None:
+    lacking = hand_in("lacking")
+    broken = HandIn(replace(lacking.submission, program=None), lacking.assignment, "lacking")
+    batch = service.submit([broken, hand_in("whole")])
+    by_student = {line.student: line for line in _lines(service, batch)}
+    assert by_student["whole"].state is JobState.DONE
+    assert by_student["lacking"].state is JobState.DEAD
+    assert "no robot program" in (by_student["lacking"].error or "")
+
+
+def _lines(service: Service, batch: str) -> list[batches.JobLine]:
+    service.wait(batch)
+    with service.store.reading() as session:
+        return batches.job_lines(session, batch)
+
+
+def test_a_killed_worker_loses_nothing(service: Service) -> None:
+    batch = service.submit(_spinning(2))
+    running = service.until_running(batch)
+    assert service.services.worker_pid is not None
+    os.kill(service.services.worker_pid, signal.SIGKILL)
+    graded = service.wait(batch)
+    service.assert_graded_once(batch)
+    # It is known to have ended, so its job went back without costing an attempt.
+    assert {job.id: job.attempt for job in graded}[running.id] == 1
+
+
+def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
+    batch = service.submit(_spinning(1))
+    service.until_running(batch)
+    assert service.services.worker_pid is not None
+    for child in _pool_children(service.services.worker_pid):
+        os.kill(child, signal.SIGKILL)
+    graded = service.wait(batch)
+    service.assert_graded_once(batch)
+    # Nobody but the lease knew.
+    assert [job.attempt for job in graded] == [2]
+
+
+def test_a_killed_broker_loses_nothing(service: Service) -> None:
+    batch = service.submit(_spinning(1) + [hand_in(f"quick-{number}") for number in range(4)])
+    service.until_running(batch)
+    (broker,) = [
+        pid for pid in _descendants(os.getpid()) if b"valkey-server" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    ]
+    os.kill(broker, signal.SIGKILL)
+    service.wait(batch)
+    service.assert_graded_once(batch)
+
+
+@pytest.mark.long
+def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path, concurrency=2, lease_seconds=6.0)
+    with open_store(settings) as store, EmbeddedServices(settings, store) as services:
+        service = Service(settings, store, services)
+        batch = service.submit([hand_in("warm-1"), hand_in("warm-2")])
+        service.wait(batch)
+        batch = service.submit(_spinning(1))
+        job = service.until_running(batch)
+        assert services.worker_pid is not None
+        busy = [pid for pid in _pool_children(services.worker_pid) if _has_student(pid)]
+        for pid in busy:
+            os.kill(pid, signal.SIGSTOP)
+        _until(lambda: next((found for found in service.jobs(batch) if found.attempt == 2), None))
+        for pid in busy:
+            os.kill(pid, signal.SIGCONT)
+        service.wait(batch)
+        service.assert_graded_once(batch)
+        assert [found.id for found in service.jobs(batch)] == [job.id]
+
+
+def _has_student(pool_child: int) -> bool:
+    """Whether a student's process runs below this pool child: a zygote has a child."""
+    return any(_descendants(zygote) for zygote in _descendants(pool_child))
+
+
+def test_a_cancelled_job_stops(service: Service) -> None:
+    batch = service.submit(_spinning(1))
+    job = service.until_running(batch)
+    assert jobs.cancel(service.store, [job.id]) == 1
+    after = service.submit([hand_in("after")])
+    service.wait(after)
+    assert [found.state for found in service.jobs(batch)] == [JobState.CANCELLED]
+    with service.store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(TrialRow).where(TrialRow.job_id == job.id)) == 0
+
+
+def test_nothing_survives_a_killed_parent(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    script = (
+        "import time\n"
+        "from service.queue.embedded import EmbeddedServices\n"
+        "from service.settings import load_settings\n"
+        "from service.store.engine import open_store\n"
+        "settings = load_settings()\n"
+        "with open_store(settings) as store, EmbeddedServices(settings, store):\n"
+        "    print('up', flush=True)\n"
+        "    time.sleep(600)\n"
+    )
+    environment = {**os.environ, **settings.environment()}
+    with subprocess.Popen([sys.executable, "-c", script], env=environment, stdout=subprocess.PIPE) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == b"up\n"
+        _until(lambda: 1 if worker_lives(settings) else None)
+        below = _descendants(parent.pid)
+        assert len(below) >= 2
+        parent.kill()
+    _until(lambda: None if any(map(_alive, below)) else 1)
+    assert not broker_answers(settings)
+    assert not worker_lives(settings)
+    # Nothing that is left keeps the next from starting.
+    with EmbeddedBroker(settings):
+        assert broker_answers(settings)
+
+
+def test_a_home_with_a_long_path_has_its_socket_elsewhere(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path / ("deep" * 30))
+    path = socket_path(settings)
+    assert len(os.fsencode(path)) < 108
+    assert path.parent.stat().st_mode & 0o077 == 0
+    with EmbeddedBroker(settings), EmbeddedBroker(settings):
+        assert broker_answers(settings)
+    assert not broker_answers(settings)
+    path.parent.rmdir() if not any(path.parent.iterdir()) else None
+
+
+def test_a_broker_that_was_found_running_is_left_running(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    with EmbeddedBroker(settings):
+        with EmbeddedBroker(settings):
+            pass
+        assert broker_answers(settings)

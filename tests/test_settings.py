@@ -1,0 +1,49 @@
+"""Settings come from the environment, and a wrong one is named in one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from service.settings import Settings, load_settings
+from sim.errors import UsageError
+
+
+@pytest.fixture(autouse=True)
+def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"ROBOMARK_{name.upper()}", raising=False)
+
+
+def test_the_home_is_the_users_data_directory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert load_settings().home == tmp_path / "robomark"
+    assert load_settings().database == f"sqlite:///{tmp_path}/robomark/robomark.db"
+
+
+def test_a_child_process_reads_the_same_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    settings = Settings(home=tmp_path, broker_url="redis://host:1/2", lease_seconds=3.5, concurrency=3)
+    for name, value in settings.environment().items():
+        monkeypatch.setenv(name, value)
+    assert load_settings() == settings
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("CONCURRENCY", "0", "greater than or equal to 1"),
+        ("CONCURRENCY", "many", "valid integer"),
+        ("LEASE_SECONDS", "-3", "greater than or equal to 0.5"),
+        ("BROKER_URL", "amqp://host", "redis://"),
+        ("DATABASE_URL", "mysql://host/name", "postgresql://"),
+        ("DATABASE_URL", "somewhere", "sqlite:///path"),
+        ("LOG_LEVEL", "loud", "WARNING"),
+    ],
+)
+def test_a_wrong_setting_is_named(monkeypatch: pytest.MonkeyPatch, name: str, value: str, expected: str) -> None:
+    monkeypatch.setenv(f"ROBOMARK_{name}", value)
+    with pytest.raises(UsageError) as caught:
+        load_settings()
+    assert str(caught.value).startswith(f"ROBOMARK_{name} is '{value}'")
+    assert expected in str(caught.value)

@@ -1,0 +1,150 @@
+"""A grade goes into rows and comes back whole; its accuracy can be asked for in SQL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+
+import pytest
+from sqlalchemy import select, text, update
+
+import report_builders
+from builders import accept_one, comparable
+from service.grading.grade import Grade
+from service.store import artifacts, grades, jobs
+from service.store.columns import storable
+from service.store.engine import Store
+from service.store.intake import load_hand_in
+from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, Submission
+from sim.errors import HostError, UsageError
+from sim.recording import Line
+
+
+def _stored(store: Store, grade: Grade) -> str:
+    """The id of a job that was graded so. The rows that the grade is of are made to fit it."""
+    accepted = accept_one(store, grade.student)
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+    with store.transaction() as session:
+        version = {"assignment": grade.assignment, "title": grade.assignment_title, "version": grade.assignment_version}
+        session.execute(update(AssignmentVersion).values(**version))
+        session.execute(update(Submission).values(sha256=grade.submission))
+    return accepted.job_id
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        report_builders.line_follower_grade,
+        report_builders.shape_grade,
+        report_builders.faulty_grade,
+        report_builders.hidden_grade,
+    ],
+)
+def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -> None:
+    grade = make()
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        back = grades.load(session, job_id)
+    assert comparable(back) == comparable(grade)
+    assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
+
+
+def test_hostile_texts_go_in_and_the_recordings_keep_them(store: Store) -> None:
+    grade = report_builders.hostile_grade()
+    first = grade.trials[0]
+    poisoned = replace(first.recording, printed=(*first.recording.printed, Line(1.0, "\0\ud800'; DROP TABLE job;--")))
+    criteria = tuple(replace(result, message=result.message + "\0\ud800") for result in grade.criteria)
+    grade = replace(grade, trials=(replace(first, recording=poisoned), *grade.trials[1:]), criteria=criteria)
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        back = grades.load(session, job_id)
+    assert comparable(back)[1] == comparable(grade)[1]
+    assert [result.message for result in back.criteria] == [storable(result.message) for result in grade.criteria]
+
+
+def test_accuracy_is_data(store: Store) -> None:
+    grade = report_builders.shape_grade(wrong=4)
+    accuracy = grade.accuracy
+    assert accuracy is not None
+    _stored(store, grade)
+    with store.reading() as session:
+        query = select(CriterionRow).where(CriterionRow.accuracy < 0.9, CriterionRow.accuracy_n >= 6)
+        row = session.scalars(query).one()
+        assert (row.accuracy, row.accuracy_low, row.accuracy_high) == (accuracy.value, accuracy.low, accuracy.high)
+        counts = {(truth, answer): count for truth, answer, count in row.confusion}
+        assert counts == {(truth, answer): count for truth, answer, count in accuracy.confusion}
+        total = session.scalar(text("SELECT SUM(CAST(marks AS NUMERIC)) FROM criterion_result"))
+    assert Decimal(str(total)) == grade.marks
+
+
+def test_marks_keep_their_places(store: Store) -> None:
+    grade = report_builders.shape_grade()
+    third = replace(grade.criteria[0], marks=Decimal("0.10"), max_marks=Decimal("3.30"))
+    job_id = _stored(store, replace(grade, criteria=(third,)))
+    with store.reading() as session:
+        back = grades.load(session, job_id).criteria[0]
+    assert (str(back.marks), str(back.max_marks)) == ("0.10", "3.30")
+
+
+def test_a_flood_of_pictures_is_cut_and_the_marks_stay(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.store.recordings.GRADE_BYTES", 1)
+    monkeypatch.setattr("service.store.recordings.SMALLEST_CAP", 1_000)
+    grade = report_builders.shape_grade()
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        back = grades.load(session, job_id)
+    assert back.marks == grade.marks
+    assert back.accuracy == grade.accuracy
+    assert all("too large" in trial.recording.notes[-1] for trial in back.trials)
+
+
+def test_what_a_worker_needs_is_all_in_the_database(store: Store) -> None:
+    accepted = accept_one(store, "Zoë 🤖")
+    with store.reading() as session:
+        back = load_hand_in(session, accepted.job_id)
+    assert back.submission.student == "Zoë 🤖"
+    assert back.submission.program is not None
+    assert "print('hello')" in back.submission.program.text
+    assert back.assignment.id == "echo-responder"
+
+
+def test_a_job_without_a_grade_says_so(store: Store) -> None:
+    accepted = accept_one(store)
+    with store.reading() as session, pytest.raises(UsageError, match="has no grade"):
+        grades.load(session, accepted.job_id)
+
+
+def test_a_file_of_the_same_name_is_replaced(store: Store) -> None:
+    job_id = accept_one(store).job_id
+    for data in (b"first", b"second"):
+        with store.transaction() as session:
+            artifacts.put(session, job_id, [artifacts.File("plot-a%.png", "image/png", data)], datetime.now(UTC))
+    with store.reading() as session:
+        assert {name: file.data for name, file in artifacts.get(session, job_id).items()} == {"plot-a%.png": b"second"}
+        assert artifacts.get(session, job_id, prefix="plot-%") == {}
+
+
+def test_a_damaged_file_is_noticed(store: Store) -> None:
+    job_id = _stored(store, report_builders.faulty_grade())
+    with store.transaction() as session:
+        session.execute(update(Artifact).values(sha256="0" * 64))
+    with store.reading() as session, pytest.raises(HostError, match="damaged"):
+        grades.load(session, job_id)
+
+
+def test_a_file_over_the_cap_is_refused(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.store.artifacts.CAP_BYTES", 10)
+    job_id = accept_one(store).job_id
+    file = artifacts.File("large", "application/octet-stream", bytes(range(256)))
+    with pytest.raises(HostError, match="too large"), store.transaction() as session:
+        artifacts.put(session, job_id, [file], datetime.now(UTC))
+
+
+def test_a_moment_without_a_zone_is_refused(store: Store) -> None:
+    job_id = accept_one(store).job_id
+    with pytest.raises(Exception, match="time zone"), store.transaction() as session:
+        session.execute(update(Job).where(Job.id == job_id).values(due_at=datetime(2026, 1, 1)))
