@@ -1,33 +1,25 @@
-"""Runs one trial: the robot program, its world and its responder, in lock-step simulated time.
+"""Serves a robot program in lock-step simulated time: its world, its output, its talk with the responder.
 
 The bridge owns the time and believes no child: programs ask and tell, and it alone moves the world and writes down
-what happened. Marks are none of its business.
+what happened. Setting a trial up and taking it down is ``trial.py``'s.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
-import shutil
-import stat
-import subprocess
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
 from responders.conversation import Code, Conversation, Responder, ResponderOrder, error_fault, refusal
-from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.arena import Arena
 from sim.backgrounds import Floor
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Recording, Verdict
+from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Verdict
 from sim.robot import Robot
 from sim.world import Chain, Noise, World
 
@@ -37,9 +29,6 @@ _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: How often a program may act without waiting; its own process counts too, and can name the line.
 _FREE_ACTS = 100_100
-_LOG_FILE = "logger.txt"
-_LOG_BYTES = 1 << 20
-_MOST_NOTES = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +66,9 @@ class _Cut(Exception):
         self.fault = fault
 
 
-class _Bridge:
+class Bridge:
+    """Serves one robot program from its first frame to its last. All that happened is in its lists afterwards."""
+
     def __init__(
         self,
         order: TrialOrder,
@@ -321,98 +312,3 @@ class _Bridge:
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         fault = Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", f"{where}, so the world cannot move", line, hint)
         raise _Cut(fault)
-
-
-def run_trial(
-    order: TrialOrder,
-    arena: Arena,
-    camera: LightCamera,
-    sandboxes: Sandboxes,
-    pulse: Callable[[], None] = lambda: None,
-) -> Recording:
-    """One run of a program from start to end, in fresh children.
-
-    ``pulse`` is called several times a second of real time and may raise to stop the trial.
-    Raises HostError when the machine, not the student, fails.
-    """
-    with _private_folder() as folder:
-        responder = None
-        if order.responder is not None:
-            responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
-        try:
-            program = sandboxes.spawn("robot", order.program.limits)
-            try:
-                unloadable = responder.load() if responder is not None else None
-                bridge = _Bridge(order, arena, camera, program, responder, pulse)
-                fault = bridge.run()
-            finally:
-                program.close()
-        finally:
-            if responder is not None:
-                responder.close()
-        log = _read_log(folder) if responder is not None else ""
-    bridge.conversation.finish()
-    faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
-    faults.sort(key=lambda each: each.t)
-    return _recording(order, bridge, responder, tuple(faults), log, program.walls)
-
-
-@contextlib.contextmanager
-def _private_folder() -> Iterator[Path]:
-    """A folder for one trial, removed afterwards whatever the student's code has put into it."""
-    folder = Path(tempfile.mkdtemp(prefix="robomark-"))
-    try:
-        yield folder
-    finally:
-        try:
-            shutil.rmtree(folder, ignore_errors=True)
-        except RecursionError:
-            # rmtree recurses; a chain of a thousand folders is a student's doing.
-            subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
-
-
-def _recording(
-    order: TrialOrder, bridge: _Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str, walls: str
-) -> Recording:
-    world = bridge.world
-    data = (messages.datum(line.text, line.t) for line in bridge.printed)
-    return Recording(
-        background=order.floor.name,
-        start=order.pose,
-        end=world.pose,
-        end_t=bridge.now / SECOND,
-        ticks=world.ticks(),
-        verdict=faults[0].verdict if faults else Verdict.FINISHED,
-        sha256=bridge.chain.hexdigest(),
-        printed=tuple(bridge.printed),
-        spoken=tuple(bridge.spoken),
-        messages=tuple(bridge.conversation.messages),
-        images=tuple(bridge.images),
-        calls=tuple(responder.calls) if responder is not None else (),
-        datalog=tuple(datum for datum in data if datum is not None),
-        image_log=tuple(bridge.image_log),
-        touches=tuple(world.touches),
-        faults=faults,
-        obstacles=world.obstacles,
-        robot=order.robot.name,
-        pen=((0, True),) if order.pen_down else (),
-        responder_output="\n".join(responder.output) if responder is not None else "",
-        responder_log=log,
-        walls=walls,
-        notes=tuple(bridge.notes + (responder.notes if responder is not None else []))[:_MOST_NOTES],
-    )
-
-
-def _read_log(folder: Path) -> str:
-    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped."""
-    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
-    except OSError:
-        return ""
-    finally:
-        os.close(directory)
-    with os.fdopen(fd, "rb") as file:
-        if not stat.S_ISREG(os.fstat(fd).st_mode):
-            return ""
-        return file.read(_LOG_BYTES).decode("utf-8", "replace")

@@ -80,7 +80,7 @@ def _walls(_settings: Settings) -> tuple[bool, str]:
 
 
 def _home(settings: Settings) -> tuple[bool, str]:
-    settings.home.mkdir(parents=True, exist_ok=True)
+    settings.home.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not os.access(settings.home, os.W_OK | os.X_OK):
         return False, f"{settings.home} cannot be written"
     free = shutil.disk_usage(settings.home).free

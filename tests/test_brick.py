@@ -156,6 +156,11 @@ def test_touching_a_wall_and_an_obstacle_is_recorded_and_stops_nothing(rig: Rig)
     assert recording.end.x > 2362
 
 
+def test_what_the_start_touches_already_is_no_touch(rig: Rig) -> None:
+    recording = run_program(rig, "tank_drive.on_for_seconds(50, 50, 1)", Pose(100, 800, 0))
+    assert recording.touches == ()
+
+
 @pytest.mark.parametrize(("amplitude", "low", "high"), [(0, 352.1, 352.1), (100, 300, 420)])
 def test_wheel_noise(rig: Rig, amplitude: float, low: float, high: float) -> None:
     from sim.world import Noise

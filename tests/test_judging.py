@@ -413,7 +413,7 @@ def test_what_the_robot_says_can_be_the_answer() -> None:
 
 @pytest.mark.parametrize(
     ("right", "count", "low", "high"),
-    # Wilson's interval as statsmodels' proportion_confint(method="wilson") gives it.
+    # The score interval of E. B. Wilson (1927), worked out by hand for these counts.
     [(0, 0, 0, 1), (6, 6, 0.6097, 1), (0, 6, 0, 0.3903), (4, 6, 0.3000, 0.9032), (90, 100, 0.8256, 0.9448)],
 )
 def test_wilson_interval(right: int, count: int, low: float, high: float) -> None:

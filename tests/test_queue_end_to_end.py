@@ -1,4 +1,4 @@
-"""Hand-ins through a real broker, a real worker process and a real database: each is graded once, whatever is killed."""
+"""Hand-ins through a real broker, worker and database: each is graded once, whatever is killed."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from builders import comparable, hand_in, settings_in
 from rich.console import Console
 from sqlalchemy import func, select
 
+from builders import comparable, hand_in, settings_in
 from service.grading.grader import grade
 from service.grading.rig import Rig
 from service.preflight import preflight

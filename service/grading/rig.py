@@ -9,8 +9,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 from types import TracebackType
 
-from responders.bridge import TrialOrder, run_trial
+from responders.bridge import TrialOrder
 from responders.sandbox.manager import FULL, Sandboxes, Walls
+from responders.trial import run_trial
 from sim.arena import Arena, Rectangle
 from sim.camera import Cameras
 from sim.recording import Recording

@@ -37,6 +37,8 @@ from sim.errors import HostError
 _SOCKET_BYTES = 100  # Unix allows 107 for a socket's path
 _START_SECONDS = 15.0
 _LOG_BYTES = 10_000_000
+_SHORT_LIFE_SECONDS = 10.0
+_SHORT_LIVES = 3
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -150,6 +152,8 @@ class EmbeddedServices:
         self.settings = self._broker.settings
         self._worker: subprocess.Popen[bytes] | None = None
         self._worker_name = ""
+        self._begun = 0.0
+        self._short_lives = 0
 
     def ensure(self) -> None:
         """Start what is not there, or not there any more. Raises HostError when it cannot be started."""
@@ -158,6 +162,7 @@ class EmbeddedServices:
             return
         if self._worker is not None:
             self._forget_worker()
+            self._count_short_lives()
         if not worker_lives(self.settings):
             self._start_worker()
 
@@ -186,12 +191,22 @@ class EmbeddedServices:
     ) -> None:
         self.stop(grace_seconds=15 if kind is None else 1)
 
+    def _count_short_lives(self) -> None:
+        short = time.monotonic() - self._begun < _SHORT_LIFE_SECONDS
+        self._short_lives = self._short_lives + 1 if short else 0
+        if self._short_lives >= _SHORT_LIVES:
+            raise HostError(f"The worker ends as soon as it is started; {self._worker_log} may tell why")
+
+    @property
+    def _worker_log(self) -> Path:
+        return self.settings.home / "log" / "worker.log"
+
     def _start_worker(self) -> None:
+        self._begun = time.monotonic()
         self._worker_name = new_worker_name()
         environment = {**os.environ, **self.settings.environment(), WORKER_VARIABLE: self._worker_name}
-        log = self.settings.home / "log" / "worker.log"
         command = [sys.executable, "-m", "service.queue.worker"]
-        self._worker = start_process(command, environment, log, signal.SIGKILL)
+        self._worker = start_process(command, environment, self._worker_log, signal.SIGKILL)
 
     def _forget_worker(self) -> None:
         # It has ended, so nobody can fence us: what it held need not wait for its lease.

@@ -69,7 +69,7 @@ def open_engine(url: str) -> Engine:
     if parsed.database and parsed.database != ":memory:":
         folder = Path(parsed.database).absolute().parent
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise HostError(f"The folder for the database cannot be made: {folder}: {error.strerror}") from None
     # One connection a transaction: nothing stays open in threads that came and went.

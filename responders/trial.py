@@ -1,0 +1,122 @@
+"""Runs one trial: fresh children and a private folder are set up, the bridge serves them, and a recording remains.
+
+Nothing outlives a trial but its recording; what the program and the responder do meanwhile is ``bridge.py``'s.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import stat
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from responders import messages
+from responders.bridge import Bridge, TrialOrder
+from responders.conversation import Responder
+from responders.sandbox.manager import Sandboxes
+from sim.arena import Arena
+from sim.camera import LightCamera
+from sim.recording import SECOND, Fault, Recording, Verdict
+
+_LOG_FILE = "logger.txt"
+_LOG_BYTES = 1 << 20
+_MOST_NOTES = 40
+
+
+def run_trial(
+    order: TrialOrder,
+    arena: Arena,
+    camera: LightCamera,
+    sandboxes: Sandboxes,
+    pulse: Callable[[], None] = lambda: None,
+) -> Recording:
+    """One run of a program from start to end, in fresh children.
+
+    ``pulse`` is called several times a second of real time and may raise to stop the trial.
+    Raises HostError when the machine, not the student, fails.
+    """
+    with _private_folder() as folder:
+        responder = None
+        if order.responder is not None:
+            responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
+        try:
+            program = sandboxes.spawn("robot", order.program.limits)
+            try:
+                unloadable = responder.load() if responder is not None else None
+                bridge = Bridge(order, arena, camera, program, responder, pulse)
+                fault = bridge.run()
+            finally:
+                program.close()
+        finally:
+            if responder is not None:
+                responder.close()
+        log = _read_log(folder) if responder is not None else ""
+    bridge.conversation.finish()
+    faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
+    faults.sort(key=lambda each: each.t)
+    return _recording(order, bridge, responder, tuple(faults), log, program.walls)
+
+
+@contextlib.contextmanager
+def _private_folder() -> Iterator[Path]:
+    """A folder for one trial, removed afterwards whatever the student's code has put into it."""
+    folder = Path(tempfile.mkdtemp(prefix="robomark-"))
+    try:
+        yield folder
+    finally:
+        try:
+            shutil.rmtree(folder, ignore_errors=True)
+        except RecursionError:
+            # rmtree recurses; a chain of a thousand folders is a student's doing.
+            subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
+
+
+def _recording(
+    order: TrialOrder, bridge: Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str, walls: str
+) -> Recording:
+    world = bridge.world
+    data = (messages.datum(line.text, line.t) for line in bridge.printed)
+    return Recording(
+        background=order.floor.name,
+        start=order.pose,
+        end=world.pose,
+        end_t=bridge.now / SECOND,
+        ticks=world.ticks(),
+        verdict=faults[0].verdict if faults else Verdict.FINISHED,
+        sha256=bridge.chain.hexdigest(),
+        printed=tuple(bridge.printed),
+        spoken=tuple(bridge.spoken),
+        messages=tuple(bridge.conversation.messages),
+        images=tuple(bridge.images),
+        calls=tuple(responder.calls) if responder is not None else (),
+        datalog=tuple(datum for datum in data if datum is not None),
+        image_log=tuple(bridge.image_log),
+        touches=tuple(world.touches),
+        faults=faults,
+        obstacles=world.obstacles,
+        robot=order.robot.name,
+        pen=((0, True),) if order.pen_down else (),
+        responder_output="\n".join(responder.output) if responder is not None else "",
+        responder_log=log,
+        walls=walls,
+        notes=tuple(bridge.notes + (responder.notes if responder is not None else []))[:_MOST_NOTES],
+    )
+
+
+def _read_log(folder: Path) -> str:
+    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped."""
+    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
+    except OSError:
+        return ""
+    finally:
+        os.close(directory)
+    with os.fdopen(fd, "rb") as file:
+        if not stat.S_ISREG(os.fstat(fd).st_mode):
+            return ""
+        return file.read(_LOG_BYTES).decode("utf-8", "replace")

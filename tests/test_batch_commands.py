@@ -1,0 +1,135 @@
+"""``robomark batch``, ``show``, ``doctor`` and ``db`` as people run them, in processes of their own."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from submissions.example_folder import examples
+
+
+@dataclass(frozen=True)
+class Ended:
+    status: int
+    out: str
+    err: str
+
+
+def robomark(home: Path, *arguments: str | Path, **environment: str) -> Ended:
+    """Run the command with its home in ``home``; a traceback is never an answer."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("ROBOMARK_")}
+    environment = {**kept, "ROBOMARK_HOME": str(home), "COLUMNS": "200", **environment}
+    command = [sys.executable, "-c", "from service.cli import main; main()", *map(str, arguments)]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert "Traceback" not in ended.stderr
+    return Ended(ended.returncode, ended.stdout, ended.stderr)
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]:
+    """A home after a batch of two good hand-ins and a bad row; what the command said, and the reports' folder."""
+    folder = tmp_path_factory.mktemp("batch") / "class"
+    for name in ("good", "flawed"):
+        shutil.copytree(examples("echo-responder") / name, folder / name)
+    (folder / "[red]odd.txt").write_text("x")
+    home = tmp_path_factory.mktemp("home")
+    reports = folder.parent / "reports"
+    ended = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--wait", "--report", reports)
+    return home, ended, reports
+
+
+def _batch_id(ended: Ended) -> str:
+    found = re.search(r"batch (\w{12}): 2 queued", ended.out)
+    assert found is not None, ended
+    return found[1]
+
+
+def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, Path]) -> None:
+    home, ended, reports = graded
+    assert ended.status == 2
+    assert "1 of the hand-ins could not be taken in" in ended.err
+    assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
+    assert re.search(r"^good +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
+    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "good.html"]
+    assert "data:image/png;base64," in (reports / "good.html").read_text()
+    assert str(reports / "good.html") in ended.out
+    assert not (home / "run" / "valkey.sock").exists()
+
+
+def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
+    home, ended, _ = graded
+    batch = _batch_id(ended)
+    status = robomark(home, "batch", "status", batch[:6])
+    assert status.status == 0
+    assert f"batch {batch}: class: 2 done" in status.out
+    assert "[red]odd.txt" in status.out
+    assert batch in robomark(home, "batch", "list").out
+    rows = list(csv.DictReader(io.StringIO(robomark(home, "batch", "export", batch).out)))
+    assert {row["student"]: row["verdict"] for row in rows} == {"good": "finished", "flawed": "finished"}
+    exported = json.loads(robomark(home, "batch", "export", batch, "--format", "json").out)
+    assert {row["student"]: row["marks"] for row in exported}["good"] == 10
+
+
+def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
+    home, ended, _ = graded
+    found = re.search(r"^good .* (\w{12})$", ended.out, re.MULTILINE)
+    assert found is not None
+    shown = robomark(home, "show", found[1], "--report", tmp_path / "out")
+    assert shown.status == 0
+    assert "10" in shown.out
+    pictures = sorted((tmp_path / "out").glob("*.png"))
+    assert pictures
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+    assert (tmp_path / "out" / "good.html").exists()
+
+
+def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
+    home, ended, _ = graded
+    copy = tmp_path / "copy.db"
+    assert robomark(home, "db", "backup", copy).status == 0
+    elsewhere = robomark(
+        tmp_path / "home", "batch", "status", _batch_id(ended), ROBOMARK_DATABASE_URL=f"sqlite:///{copy}"
+    )
+    assert "2 done" in elsewhere.out
+    again = robomark(home, "db", "backup", copy)
+    assert (again.status, "exists already" in again.err) == (2, True)
+
+
+def test_doctor_is_well_here_and_names_what_is_not(tmp_path: Path) -> None:
+    well = robomark(tmp_path, "doctor")
+    assert well.status == 0, well
+    ill = robomark(tmp_path, "doctor", ROBOMARK_BROKER_URL="redis://127.0.0.1:1/0")
+    assert ill.status == 3
+    assert "not well: broker" in ill.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "expected"),
+    [
+        (["show", "nosuchgrade"], 2, "there is no grade 'nosuchgrade'"),
+        (["batch", "status", "nosuchbatch"], 2, "there is no batch 'nosuchbatch'"),
+        (["batch", "submit", "nowhere", "-a", "echo-responder"], 2, "does not exist"),
+    ],
+)
+def test_mistakes_get_one_sentence(tmp_path: Path, arguments: list[str], status: int, expected: str) -> None:
+    ended = robomark(tmp_path, *arguments)
+    assert ended.status == status
+    assert expected in ended.err
+    assert len(ended.err.strip().splitlines()) == 1
+
+
+def test_a_home_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    ended = robomark(tmp_path / "file" / "home", "batch", "list")
+    assert ended.status == 3
+    assert "file" in ended.err

@@ -1,0 +1,162 @@
+"""Folders and zips of hand-ins: every bad row is named, and stops no other."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from service.preflight import preflight
+from sim.errors import UsageError
+
+PROGRAM = "print('hello')\n"
+RESPONDER = "def responder(msg):\n    return msg\n"
+
+
+def _student(folder: Path, name: str, *, responder: bool = True, toml: str = "") -> None:
+    own = folder / name
+    own.mkdir(parents=True)
+    (own / "robot.py").write_text(PROGRAM)
+    if responder:
+        (own / "responder.py").write_text(RESPONDER)
+    if toml:
+        (own / "submission.toml").write_text(toml)
+
+
+@pytest.fixture
+def class_folder(tmp_path: Path) -> Path:
+    """A class with two good hand-ins and one of everything that goes wrong."""
+    folder = tmp_path / "class"
+    _student(folder, "ada")
+    _student(folder, "Zoë 🤖")
+    _student(folder, "no-responder", responder=False)
+    (folder / "empty").mkdir()
+    (folder / "notes.docx").write_bytes(b"PK")
+    (folder / "broken.zip").write_bytes(b"PK\3\4 and no more")
+    (folder / ".hidden").write_text("x")
+    (folder / "link").symlink_to("/etc")
+    with zipfile.ZipFile(folder / "ada.zip", "w") as archive:
+        archive.writestr("robot.py", PROGRAM)
+        archive.writestr("responder.py", RESPONDER)
+    with zipfile.ZipFile(folder / "climber.zip", "w") as archive:
+        archive.writestr("../robot.py", PROGRAM)
+    return folder
+
+
+def test_every_bad_row_is_named_and_the_rest_taken(class_folder: Path) -> None:
+    checked = preflight(class_folder, "echo-responder")
+    assert [hand_in.submission.student for hand_in in checked.hand_ins] == ["Zoë 🤖", "ada"]
+    problems = dict(checked.problems)
+    assert set(problems) == {
+        "no-responder", "empty", "notes.docx", "broken.zip", "link", "ada.zip", "climber.zip",
+    }  # fmt: skip
+    assert "responder.py" in problems["no-responder"]
+    assert "already this student's hand-in" in problems["ada.zip"]
+    assert all(sentence.strip().endswith(".") and "\n" not in sentence for sentence in problems.values())
+
+
+@pytest.mark.parametrize("top", ["", "class/", "__MACOSX/x\nclass/"])
+def test_a_zip_of_the_same_folder_is_the_same(class_folder: Path, tmp_path: Path, top: str) -> None:
+    *ignored, prefix = top.split("\n")
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        for name in ignored:
+            archive.writestr(name, "x")
+        for path in sorted(class_folder.rglob("*")):
+            if path.is_file() and not path.is_symlink():
+                archive.write(path, prefix + str(path.relative_to(class_folder)))
+    checked = preflight(tmp_path / "all.zip", "echo-responder")
+    assert [hand_in.submission.student for hand_in in checked.hand_ins] == ["Zoë 🤖", "ada"]
+    assert {name for name, _ in checked.problems} == {
+        "no-responder", "notes.docx", "broken.zip", "ada.zip", "climber.zip",
+    }  # fmt: skip
+
+
+def test_each_hand_in_may_name_its_own_assignment(tmp_path: Path) -> None:
+    folder = tmp_path / "mixed"
+    _student(folder, "ada", toml='assignment = "echo-responder"\n')
+    _student(folder, "bob", toml='assignment = "json-queue"\n')
+    _student(folder, "eve", toml='assignment = "no-such-thing"\n')
+    checked = preflight(folder, None)
+    named = {hand_in.submission.student: hand_in.assignment.id for hand_in in checked.hand_ins}
+    assert named == {"ada": "echo-responder", "bob": "json-queue"}
+    ((name, sentence),) = checked.problems
+    assert name == "eve"
+    assert "no-such-thing" in sentence
+
+
+def test_a_folder_named_after_an_assignment_names_it(tmp_path: Path) -> None:
+    folder = tmp_path / "echo-responder"
+    _student(folder, "ada")
+    (hand_in,) = preflight(folder, None).hand_ins
+    assert hand_in.assignment.id == "echo-responder"
+
+
+def _one_hand_in(tmp_path: Path) -> Path:
+    _student(tmp_path, "ada")
+    return tmp_path / "ada"
+
+
+def _nothing(tmp_path: Path) -> Path:
+    return tmp_path / "nowhere"
+
+
+def _empty(tmp_path: Path) -> Path:
+    (tmp_path / "empty").mkdir()
+    return tmp_path / "empty"
+
+
+def _text_file(tmp_path: Path) -> Path:
+    (tmp_path / "list.txt").write_text("ada")
+    return tmp_path / "list.txt"
+
+
+def _broken_zip(tmp_path: Path) -> Path:
+    (tmp_path / "all.zip").write_bytes(b"PK\3\4")
+    return tmp_path / "all.zip"
+
+
+def _climbing_zip(tmp_path: Path) -> Path:
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        archive.writestr("ada/../../robot.py", PROGRAM)
+    return tmp_path / "all.zip"
+
+
+def _double_zip(tmp_path: Path) -> Path:
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        archive.writestr("ada/robot.py", PROGRAM)
+        with pytest.warns(UserWarning, match="Duplicate"):
+            archive.writestr("ada/robot.py", PROGRAM)
+    return tmp_path / "all.zip"
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (_one_hand_in, "looks like one hand-in"),
+        (_nothing, "does not exist"),
+        (_empty, "is empty"),
+        (_text_file, "neither a folder nor a .zip"),
+        (_broken_zip, "cannot be unpacked"),
+        (_climbing_zip, "outside it"),
+        (_double_zip, "two files of the same name"),
+    ],
+)
+def test_what_is_no_batch_is_refused_in_one_sentence(tmp_path: Path, make: object, expected: str) -> None:
+    path = make(tmp_path)  # type: ignore[operator]
+    with pytest.raises(UsageError, match=expected) as caught:
+        preflight(path, "echo-responder")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_zip_that_grows_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.preflight._MOST_BYTES", 1_000_000)
+    with zipfile.ZipFile(tmp_path / "all.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("ada/robot.py", b"\0" * 2_000_000)
+    with pytest.raises(UsageError, match="unpacks to more than"):
+        preflight(tmp_path / "all.zip", "echo-responder")
+
+
+def test_an_unknown_assignment_is_the_callers_mistake(class_folder: Path) -> None:
+    with pytest.raises(UsageError, match="no-such-thing"):
+        preflight(class_folder, "no-such-thing")
