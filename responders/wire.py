@@ -32,6 +32,10 @@ def _whole(low: int, high: int) -> Check:
     return lambda value: type(value) is int and low <= value <= high
 
 
+def _flag(value: object) -> bool:
+    return type(value) is bool
+
+
 def _number(value: object) -> bool:
     return type(value) in (int, float) and math.isfinite(value)  # type: ignore[arg-type]
 
@@ -64,7 +68,7 @@ Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 WALLS: Schema = MappingProxyType(
     {
         "walls": (
-            {"landlock": _whole(0, 99), "seccomp": lambda value: type(value) is bool, "missing": _or_none(_text)},
+            {"landlock": _whole(0, 99), "seccomp": _flag, "own_user": _flag, "missing": _or_none(_text)},
             {},
         )
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
@@ -32,7 +33,7 @@ from service.store import batches, grades, intake
 from service.store.batches import BatchLine, JobLine
 from service.store.engine import Store, open_store
 from service.store.models import JobState, Lane
-from service.waiting import wait_for_batch
+from service.waiting import Waiting
 from sim.errors import Cancelled, HostError, UsageError
 
 batch_app = typer.Typer(help="Grade many hand-ins through the queue.", no_args_is_help=True)
@@ -106,12 +107,9 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
         accepted = _accept(store, settings, hand_ins, checked)
         console.print(f"batch {accepted.id}: {len(accepted.jobs)} queued", highlight=False)
         try:
-            _wait(store, settings, accepted.id, len(accepted.jobs), console)
+            lines = _wait(store, settings, accepted.id, len(accepted.jobs), console)
         except KeyboardInterrupt:
             raise Cancelled(f"stopped; what is not graded stays queued: robomark batch status {accepted.id}") from None
-        with store.reading() as session:
-            lines = batches.job_lines(session, accepted.id)
-        console.print(_marks_table(lines))
         if report is not None:
             graded = [line.id for line in lines if line.state is JobState.DONE]
             for written in write_reports(store, graded, report):
@@ -198,16 +196,27 @@ def _accept(store: Store, settings: Settings, path: Path, checked: Preflight) ->
     return intake.accept_batch(store, path.name, checked.hand_ins, checked.problems, max_attempts=settings.max_attempts)
 
 
-def _wait(store: Store, settings: Settings, batch_id: str, count: int, console: Console) -> None:
-    if settings.broker_url:
-        nudger = _nudger(settings, store)
+def _wait(store: Store, settings: Settings, batch_id: str, count: int, console: Console) -> list[JobLine]:
+    """Wait for the marks, show them, and wait for the plots."""
+    with ExitStack() as services:
+        if settings.broker_url:
+            broker, keep_up = settings, _nothing
+        else:
+            embedded = services.enter_context(EmbeddedServices(settings, store))
+            broker, keep_up = embedded.settings, embedded.ensure
+        nudger = _nudger(broker, store)
         nudger.grade(Lane.BATCH, count)
-        wait_for_batch(store, nudger, batch_id, console, keep_up=lambda: None)
-        return
-    with EmbeddedServices(settings, store) as services:
-        nudger = _nudger(services.settings, store)
-        nudger.grade(Lane.BATCH, count)
-        wait_for_batch(store, nudger, batch_id, console, keep_up=services.ensure)
+        waiting = Waiting(store, nudger, batch_id, console, keep_up)
+        waiting.for_marks()
+        with store.reading() as session:
+            lines = batches.job_lines(session, batch_id)
+        console.print(_marks_table(lines))
+        waiting.for_plots()
+    return lines
+
+
+def _nothing() -> None:
+    """Services that are not ours are kept up by others."""
 
 
 def _nudger(settings: Settings, store: Store) -> Nudger:

@@ -20,6 +20,7 @@ from service.grade_command import grade
 from service.models_commands import models_app
 from service.operator_commands import database_app, doctor, show, worker
 from service.run_command import run
+from service.sandbox_command import sandbox_app
 from sim.errors import Cancelled, RobomarkError, UsageError
 
 _CALLER, _OURS, _STOPPED = 2, 3, 130
@@ -40,6 +41,7 @@ app.command()(show)
 app.command()(worker)
 app.command()(doctor)
 app.add_typer(database_app, name="db")
+app.add_typer(sandbox_app, name="sandbox")
 app.command()(demo)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import timedelta
 
 from rich.console import Console
@@ -22,7 +23,7 @@ _SWEEP_SECONDS = 2.0
 
 
 class _Rate(ProgressColumn):
-    """Hand-ins a minute and the time left, from the beginning of this wait."""
+    """How many a minute and the time left, from the beginning of this wait."""
 
     def render(self, task: Task) -> Text:
         elapsed = task.elapsed or 0.0
@@ -34,37 +35,52 @@ class _Rate(ProgressColumn):
         return Text(f"{60 * rate:.0f} a minute, {left} left", style="progress.remaining")
 
 
-def wait_for_batch(store: Store, nudger: Nudger, batch_id: str, console: Console, keep_up: Callable[[], None]) -> None:
-    """Return when every job of the batch has ended and its plots are drawn.
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Somebody who waits for a batch.
 
     ``keep_up`` is called again and again, to start again what has ended; what it raises ends the waiting.
     """
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        _Rate(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    ) as bars:
-        with store.reading() as session:
-            begun = batches.progress(session, batch_id)
-        marks = bars.add_task("grading", total=begun.jobs, completed=begun.ended, before=begun.ended)
-        plots = bars.add_task("plots", total=None, visible=False, before=0)
-        most_plots = 0
-        swept = float("-inf")
-        while True:
-            keep_up()
-            if time.monotonic() - swept >= _SWEEP_SECONDS:
-                nudger.sweep()
-                swept = time.monotonic()
-            with store.reading() as session:
-                state = batches.progress(session, batch_id)
-            bars.update(marks, completed=state.ended + min(state.partial, state.jobs - state.ended))
-            most_plots = max(most_plots, state.plots_due)
-            if state.ended == state.jobs:
-                if state.plots_due == 0:
+
+    store: Store
+    nudger: Nudger
+    batch_id: str
+    console: Console
+    keep_up: Callable[[], None]
+
+    def for_marks(self) -> None:
+        """Return when every job of the batch has ended."""
+        self._wait("grading", lambda state: (state.jobs, state.ended, state.partial))
+
+    def for_plots(self) -> None:
+        """Return when the plots of all graded jobs are drawn, or given up."""
+        most = self._look().plots_due
+        self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
+
+    def _look(self) -> batches.Progress:
+        with self.store.reading() as session:
+            return batches.progress(session, self.batch_id)
+
+    def _wait(self, what: str, count: Callable[[batches.Progress], tuple[int, int, float]]) -> None:
+        """``count`` gives how many there are, how many are done, and how much of the next ones."""
+        total, before, _ = count(self._look())
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            _Rate(),
+            TimeElapsedColumn(),
+        )
+        with Progress(*columns, console=self.console, transient=True) as bars:
+            bar = bars.add_task(what, total=total, completed=before, before=before)
+            swept = float("-inf")
+            while True:
+                self.keep_up()
+                if time.monotonic() - swept >= _SWEEP_SECONDS:
+                    self.nudger.sweep()
+                    swept = time.monotonic()
+                total, done, partial = count(self._look())
+                bars.update(bar, total=total, completed=min(done + partial, total))
+                if done >= total:
                     return
-                bars.update(plots, visible=True, total=most_plots, completed=most_plots - state.plots_due)
-            time.sleep(_LOOK_SECONDS)
+                time.sleep(_LOOK_SECONDS)

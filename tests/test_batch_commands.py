@@ -8,13 +8,19 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from sqlalchemy import func, select
 
+from service.settings import Settings
+from service.store.engine import open_store
+from service.store.models import Job, JobState
 from submissions.example_folder import examples
 
 
@@ -103,6 +109,33 @@ def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: 
     assert "2 done" in elsewhere.out
     again = robomark(home, "db", "backup", copy)
     assert (again.status, "exists already" in again.err) == (2, True)
+
+
+def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
+    own = tmp_path / "class" / "spinner"
+    shutil.copytree(examples("echo-responder") / "good", own)
+    (own / "robot.py").write_text("while True:\n    pass\n")
+    home = tmp_path / "home"
+    command = [sys.executable, "-c", "from service.cli import main; main()"]
+    command += ["batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]
+    environment = {**os.environ, "ROBOMARK_HOME": str(home)}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as waiting:
+        while _running(home) == 0:
+            assert waiting.poll() is None
+            time.sleep(0.1)
+        waiting.send_signal(signal.SIGINT)
+        _, err = waiting.communicate(timeout=60)
+    assert waiting.returncode == 130
+    assert b"stays queued: robomark batch status" in err
+    with open_store(Settings(home=home)) as store, store.reading() as session:
+        job = session.scalars(select(Job)).one()
+        assert (job.state, job.attempt, job.lease) == (JobState.QUEUED, 0, None)
+
+
+def _running(home: Path) -> int:
+    with open_store(Settings(home=home)) as store, store.reading() as session:
+        running = select(func.count()).select_from(Job).where(Job.state == JobState.RUNNING)
+        return session.scalar(running) or 0
 
 
 def test_doctor_is_well_here_and_names_what_is_not(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from rich.console import Console
 from sqlalchemy import func, select
 
 from builders import comparable, hand_in, settings_in
+from databases import fresh_database
 from service.grading.grader import grade
 from service.grading.rig import Rig
 from service.preflight import preflight
@@ -28,7 +29,7 @@ from service.store import artifacts, batches, grades, jobs
 from service.store.engine import Store, open_store
 from service.store.intake import HandIn, accept_batch, load_hand_in
 from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
-from service.waiting import wait_for_batch
+from service.waiting import Waiting
 from submissions.example_folder import examples
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
@@ -56,7 +57,9 @@ class Service:
             assert time.monotonic() - begun < PATIENCE, "the batch does not end"
             self.services.ensure()
 
-        wait_for_batch(self.store, self.nudger, batch, Console(quiet=True), keep_up)
+        waiting = Waiting(self.store, self.nudger, batch, Console(quiet=True), keep_up)
+        waiting.for_marks()
+        waiting.for_plots()
         return self.jobs(batch)
 
     def jobs(self, batch: str) -> list[Job]:
@@ -187,6 +190,19 @@ def test_a_killed_broker_loses_nothing(service: Service) -> None:
     os.kill(broker, signal.SIGKILL)
     service.wait(batch)
     service.assert_graded_once(batch)
+
+
+@pytest.mark.long
+def test_a_batch_on_postgresql(tmp_path: Path, postgresql: str) -> None:
+    settings = settings_in(tmp_path, database_url=fresh_database(postgresql))
+    with open_store(settings) as store, EmbeddedServices(settings, store) as services:
+        service = Service(settings, store, services)
+        batch = service.submit([*preflight(examples("json-queue"), "json-queue").hand_ins, *_spinning(1)])
+        service.until_running(batch)
+        assert services.worker_pid is not None
+        os.kill(services.worker_pid, signal.SIGKILL)
+        service.wait(batch)
+        service.assert_graded_once(batch)
 
 
 @pytest.mark.long

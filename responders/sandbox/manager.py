@@ -11,6 +11,7 @@ import importlib.util
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -49,9 +50,9 @@ FULL = Walls()
 NONE = Walls(landlock=0, seccomp=False)
 
 
-def stamp(landlock: int, seccomp: bool) -> str:
+def stamp(landlock: int, seccomp: bool, own_user: bool = False) -> str:
     """What grades and reports say of the layers that stood."""
-    layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp
+    layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp + ["own user"] * own_user
     return ", ".join([*layers, "process limits"]) if layers else "process limits only"
 
 
@@ -126,8 +127,12 @@ class Zygote:
             theirs.close()
             for fd in descriptors[1:]:
                 os.close(fd)
+        if "missing" in answer:
+            ours.close()
+            raise _walls_missing(answer["missing"])
         child = Child(self.reap, answer["pid"], received[0], ours, limits, folder)
         try:
+            _try_to_signal(received[0])
             self._check_walls(child)
         except BaseException:
             child.close()
@@ -141,13 +146,10 @@ class Zygote:
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
         if standing["missing"] is not None:
-            raise WallsMissing(
-                f"this machine cannot wall in student code: {standing['missing']}; "
-                "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
-            )
+            raise _walls_missing(standing["missing"])
         if bool(standing["landlock"]) != bool(self._walls.landlock) or standing["seccomp"] != self._walls.seccomp:
-            raise WallsMissing("this machine cannot wall in student code: a wall that was asked for does not stand")
-        child.walls = stamp(standing["landlock"], standing["seccomp"])
+            raise _walls_missing("a wall that was asked for does not stand")
+        child.walls = stamp(standing["landlock"], standing["seccomp"], standing["own_user"])
 
     def _start(self) -> None:
         """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
@@ -219,9 +221,9 @@ class Sandboxes:
             self._zygotes[role] = Zygote(role, self._walls)
         return self._zygotes[role].spawn(limits, folder)
 
-    def check(self) -> str:
+    def check(self, role: Role = "robot") -> str:
         """Put up the walls once, round nothing, and say which stand. Raises WallsMissing when one cannot."""
-        child = self.spawn("robot", ChildLimits(1.0, 64 << 20))
+        child = self.spawn(role, ChildLimits(1.0, 64 << 20))
         child.close()
         return child.walls
 
@@ -241,6 +243,20 @@ class Sandboxes:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _try_to_signal(pidfd: int) -> None:
+    try:
+        signal.pidfd_send_signal(pidfd, 0)
+    except OSError as error:
+        raise _walls_missing(f"pidfd_send_signal: {error.strerror}") from None
+
+
+def _walls_missing(what: str) -> WallsMissing:
+    return WallsMissing(
+        f"this machine cannot wall in student code: {what}; "
+        "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
+    )
 
 
 def _package_folder(name: str) -> Path:

@@ -19,6 +19,8 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
 _WIRE, _FOLDER = 3, 4
+#: Where the numbers of users begin that exist for one child each; nothing on a machine should belong to them.
+_USERS, _USERS_COUNT = 61_000, 4_000
 #: All that student code finds: libraries loaded late must not start threads either.
 _ENVIRONMENT = {"HOME": "/", "LANG": "C.UTF-8", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -28,6 +30,7 @@ def start(
     descriptors: list[int],
     grants: lockdown.Grants,
     role: Callable[[Wire, lockdown.Grants], None],
+    zygote: int,
 ) -> None:
     """Never returns. ``descriptors`` are the wire and, if the order has a folder, the folder."""
     try:
@@ -35,7 +38,7 @@ def start(
         _descriptors(descriptors, bool(order["folder"]))
         _limits(order)
         wire = Wire(_WIRE)
-        wire.send(_walls(order, grants))
+        wire.send(_walls(order, grants, zygote))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
         role(wire, grants)
@@ -45,13 +48,29 @@ def start(
 
 def _own_session() -> None:
     os.setsid()
-    prctl = ctypes.CDLL(None, use_errno=True).prctl
-    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() == 1:
-        os._exit(0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
+
+
+def _own_user(order: dict[str, Any], grants: lockdown.Grants) -> bool:
+    """Root makes each child somebody who owns nothing, where the interpreter can be read by such a user."""
+    if not grants.open_to_others or not lockdown.may_change_user():
+        return False
+    user = _USERS + os.getpid() % _USERS_COUNT
+    if order["folder"]:
+        for name in [".", *os.listdir()]:
+            os.chown(name, user, user, follow_symlinks=False)
+    lockdown.become(user)
+    return True
+
+
+def _end_with(zygote: int) -> None:
+    """A change of user forgets both of these, so they come after it."""
+    prctl = ctypes.CDLL(None, use_errno=True).prctl
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    if os.getppid() != zygote:
+        os._exit(0)
 
 
 def _descriptors(descriptors: list[int], has_folder: bool) -> None:
@@ -84,11 +103,14 @@ def _limits(order: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_MSGQUEUE, (0, 0))
 
 
-def _walls(order: dict[str, Any], grants: lockdown.Grants) -> Frame:
+def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame:
     """Put up the layers that the order names, try each, and say what stands; nothing of the student's has run yet."""
     missing = None
-    landlock, seccomp = 0, False
+    landlock, seccomp, own_user = 0, False, False
     try:
+        own_user = _own_user(order, grants)
+        _end_with(zygote)
+        lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
         if order["landlock"]:
             landlock = _files(order, grants)
@@ -99,7 +121,7 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants) -> Frame:
             seccomp = True
     except lockdown.WallMissing as wall:
         missing = str(wall)
-    return {"do": "walls", "landlock": landlock, "seccomp": seccomp, "missing": missing}
+    return {"do": "walls", "landlock": landlock, "seccomp": seccomp, "own_user": own_user, "missing": missing}
 
 
 def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:

@@ -33,11 +33,8 @@ _PACKAGES = frozenset(
 _NOT_STANDARD = frozenset(
     {"site-packages", "dist-packages", "test", "idlelib", "ensurepip", "lib2to3", "tkinter", "turtledemo"}
 )
+_LIBRARIES = ("/lib64", "/usr/lib64", "/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu")
 _SYSTEM = (
-    "/lib",
-    "/lib64",
-    "/usr/lib/x86_64-linux-gnu",
-    "/lib/x86_64-linux-gnu",
     "/usr/share/zoneinfo",
     "/etc/localtime",
     "/dev/null",
@@ -49,12 +46,39 @@ _SYSTEM = (
 
 def readable(roots: list[str]) -> tuple[str, ...]:
     """Files and folders that may be read."""
-    return tuple({*roots, *_standard_library(), *_packages(), *_SYSTEM})
+    return tuple({*roots, *_standard_library(), *_packages(), *_system_libraries(), *_SYSTEM})
 
 
 def listable() -> tuple[str, ...]:
     """Folders whose names may be listed, as the import system does."""
     return tuple({path for key in ("purelib", "platlib") if (path := sysconfig.get_path(key))})
+
+
+def open_to_others(paths: tuple[str, ...]) -> bool:
+    """Whether a user who owns nothing here can read ``paths`` and reach them."""
+    folders = {os.path.dirname(os.path.realpath(path)) for path in paths}
+    while more := {os.path.dirname(folder) for folder in folders} - folders:
+        folders |= more
+    return all(_has(folder, 0o001) for folder in folders) and all(
+        _has(path, 0o005 if os.path.isdir(path) else 0o004) for path in paths if os.path.exists(path)
+    )
+
+
+def _has(path: str, bits: int) -> bool:
+    try:
+        return os.stat(path).st_mode & bits == bits
+    except OSError:
+        return False
+
+
+def _system_libraries() -> Iterator[str]:
+    """Whole folders; but where Python keeps packages beneath one, only the libraries in it."""
+    for folder in _LIBRARIES:
+        names = os.listdir(folder) if os.path.isdir(folder) else []
+        if not any(name.startswith("python") for name in names):
+            yield folder
+        else:
+            yield from (os.path.join(folder, name) for name in names if ".so" in name)
 
 
 def _standard_library() -> Iterator[str]:

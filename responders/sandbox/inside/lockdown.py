@@ -15,6 +15,9 @@ from dataclasses import dataclass
 _libc = ctypes.CDLL(None, use_errno=True)
 
 _PR_SET_NO_NEW_PRIVS = 38
+_SYS_CAPGET, _SYS_CAPSET = 125, 126
+_CAPABILITIES = struct.pack("=Ii", 0x20080522, 0)  # the third version of the interface, this process
+_CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID = 0, 1, 5, 6, 7
 _SYS_SECCOMP = 317
 _SYS_LANDLOCK_CREATE_RULESET = 444
 _SYS_LANDLOCK_ADD_RULE = 445
@@ -41,6 +44,7 @@ class Grants:
     read: tuple[str, ...]
     list_only: tuple[str, ...] = ()
     write: int | None = None  # a descriptor of the folder
+    open_to_others: bool = False  # whether a user who owns nothing could read them
 
 
 def landlock_version() -> int:
@@ -53,6 +57,31 @@ def forbid_new_privileges() -> None:
     """No set-uid program can lift the walls."""
     if _libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
         raise WallMissing(f"no_new_privs: {_last_error()}")
+
+
+def drop_capabilities() -> None:
+    """Root keeps its name and loses its powers: no mounts, no raw sockets, no pages taken from the machine."""
+    if _libc.syscall(_SYS_CAPSET, _CAPABILITIES, bytes(24)) != 0:
+        raise WallMissing(f"capset: {_last_error()}")
+
+
+def may_change_user() -> bool:
+    """Whether this process can become somebody else, and its parent can still end it and tidy up after it."""
+    sets = ctypes.create_string_buffer(24)
+    if os.geteuid() != 0 or _libc.syscall(_SYS_CAPGET, _CAPABILITIES, sets) != 0:
+        return False
+    effective = struct.unpack_from("=I", sets)[0]
+    return all(effective >> power & 1 for power in (_CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID))
+
+
+def become(user: int) -> None:
+    """Be ``user``, and in no group but its own. Raises WallMissing."""
+    try:
+        os.setgroups([])
+        os.setresgid(user, user, user)
+        os.setresuid(user, user, user)
+    except OSError as error:
+        raise WallMissing(f"own user: {error.strerror}") from None
 
 
 def restrict_files(grants: Grants, most: int = 99) -> int:
@@ -307,8 +336,15 @@ def _equal_to(rule: Rule) -> list[Instruction]:
 
 
 def _never_truncating(argument: int) -> list[Instruction]:
-    """Opening for reading with O_TRUNC empties a file on kernels whose Landlock does not know truncation."""
+    """Opening for reading, or for neither, with O_TRUNC empties a file where Landlock does not know truncation.
+
+    For neither (both bits set) Landlock asks for no right at all, so that is refused altogether.
+    """
     return [
+        (_LOAD, 0, 0, _argument(argument)),
+        (_AND, 0, 0, _O_ACCMODE),
+        (_JUMP_EQUAL, 0, 1, _O_ACCMODE),
+        (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
         (_LOAD, 0, 0, _argument(argument)),
         (_JUMP_SET, 0, 3, _O_TRUNC),
         (_AND, 0, 0, _O_ACCMODE),

@@ -6,6 +6,7 @@ It is exec'd with a clean environment, has one thread, and dies with its worker.
 from __future__ import annotations
 
 import array
+import contextlib
 import ctypes
 import gc
 import json
@@ -21,6 +22,7 @@ _PR_SET_DUMPABLE = 4
 
 def main(role_name: str, roots: list[str]) -> None:
     """Serve orders on descriptor 3 until the worker closes it."""
+    _first_to_go()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
@@ -34,7 +36,9 @@ def main(role_name: str, roots: list[str]) -> None:
     else:
         from . import responder_role as role  # type: ignore[no-redef]
     role.preload()
-    allowed = lockdown.Grants(grants.readable(roots), grants.listable())
+    readable = grants.readable(roots)
+    allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
+    zygote = os.getpid()
     _one_thread()
     gc.collect()
     gc.freeze()
@@ -47,10 +51,9 @@ def main(role_name: str, roots: list[str]) -> None:
         if order["do"] == "spawn":
             pid = os.fork()
             if pid == 0:
-                child.start(order, descriptors, allowed, role.run)
-            pidfd = os.pidfd_open(pid)
-            _reply(control, {"pid": pid}, [pidfd])
-            for fd in (*descriptors, pidfd):
+                child.start(order, descriptors, allowed, role.run, zygote)
+            _hand_over(control, pid)
+            for fd in descriptors:
                 os.close(fd)
         else:
             _, status, usage = os.wait4(order["pid"], 0)
@@ -58,6 +61,25 @@ def main(role_name: str, roots: list[str]) -> None:
                 control,
                 {"status": status, "cpu": usage.ru_utime + usage.ru_stime, "memory_kb": usage.ru_maxrss},
             )
+
+
+def _hand_over(control: socket.socket, pid: int) -> None:
+    """Give the worker what it can end the child with."""
+    try:
+        pidfd = os.pidfd_open(pid)
+    except OSError as error:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        _reply(control, {"missing": f"pidfd_open: {error.strerror}"})
+        return
+    _reply(control, {"pid": pid}, [pidfd])
+    os.close(pidfd)
+
+
+def _first_to_go() -> None:
+    """When the machine runs out of memory, a child goes before the worker."""
+    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
+        score.write("1000")
 
 
 def _one_thread() -> None:

@@ -1,0 +1,26 @@
+"""``robomark sandbox``: which walls stand round student code on this machine, and what is missing."""
+
+from __future__ import annotations
+
+import platform
+
+import typer
+
+from responders.sandbox.manager import Sandboxes
+
+sandbox_app = typer.Typer(help="The walls round student code.", no_args_is_help=True)
+
+
+@sandbox_app.callback()
+def _group() -> None:
+    """The walls round student code."""
+
+
+@sandbox_app.command()
+def check() -> None:
+    """Put up the walls, try them, and say which stand; exit status 3 and the reason when one cannot."""
+    typer.echo(f"kernel: {platform.system()} {platform.release()} on {platform.machine()}")
+    with Sandboxes() as sandboxes:
+        typer.echo(f"robot programs: {sandboxes.check('robot')}")
+        typer.echo(f"responders: {sandboxes.check('responder')}")
+    typer.echo("every wall was tried from inside before it was counted")

@@ -1,0 +1,102 @@
+"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the canaries.
+
+Python's own refusals are switched off first, as any student could, so that only the kernel's walls are tried.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import mmap
+import os
+import sys
+from types import SimpleNamespace
+
+libc = ctypes.CDLL(None, use_errno=True)
+libc.syscall.restype = ctypes.c_long
+libc.mmap.restype = ctypes.c_void_p
+
+#: Which wall stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
+LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "either", "newer", "remains", "untried"
+
+#: The numbers of system calls by name, and the canaries; filled before an attack runs.
+numbers: dict[str, int] = {}
+targets = SimpleNamespace()
+
+
+def attack(stopped_by):
+    """Mark a function as an attack and say what stops it."""
+
+    def mark(function):
+        function.stopped_by = stopped_by
+        return function
+
+    return mark
+
+
+def system_calls(stopped_by, **calls):
+    """One attack for each call, by name: the arguments that it is made with."""
+    return {
+        name: attack(stopped_by)(lambda name=name, arguments=arguments: call(name, *arguments) >= 0)
+        for name, arguments in calls.items()
+    }
+
+
+def call(name, *arguments):
+    """The result of a raw system call. Raises OSError."""
+    number = numbers[name] if isinstance(name, str) else name
+    wide = [ctypes.c_long(argument) if isinstance(argument, int) else argument for argument in arguments]
+    result = libc.syscall(ctypes.c_long(number), *wide)
+    if result == -1:
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code), str(name))
+    return result
+
+
+def space(size=256):
+    """Zeroed memory to pass to a call."""
+    return ctypes.create_string_buffer(size)
+
+
+def machine_code(code):
+    """The number that a piece of x86-64 machine code returns."""
+    page = mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)
+    page.write(code)
+    address = ctypes.addressof(ctypes.c_char.from_buffer(page))
+    return ctypes.CFUNCTYPE(ctypes.c_long)(address)()
+
+
+def contents(path, size=64):
+    """The start of a file, without Python's file objects."""
+    fd = os.open(path, os.O_RDONLY)
+    try:
+        return os.read(fd, size)
+    finally:
+        os.close(fd)
+
+
+def says_leak(program, *arguments):
+    """Arguments of a shell that runs a program and then says on the wire that it could."""
+    frame = '{"do":"print","text":"LEAK it ran"}'
+    return ["sh", "-c", f"{program} >/dev/null 2>&1; printf '{frame}\\n' >&3", *arguments]
+
+
+def disarm():
+    """Switch off the refusals that Python makes by itself."""
+    for found in gc.get_objects():
+        if getattr(found, "__qualname__", "") == "install.<locals>.hook":
+            for name, cell in zip(found.__code__.co_freevars, found.__closure__, strict=True):
+                if name == "folders":
+                    cell.cell_contents = ("/",)
+            found.__globals__["_SENTENCES"].clear()
+
+
+def report(function):
+    """Run an attack and print what came of it."""
+    say = sys.stdout.write
+    try:
+        got = function()
+    except BaseException as error:
+        say(f"blocked {type(error).__name__}: {error}")
+    else:
+        say(f"LEAK {got!r}"[:200] if got else "blocked")
