@@ -19,13 +19,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from responders.sandbox.manager import Sandboxes
 from service.grading.grade import Grade
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
-from service.report_files import write_reports
+from service.report_files import write_batch
 from service.reports.csv_output import marks_csv, moodle_csv
 from service.reports.json_output import json_document
 from service.settings import Settings, load_settings
@@ -111,9 +112,8 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
         except KeyboardInterrupt:
             raise Cancelled(f"stopped; what is not graded stays queued: robomark batch status {accepted.id}") from None
         if report is not None:
-            graded = [line.id for line in lines if line.state is JobState.DONE]
-            for written in write_reports(store, graded, report):
-                console.print(f"report: {written.path}", highlight=False, soft_wrap=True)
+            page = write_batch(store, f"Batch {hand_ins.name}", lines, checked.problems, report)
+            console.print(f"report: {page}", highlight=False, soft_wrap=True)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
         raise HostError(f"{len(failed)} of {len(lines)} could not be graded; {failed[0].source}: {failed[0].error}")
@@ -202,6 +202,9 @@ def _wait(store: Store, settings: Settings, batch_id: str, count: int, console: 
         if settings.broker_url:
             broker, keep_up = settings, _nothing
         else:
+            with Sandboxes() as sandboxes:
+                # Here the reason can be said; a worker that refuses would only be seen to end.
+                sandboxes.check()
             embedded = services.enter_context(EmbeddedServices(settings, store))
             broker, keep_up = embedded.settings, embedded.ensure
         nudger = _nudger(broker, store)

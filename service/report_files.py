@@ -5,16 +5,20 @@ What a report says is ``service.reports``'; what is not drawn yet is drawn there
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from service.queue.plotting import PREFIX, draw
-from service.reports.html import student_report
+from service.reports.html import BatchRow, batch_index, student_report
 from service.reports.written import file_name, write_page
 from service.store import artifacts, grades, intake
+from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.models import Job, PlotState
+from service.store.models import Job, JobState, PlotState
+from sim.recording import Verdict
+
+_INDEX = "index.html"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +34,7 @@ def write_reports(store: Store, job_ids: Iterable[str], folder: Path) -> list[Wr
 
     Raises UsageError when the folder cannot be written to.
     """
-    used: set[str] = set()
+    used = {_INDEX}
     written = []
     for job_id in job_ids:
         student, page = _page(store, job_id)
@@ -40,6 +44,31 @@ def write_reports(store: Store, job_ids: Iterable[str], folder: Path) -> list[Wr
         used.add(name.casefold())
         written.append(Written(job_id, write_page(folder, name, page)))
     return written
+
+
+def write_batch(
+    store: Store, title: str, lines: Sequence[JobLine], problems: Sequence[tuple[str, str]], folder: Path
+) -> Path:
+    """A page for each graded job, and one that lists them all with what was refused; where that one is.
+
+    Raises UsageError when the folder cannot be written to.
+    """
+    graded = [line.id for line in lines if line.state is JobState.DONE]
+    pages = {written.job_id: written.path.name for written in write_reports(store, graded, folder)}
+    rows = [
+        BatchRow(
+            line.student,
+            line.marks,
+            line.max_marks,
+            None if line.verdict is None else Verdict(line.verdict),
+            pages.get(line.id),
+            line.error or ("" if line.state is JobState.DONE else line.state.value),
+        )
+        for line in lines
+    ]
+    rows += [BatchRow(name, note=f"not taken in: {sentence}") for name, sentence in problems]
+    walls = ", ".join(sorted({line.walls for line in lines if line.walls}))
+    return write_page(folder, _INDEX, batch_index(rows, title, walls))
 
 
 def _page(store: Store, job_id: str) -> tuple[str, str]:

@@ -66,9 +66,12 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert "1 of the hand-ins could not be taken in" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
     assert re.search(r"^good +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
-    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "good.html"]
+    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "good.html", "index.html"]
     assert "data:image/png;base64," in (reports / "good.html").read_text()
-    assert str(reports / "good.html") in ended.out
+    assert f"report: {reports / 'index.html'}" in ended.out
+    index = (reports / "index.html").read_text()
+    assert 'href="good.html"' in index
+    assert "[red]odd.txt" in index
     assert not (home / "run" / "valkey.sock").exists()
 
 

@@ -30,7 +30,7 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
-SEED = Path(__file__).with_name("seed")
+RESPONDER = Path(__file__).parents[1] / "submissions" / "examples" / "shape-recognition" / "seed" / "responder.py"
 
 
 def chain(name: str, rig: Rig) -> str:
@@ -46,7 +46,7 @@ def chain(name: str, rig: Rig) -> str:
             Pose(520, 900, 0),
             background="Simple_Shapes",
             noise=Noise(light=10),
-            responder=(SEED / "shape_responder.py").read_text(),
+            responder=RESPONDER.read_text(),
             files={"mlp_shapes_14x14.joblib": weights_bytes("shapes")},
         )
         assert recording.verdict is Verdict.FINISHED

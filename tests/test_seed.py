@@ -12,7 +12,7 @@ from service.grading.rig import Rig
 from sim.recording import Pose, Recording, Verdict
 from submissions.magics import setup, split_program
 
-SEED = Path(__file__).with_name("seed")
+EXAMPLES = Path(__file__).parents[1] / "submissions" / "examples"
 NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
 SHAPES = (
     "square",
@@ -25,20 +25,21 @@ SHAPES = (
 
 
 def play(rig: Rig, name: str, start: Pose | None = None) -> Recording:
-    flags, text = split_program((SEED / f"{name}_robot.py").read_text())
+    hand_in = EXAMPLES / name / "seed"
+    flags, text = split_program((hand_in / "robot.py").read_text())
     chosen = setup(flags)
     return run_program(
         rig,
         text,
         start or chosen.pose,
         background=chosen.background,
-        responder=(SEED / f"{name}_responder.py").read_text(),
+        responder=(hand_in / "responder.py").read_text(),
         files=NETWORK,
     )
 
 
 def test_echo(rig: Rig) -> None:
-    recording = play(rig, "echo")
+    recording = play(rig, "echo-responder")
     assert [(message.sender, message.text) for message in recording.messages] == [
         line
         for number in (0, 2, 4)
@@ -51,7 +52,7 @@ def test_echo(rig: Rig) -> None:
 
 
 def test_json(rig: Rig) -> None:
-    recording = play(rig, "json")
+    recording = play(rig, "json-queue")
     queues = [line.text for line in recording.printed if line.text.startswith("Message queue")]
     assert [queue.count("Py saw") for queue in queues] == [0, 1, 1, 2, 2, 3]
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
@@ -60,7 +61,7 @@ def test_json(rig: Rig) -> None:
 
 
 def test_image_data(rig: Rig) -> None:
-    recording = play(rig, "image")
+    recording = play(rig, "image-parser")
     answers = [message.text for message in recording.messages if message.sender == "responder"]
     assert answers[0] == """JSON::{"message": "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"}"""
     assert answers[1].startswith("""JSON::{"message": "Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,""")
@@ -68,7 +69,7 @@ def test_image_data(rig: Rig) -> None:
 
 
 def test_shape_from_520_900(rig: Rig) -> None:
-    recording = play(rig, "shape")
+    recording = play(rig, "shape-recognition")
     assert recording.spoken[-1].text == "Is that a upwards facing triangle"
     assert [(call.caller, call.callee) for call in recording.calls] == [
         ("responder", "parser"),
@@ -80,6 +81,6 @@ def test_shape_from_520_900(rig: Rig) -> None:
 
 @pytest.mark.parametrize(("number", "shape"), list(enumerate(SHAPES)))
 def test_every_shape(rig: Rig, number: int, shape: str) -> None:
-    recording = play(rig, "shape", Pose(200 + 80 * number, 900, 0))
+    recording = play(rig, "shape-recognition", Pose(200 + 80 * number, 900, 0))
     assert recording.spoken[-1].text == f"Is that a {shape}"
     assert recording.images[0].truth == shape

@@ -16,6 +16,7 @@ from typing import Any
 import structlog
 from celery import Celery, bootsteps
 
+from responders.sandbox.manager import Sandboxes
 from service.queue.celery_app import QUEUES, make_celery
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
@@ -46,10 +47,13 @@ def alive_path(settings: Settings, name: str) -> Path:
 def run_worker(settings: Settings) -> int:
     """Work until told to stop; returns the exit status. ``settings.broker_url`` must name a broker.
 
-    Raises UsageError without one, HostError when the database cannot be used.
+    Raises UsageError without one, HostError when the database cannot be used or the walls round student code cannot
+    be put up.
     """
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
+    with Sandboxes() as sandboxes:
+        sandboxes.check()
     os.environ.update(settings.environment())
     name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
     # A responder's arithmetic is small; threads of the linear algebra library would only fight for the cores.

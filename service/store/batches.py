@@ -30,6 +30,7 @@ class JobLine:
     attempt: int  # the student's
     error: str | None
     plots: PlotState
+    walls: str | None  # what stood around the student's code
     worker: str | None
     queued_at: datetime
     finished_at: datetime | None
@@ -163,6 +164,7 @@ def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None]) -> JobL
         attempt=attempt,
         error=job.error,
         plots=job.plots,
+        walls=job.walls,
         worker=job.worker,
         queued_at=job.queued_at,
         finished_at=job.finished_at,

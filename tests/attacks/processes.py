@@ -1,0 +1,183 @@
+"""Other processes: their environment, their memory, their descriptors."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+
+from attacks.tools import EITHER, LANDLOCK, NEWER, SECCOMP, UNTRIED, attack, call, contents, libc, space, targets
+
+PTRACE_ATTACH, PTRACE_DETACH, PTRACE_SEIZE, PTRACE_TRACEME = 16, 17, 0x4206, 0
+
+
+@attack(LANDLOCK)
+def list_all_processes():
+    return os.listdir("/proc")
+
+
+@attack(UNTRIED)
+def read_the_environment_of_the_first_process():
+    return contents("/proc/1/environ")
+
+
+@attack(LANDLOCK)
+def read_the_environment_of_another():
+    return contents(f"/proc/{targets.victim}/environ")
+
+
+@attack(LANDLOCK)
+def read_the_environment_of_the_worker():
+    return contents(f"/proc/{targets.worker}/environ")
+
+
+@attack(LANDLOCK)
+def read_the_command_line_of_the_worker():
+    return contents(f"/proc/{targets.worker}/cmdline")
+
+
+@attack(UNTRIED)
+def read_the_environment_of_the_zygote():
+    return contents(f"/proc/{os.getppid()}/environ")
+
+
+@attack(LANDLOCK)
+def read_the_own_environment():
+    return contents("/proc/self/environ")
+
+
+@attack(LANDLOCK)
+def read_the_own_memory_map():
+    return contents("/proc/self/maps")
+
+
+@attack(LANDLOCK)
+def list_the_own_descriptors():
+    return os.listdir("/proc/self/fd")
+
+
+@attack(LANDLOCK)
+def write_the_own_memory():
+    return os.open("/proc/self/mem", os.O_RDWR) > 0
+
+
+@attack(LANDLOCK)
+def read_the_own_status():
+    return contents("/proc/thread-self/status")
+
+
+@attack(LANDLOCK)
+def open_the_memory_of_another():
+    return os.open(f"/proc/{targets.victim}/mem", os.O_RDONLY) > 0
+
+
+@attack(LANDLOCK)
+def open_the_memory_of_the_worker():
+    return os.open(f"/proc/{targets.worker}/mem", os.O_RDONLY) > 0
+
+
+@attack(UNTRIED)
+def open_the_memory_of_the_zygote():
+    return os.open(f"/proc/{os.getppid()}/mem", os.O_RDWR) > 0
+
+
+@attack(LANDLOCK)
+def open_a_descriptor_of_another():
+    return os.open(f"/proc/{targets.victim}/fd/0", os.O_RDONLY) > 0
+
+
+@attack(LANDLOCK)
+def enter_the_root_of_another():
+    return os.listdir(f"/proc/{targets.victim}/root/")
+
+
+@attack(LANDLOCK)
+def choose_who_dies_when_memory_runs_out():
+    return os.open("/proc/self/oom_score_adj", os.O_WRONLY) > 0
+
+
+@attack(EITHER)
+def compare_with_another():
+    return call("kcmp", os.getpid(), targets.victim, 0, 0, 0) >= 0
+
+
+@attack(EITHER)
+def steal_a_descriptor():
+    return call("pidfd_getfd", call("pidfd_open", targets.victim, 0), 0, 0) >= 0
+
+
+@attack(SECCOMP)
+def get_a_handle_of_another():
+    return call("pidfd_open", targets.victim, 0) >= 0
+
+
+@attack(EITHER)
+def read_the_memory_of_another():
+    """The victim is the program that the test itself is: the same address holds the same C library only by chance."""
+    local, remote = _vectors()
+    got = libc.process_vm_readv(targets.victim, ctypes.byref(local), 1, ctypes.byref(remote), 1, 0)
+    if got < 0 and ctypes.get_errno() == 14:  # the address means nothing there, but the right to read was given
+        return True
+    return got > 0
+
+
+@attack(EITHER)
+def write_the_memory_of_another():
+    local, remote = _vectors()
+    got = libc.process_vm_writev(targets.victim, ctypes.byref(local), 1, ctypes.byref(remote), 1, 0)
+    return got < 0 and ctypes.get_errno() == 14
+
+
+def _vectors():
+    class Vector(ctypes.Structure):
+        _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
+
+    return Vector(ctypes.addressof(space(64)), 8), Vector(4096, 8)
+
+
+@attack(EITHER)
+def trace_another():
+    call("ptrace", PTRACE_SEIZE, targets.victim, 0, 0)
+    return True
+
+
+@attack(UNTRIED)
+def trace_the_zygote():
+    call("ptrace", PTRACE_SEIZE, os.getppid(), 0, 0)
+    return True
+
+
+@attack(UNTRIED)
+def attach_to_the_worker():
+    call("ptrace", PTRACE_ATTACH, targets.worker, 0, 0)
+    return True
+
+
+@attack(NEWER)
+def be_traced_by_the_zygote():
+    return call("ptrace", PTRACE_TRACEME, 0, 0, 0) == 0
+
+
+@attack(UNTRIED)
+def advise_on_the_memory_of_another():
+    fd = call("pidfd_open", targets.victim, 0)
+    return call("process_madvise", fd, space(16), 1, 21, 0) >= 0
+
+
+@attack(UNTRIED)
+def release_the_memory_of_another():
+    return call("process_mrelease", call("pidfd_open", targets.victim, 0), 0) >= 0
+
+
+@attack(UNTRIED)
+def enter_the_namespaces_of_the_first_process():
+    return call("setns", os.open("/proc/1/ns/mnt", os.O_RDONLY), 0) >= 0
+
+
+@attack(SECCOMP)
+def make_namespaces():
+    return call("unshare", 0x10000000) >= 0  # CLONE_NEWUSER
+
+
+@attack(UNTRIED)
+def make_namespaces_with_clone():
+    return call("clone", 0x10000000 | 17, 0, 0, 0, 0) > 0

@@ -1,0 +1,72 @@
+"""What students may try against the walls: each attack is stopped, and would get through if its wall were not there.
+
+What the attacks are is in ``attacks/``; this says what must come of them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from attacks import tools
+from battery import GETS_THROUGH, SETTINGS, Attack, attacks, canaries, run
+from responders.sandbox.manager import Role, Sandboxes
+
+ATTACKS = attacks()
+WALLED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
+
+
+@pytest.fixture(scope="module")
+def sandboxes() -> Iterator[dict[str, Sandboxes]]:
+    made = {name: Sandboxes(walls) for name, walls in SETTINGS.items()}
+    yield made
+    for each in made.values():
+        each.close()
+
+
+@pytest.mark.parametrize(("setting", "role"), WALLED, ids=lambda value: value)
+@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
+def test_the_walls_hold(
+    attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path
+) -> None:
+    """With a folder to write in, which is more than a robot program gets."""
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    with canaries(tmp_path) as targets:
+        outcome = run(sandboxes[setting], role, attack, targets.targets(), folder)
+        assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
+        assert targets.harm() == []
+
+
+@pytest.mark.parametrize(
+    ("attack", "setting"),
+    [
+        pytest.param(attack, setting, id=f"{attack.id}-{setting}")
+        for attack in ATTACKS
+        for setting in SETTINGS
+        if setting not in ("full", "full-1") and setting in GETS_THROUGH[attack.stopped_by]
+    ],
+)
+def test_without_its_wall_it_gets_through(
+    attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    with canaries(tmp_path) as targets:
+        outcome = run(sandboxes[setting], "robot", attack, targets.targets(), folder)
+    if not outcome.startswith("LEAK"):
+        with canaries(tmp_path) as targets:
+            bare = run(sandboxes["none"], "robot", attack, targets.targets(), folder)
+        if not bare.startswith("LEAK"):
+            pytest.skip(f"this machine refuses it to everybody: {bare}")
+    assert outcome.startswith("LEAK"), outcome
+
+
+def test_there_are_enough_attacks_of_every_kind() -> None:
+    counts = Counter(attack.group for attack in ATTACKS)
+    assert sum(counts.values()) >= 250
+    assert min(counts.values()) >= 9
+    assert len({attack.id for attack in ATTACKS}) == len(ATTACKS)

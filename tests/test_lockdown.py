@@ -1,0 +1,132 @@
+"""The walls by themselves, round a bare process: what a rule gives, what root loses, and who a child is."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from battery import run_text
+from responders.sandbox import manager
+from responders.sandbox.inside import grants
+from responders.sandbox.manager import NONE, Sandboxes
+
+_SANDBOX = Path(manager.__file__).parent
+_SYSTEM_PYTHON = "/usr/bin/python3.11"
+
+#: Ways to change a file that may be read; each has a file of its own.
+_CHANGES = {
+    "reading-truncating": "os.open(path, os.O_RDONLY | os.O_TRUNC)",
+    "neither-truncating": "os.open(path, 3 | os.O_TRUNC)",
+    "neither-truncating-creating": "os.open(path, 3 | os.O_TRUNC | os.O_CREAT, 0o600)",
+    "writing": "os.write(os.open(path, os.O_WRONLY), b'mine')",
+    "truncate": "os.truncate(path, 0)",
+    "mapping": "mmap.mmap(os.open(path, os.O_RDWR), 4)",
+    "removing": "os.unlink(path)",
+    "renaming": "os.rename(path, path + '-mine')",
+    "reading-and-truncating-the-descriptor": "os.ftruncate(os.open(path, os.O_RDONLY), 0)",
+}
+_PROBE = """
+import json, mmap, os, sys
+sys.path.insert(0, sys.argv[1])
+from inside import lockdown
+folder, landlock, seccomp, changes = sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), json.loads(sys.argv[5])
+lockdown.drop_capabilities()
+lockdown.forbid_new_privileges()
+if landlock:
+    lockdown.restrict_files(lockdown.Grants((folder,)), landlock)
+if seccomp:
+    lockdown.restrict_system_calls()
+for name, change in changes.items():
+    path = os.path.join(folder, name)
+    os.close(os.open(path, os.O_RDONLY))
+    try:
+        eval(change)
+    except OSError:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("landlock", "seccomp", "changed"),
+    [
+        (99, True, set()),
+        (1, True, set()),
+        (1, False, {"reading-truncating", "neither-truncating", "neither-truncating-creating", "truncate"}),
+        (0, False, set(_CHANGES) - {"reading-and-truncating-the-descriptor"}),
+    ],
+)
+def test_a_file_that_may_be_read_may_not_be_changed(
+    landlock: int, seccomp: bool, changed: set[str], tmp_path: Path
+) -> None:
+    for name in _CHANGES:
+        (tmp_path / name).write_text("given")
+    subprocess.run(
+        [
+            sys.executable,
+            "-I",
+            "-c",
+            _PROBE,
+            _SANDBOX,
+            tmp_path,
+            str(landlock),
+            str(int(seccomp)),
+            json.dumps(_CHANGES),
+        ],
+        check=True,
+    )
+    found = {name for name in _CHANGES if not (tmp_path / name).exists() or (tmp_path / name).read_text() != "given"}
+    assert found | {"mapping"} == changed | {"mapping"}
+
+
+def test_no_powers_are_left() -> None:
+    with Sandboxes(NONE) as sandboxes:
+        said, stop = run_text(sandboxes, "robot", "print(open('/proc/self/status').read())", Path("/"))
+    assert stop is None
+    powers = dict(line.split(":\t") for line in said[0].splitlines() if line.startswith("Cap"))
+    assert {powers[name] for name in ("CapInh", "CapPrm", "CapEff", "CapAmb")} == {"0" * 16}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.skipif(not Path(_SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
+def test_root_makes_each_child_a_user_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With an interpreter in a folder of root's own the children stay root, without its powers."""
+    monkeypatch.setattr(sys, "executable", _SYSTEM_PYTHON)
+    folder = tmp_path / "folder"
+    folder.mkdir(mode=0o700)
+    (folder / "given.txt").write_text("given")
+    (folder / "given.txt").chmod(0o600)
+    text = """
+import os, wave
+print(os.getuid(), os.geteuid(), os.getgid(), os.getegid())
+print(open("given.txt").read())
+open("logger.txt", "w").write("mine")
+"""
+    with Sandboxes() as sandboxes:
+        stamp = sandboxes.check()
+        said, stop = run_text(sandboxes, "robot", text, folder)
+    assert stamp.endswith("seccomp, own user, process limits")
+    assert (stop, said[1]) == (None, "given")
+    assert all(61_000 <= int(number) < 65_000 for number in said[0].split())
+    assert (folder / "logger.txt").read_text() == "mine"
+
+
+def test_a_folder_that_others_cannot_enter_is_not_open_to_them(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "module.py").write_text("")
+    for folder in (*reversed(tmp_path.parents), tmp_path, inner):
+        if os.stat(folder).st_uid == os.getuid() and folder.is_relative_to(tmp_path.parent.parent):
+            folder.chmod(0o755)
+    path = (str(inner / "module.py"),)
+    assert grants.open_to_others(path)
+    assert grants.open_to_others((*path, str(inner / "missing.py")))
+    tmp_path.chmod(0o700)
+    assert not grants.open_to_others(path)
+    tmp_path.chmod(0o755)
+    (inner / "module.py").chmod(0o600)
+    assert not grants.open_to_others(path)

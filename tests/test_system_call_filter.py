@@ -1,0 +1,94 @@
+"""The system call filter, run by an interpreter of its instructions: what it says to every call there is."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import pytest
+
+from filter_machine import AARCH64, I386, X86_64, decide, listed
+from responders.sandbox.inside.lockdown import ALLOWED, program
+
+PID = 54321
+FILTER = program(PID)
+X32 = 1 << 30
+HIGH = 1 << 32
+CALLS = {number: (name, decision) for number, name, decision in listed()}
+
+#: Calls that depend on an argument: when they are allowed. Only what the kernel looks at counts: 32 bits of most.
+SOME: dict[str, Callable[[Sequence[int]], bool]] = {
+    "open": lambda a: _opens(a[1]),
+    "openat": lambda a: _opens(a[2]),
+    "ioctl": lambda a: _low(a[1]) in (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451),
+    "fcntl": lambda a: _low(a[1]) in (0, 1, 2, 3, 4, 1030),
+    "kill": lambda a: _low(a[0]) == PID,
+    "tgkill": lambda a: _low(a[0]) == PID,
+    "prctl": lambda a: _low(a[0]) in (15, 16),
+    "arch_prctl": lambda a: _low(a[0]) in (0x1002, 0x1003),
+    "prlimit64": lambda a: a[2] == 0,
+}
+#: Each is put in each place: processes, flags, requests and pointers, and what they become in 32 bits.
+EDGES = (
+    [0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1]
+    + [0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C]
+    + [0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000]
+)
+
+
+def _low(value: int) -> int:
+    return value & 0xFFFFFFFF
+
+
+def _opens(flags: int) -> bool:
+    access = flags & 3
+    return access in (1, 2) or (access == 0 and not flags & 0o1000)
+
+
+def _arguments(everything: bool) -> list[list[int]]:
+    """Each edge in each place, plain and with its high half set; or only a few."""
+    if not everything:
+        return [[value] * 6 for value in (0, 1, PID, HIGH, (1 << 64) - 1)]
+    values = {edge & (1 << 64) - 1 for plain in EDGES for edge in (plain, plain | HIGH)}
+    found = []
+    for place, value in itertools.product(range(6), sorted(values)):
+        for fill in (0, (1 << 64) - 1):
+            arguments = [fill] * 6
+            arguments[place] = value
+            found.append(arguments)
+    return found
+
+
+@pytest.mark.parametrize("number", range(601))
+def test_each_call_is_decided_as_listed(number: int) -> None:
+    name, decision = CALLS.get(number, (str(number), "EPERM"))
+    depends = decision == "some"
+    assert depends == (name in SOME)
+    for arguments in _arguments(everything=depends):
+        expected = decision if not depends else "allow" if SOME[name](arguments) else "EPERM"
+        assert decide(FILTER, number, arguments) == expected, (name, [hex(each) for each in arguments])
+
+
+@pytest.mark.parametrize("architecture", [I386, AARCH64, 0, X86_64 & ~HIGH & 0x7FFFFFFF])
+def test_a_foreign_architecture_is_the_end(architecture: int) -> None:
+    assert {decide(FILTER, number, (0,) * 6, architecture) for number in range(601)} == {"kill"}
+
+
+def test_x32_and_numbers_out_of_range_are_the_end() -> None:
+    assert {decide(FILTER, X32 + number) for number in range(601)} == {"kill"}
+    assert {decide(FILTER, number) for number in (-1, X32, 1 << 31, 0xFFFFFFFF)} == {"kill"}
+    assert decide(FILTER, X32 - 1) == "EPERM"
+
+
+def test_the_names_beside_the_numbers_are_right() -> None:
+    """The allow-list is read by people, who trust its names."""
+    assert {name: number for number, (name, decision) in CALLS.items() if decision == "allow"} == ALLOWED
+
+
+def test_nothing_that_reaches_others_is_allowed() -> None:
+    """A second look that does not come from the list of what is allowed."""
+    words = ("sock", "send", "recv", "connect", "bind", "listen", "accept", "exec", "fork", "ptrace", "vm_", "pidfd")
+    words += ("mount", "ns", "uring", "bpf", "key", "memfd", "shm", "sem", "msg", "mq_", "chmod", "chown", "chroot")
+    words += ("setuid", "setgid", "cap", "landlock", "seccomp", "handle", "inotify", "fanotify", "module", "xattr")
+    found = {name for name in ALLOWED if any(word in name for word in words)}
+    assert not found
