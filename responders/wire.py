@@ -68,7 +68,23 @@ Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 WALLS: Schema = MappingProxyType(
     {
         "walls": (
-            {"landlock": _whole(0, 99), "seccomp": _flag, "own_user": _flag, "missing": _or_none(_text)},
+            {
+                "landlock": _whole(0, 99),
+                "seccomp": _flag,
+                "own_user": _flag,
+                "policy": _text,
+                "missing": _or_none(_text),
+            },
+            {},
+        )
+    }
+)
+
+#: What a child says that tried the short battery instead of running student code.
+BATTERY: Schema = MappingProxyType(
+    {
+        "battery": (
+            {"version": _text, "tried": _whole(0, 10_000), "through": lambda value: isinstance(value, list)},
             {},
         )
     }

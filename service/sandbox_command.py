@@ -23,4 +23,3 @@ def check() -> None:
     with Sandboxes() as sandboxes:
         typer.echo(f"robot programs: {sandboxes.check('robot')}")
         typer.echo(f"responders: {sandboxes.check('responder')}")
-    typer.echo("every wall was tried from inside before it was counted")

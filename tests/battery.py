@@ -16,14 +16,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from attacks import files, kernel, memory, metadata, network, processes, programs, signals, tools
+from attacks import file_changes, files, kernel, memory, metadata, network, processes, programs, signals, tools
 from filter_machine import listed
 from responders import wire
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import NONE, Role, Sandboxes, Walls
 from responders.sandbox.running_child import ChildLimits, ChildStopped
 
-GROUPS = (files, metadata, processes, signals, programs, network, kernel, memory)
+GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
 
 #: The settings in which an attack must get through, by what stops it: otherwise its test would prove nothing.
@@ -43,6 +43,10 @@ SETTINGS = {
     "landlock-1": Walls(landlock=1, seccomp=False),
     "seccomp": Walls(landlock=0),
 }
+#: An interpreter that every user can read, where the machine has one.
+SYSTEM_PYTHON = "/usr/bin/python3.11"
+#: In the worker's environment and memory while attacks run.
+SECRET = "canary-of-the-worker-51c9"
 SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
 _TOOLS = Path(tools.__file__).read_text()
 _NUMBERS = {name: number for number, name, _ in listed()}
@@ -88,10 +92,37 @@ def attacks() -> list[Attack]:
     ]
 
 
+class Victim:
+    """A process that sleeps with a secret; started again when something has happened to it."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def fresh(self) -> subprocess.Popen[bytes]:
+        """It, alive and as it was made."""
+        process = self._process
+        if process is not None and process.poll() is None and os.getpriority(os.PRIO_PROCESS, process.pid) == 0:
+            return process
+        self.close()
+        self._process = subprocess.Popen(
+            ["sleep", "1000"],
+            env={"SECRET": "of the victim"},
+            stdin=subprocess.DEVNULL,
+            preexec_fn=_without_powers,
+        )
+        return self._process
+
+    def close(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+
 class Canaries:
     """A folder with secrets, a process, and servers: all that attacks are aimed at."""
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, victim: Victim) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="secrets-", dir=home))
         self.key, self.ssh = self.folder / "key", self.folder / "id_rsa"
         self.key.write_text("the grading key")
@@ -101,13 +132,7 @@ class Canaries:
             os.utime(secret, (1_600_000_000, 1_600_000_000))
         (self.folder / "grader_secret.py").write_text("answer = 42\n")
         (self.folder / "empty").mkdir()
-        self.victim = subprocess.Popen(
-            ["sleep", "1000"],
-            env={"SECRET": "of the victim"},
-            stdin=subprocess.DEVNULL,
-            cwd=self.folder,
-            preexec_fn=_without_powers,
-        )
+        self.victim = victim.fresh()
         self._servers = (
             _server(socket.AF_INET, socket.SOCK_STREAM, ("127.0.0.1", 0)),
             _server(socket.AF_INET, socket.SOCK_DGRAM, ("127.0.0.1", 0)),
@@ -130,7 +155,7 @@ class Canaries:
             "unix": str(self.folder / "server"),
             "abstract": self.folder.name,
             "abstract_datagram": f"{self.folder.name}-datagram",
-            "scrambled": [],
+            "scrambled": scrambled(SECRET, "the grading key", "a private key"),
         }
 
     def harm(self) -> list[str]:
@@ -139,13 +164,14 @@ class Canaries:
         return found + [f"{server.getsockname()!r} was reached" for server in self._servers if _reached(server)]
 
     def close(self) -> None:
-        self.victim.kill()
-        self.victim.wait()
         for server in self._servers:
             server.close()
 
     def _look(self) -> dict[str, object]:
-        seen: dict[str, object] = {"the folder": sorted(os.listdir(self.folder)), "the victim": self.victim.poll()}
+        seen: dict[str, object] = {
+            "the folder": sorted(each.name for each in self.folder.iterdir()),
+            "the victim": self.victim.poll(),
+        }
         seen["its priority"] = os.getpriority(os.PRIO_PROCESS, self.victim.pid) if self.victim.poll() is None else None
         for secret in (self.key, self.ssh):
             if secret.exists():
@@ -157,10 +183,19 @@ class Canaries:
         return seen
 
 
+def attack_text(attack: Attack, targets: dict[str, Any]) -> str:
+    """A student's file that runs an attack and prints what came of it."""
+    return _FRAME.format(tools=_TOOLS, numbers=_NUMBERS, targets=targets, group=attack.text, name=attack.name)
+
+
+def scrambled(*secrets: str) -> list[str]:
+    """Secrets in a form that does not hold them, for an attack that looks for them."""
+    return [bytes(byte ^ 0x5A for byte in secret.encode()).hex() for secret in secrets]
+
+
 def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any], folder: Path) -> str:
     """What came of an attack: ``LEAK ...``, or how it was blocked."""
-    text = _FRAME.format(tools=_TOOLS, numbers=_NUMBERS, targets=targets, group=attack.text, name=attack.name)
-    said, stop = run_text(sandboxes, role, text, folder)
+    said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
@@ -189,8 +224,8 @@ def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple
 
 
 @contextlib.contextmanager
-def canaries(home: Path) -> Iterator[Canaries]:
-    made = Canaries(home)
+def canaries(home: Path, victim: Victim) -> Iterator[Canaries]:
+    made = Canaries(home, victim)
     try:
         yield made
     finally:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from responders.bridge import Preamble, ProgramOrder, TrialOrder
 from responders.channel import Channel
@@ -35,6 +35,7 @@ def run_program(
     seconds: float = 60,
     seed: int = 1,
     output_bytes: int = 1_000_000,
+    pulse: Callable[[], None] = lambda: None,
 ) -> Recording:
     """One trial; the start is the background's own unless given."""
     ground = floor(background)
@@ -52,4 +53,4 @@ def run_program(
         seconds=seconds,
         seed=seed,
     )
-    return rig.run(order, obstacles)
+    return rig.run(order, obstacles, pulse)

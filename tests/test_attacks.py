@@ -5,6 +5,8 @@ What the attacks are is in ``attacks/``; this says what must come of them.
 
 from __future__ import annotations
 
+import os
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from attacks import tools
-from battery import GETS_THROUGH, SETTINGS, Attack, attacks, canaries, run
+from battery import GETS_THROUGH, SECRET, SETTINGS, SYSTEM_PYTHON, Attack, Victim, attacks, canaries, run
 from responders.sandbox.manager import Role, Sandboxes
 
 ATTACKS = attacks()
@@ -21,23 +23,58 @@ WALLED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("fu
 
 @pytest.fixture(scope="module")
 def sandboxes() -> Iterator[dict[str, Sandboxes]]:
-    made = {name: Sandboxes(walls) for name, walls in SETTINGS.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROBOMARK_CANARY", SECRET)
+        made = {name: Sandboxes(walls) for name, walls in SETTINGS.items()}
+        yield made
+        for each in made.values():
+            each.close()
+
+
+@pytest.fixture(scope="module")
+def victim() -> Iterator[Victim]:
+    made = Victim()
     yield made
-    for each in made.values():
-        each.close()
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def own_user() -> Iterator[Sandboxes]:
+    """As root, with an interpreter that others can read: each child is a user who owns nothing."""
+    with Sandboxes() as made:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("ROBOMARK_CANARY", SECRET)
+            patch.setattr(sys, "executable", SYSTEM_PYTHON)
+            assert "own user" in made.check()
+        yield made
 
 
 @pytest.mark.parametrize(("setting", "role"), WALLED, ids=lambda value: value)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
 def test_the_walls_hold(
-    attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path
+    attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     """With a folder to write in, which is more than a robot program gets."""
     folder = tmp_path / "folder"
     folder.mkdir()
-    with canaries(tmp_path) as targets:
+    with canaries(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], role, attack, targets.targets(), folder)
         assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
+        assert targets.harm() == []
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
+@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
+def test_the_walls_hold_round_a_user_of_its_own(
+    attack: Attack, own_user: Sandboxes, tmp_path: Path, victim: Victim
+) -> None:
+    """Some of what remains otherwise does not remain for a user who may not even enter the folders."""
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    with canaries(tmp_path, victim) as targets:
+        outcome = run(own_user, "robot", attack, targets.targets(), folder)
+        assert attack.stopped_by == tools.REMAINS or not outcome.startswith("LEAK"), outcome
         assert targets.harm() == []
 
 
@@ -51,14 +88,14 @@ def test_the_walls_hold(
     ],
 )
 def test_without_its_wall_it_gets_through(
-    attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path
+    attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
-    with canaries(tmp_path) as targets:
+    with canaries(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], "robot", attack, targets.targets(), folder)
     if not outcome.startswith("LEAK"):
-        with canaries(tmp_path) as targets:
+        with canaries(tmp_path, victim) as targets:
             bare = run(sandboxes["none"], "robot", attack, targets.targets(), folder)
         if not bare.startswith("LEAK"):
             pytest.skip(f"this machine refuses it to everybody: {bare}")

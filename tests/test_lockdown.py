@@ -6,17 +6,17 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from battery import run_text
+from battery import SYSTEM_PYTHON, run_text
 from responders.sandbox import manager
 from responders.sandbox.inside import grants
 from responders.sandbox.manager import NONE, Sandboxes
 
 _SANDBOX = Path(manager.__file__).parent
-_SYSTEM_PYTHON = "/usr/bin/python3.11"
 
 #: Ways to change a file that may be read; each has a file of its own.
 _CHANGES = {
@@ -83,19 +83,21 @@ def test_a_file_that_may_be_read_may_not_be_changed(
     assert found | {"mapping"} == changed | {"mapping"}
 
 
-def test_no_powers_are_left() -> None:
+def test_no_powers_are_left(tmp_path: Path) -> None:
+    text = """
+import ctypes
+sets = ctypes.create_string_buffer(24)
+print(ctypes.CDLL(None).syscall(125, (0x20080522).to_bytes(8, "little"), sets), sets.raw == bytes(24))
+"""
     with Sandboxes(NONE) as sandboxes:
-        said, stop = run_text(sandboxes, "robot", "print(open('/proc/self/status').read())", Path("/"))
-    assert stop is None
-    powers = dict(line.split(":\t") for line in said[0].splitlines() if line.startswith("Cap"))
-    assert {powers[name] for name in ("CapInh", "CapPrm", "CapEff", "CapAmb")} == {"0" * 16}
+        assert run_text(sandboxes, "robot", text, tmp_path) == (["0 True"], None)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
-@pytest.mark.skipif(not Path(_SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
+@pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
 def test_root_makes_each_child_a_user_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With an interpreter in a folder of root's own the children stay root, without its powers."""
-    monkeypatch.setattr(sys, "executable", _SYSTEM_PYTHON)
+    monkeypatch.setattr(sys, "executable", SYSTEM_PYTHON)
     folder = tmp_path / "folder"
     folder.mkdir(mode=0o700)
     (folder / "given.txt").write_text("given")
@@ -109,24 +111,22 @@ open("logger.txt", "w").write("mine")
     with Sandboxes() as sandboxes:
         stamp = sandboxes.check()
         said, stop = run_text(sandboxes, "robot", text, folder)
-    assert stamp.endswith("seccomp, own user, process limits")
+    assert "seccomp, own user, process limits" in stamp
     assert (stop, said[1]) == (None, "given")
     assert all(61_000 <= int(number) < 65_000 for number in said[0].split())
     assert (folder / "logger.txt").read_text() == "mine"
 
 
-def test_a_folder_that_others_cannot_enter_is_not_open_to_them(tmp_path: Path) -> None:
-    inner = tmp_path / "inner"
-    inner.mkdir()
-    (inner / "module.py").write_text("")
-    for folder in (*reversed(tmp_path.parents), tmp_path, inner):
-        if os.stat(folder).st_uid == os.getuid() and folder.is_relative_to(tmp_path.parent.parent):
-            folder.chmod(0o755)
-    path = (str(inner / "module.py"),)
-    assert grants.open_to_others(path)
-    assert grants.open_to_others((*path, str(inner / "missing.py")))
-    tmp_path.chmod(0o700)
-    assert not grants.open_to_others(path)
-    tmp_path.chmod(0o755)
-    (inner / "module.py").chmod(0o600)
-    assert not grants.open_to_others(path)
+def test_a_folder_that_others_cannot_enter_is_not_open_to_them() -> None:
+    with tempfile.TemporaryDirectory() as made:
+        outer, inner = Path(made), Path(made) / "inner"
+        inner.mkdir()
+        module = inner / "module.py"
+        module.touch()
+        for path in (outer, inner, module):
+            path.chmod(0o755)
+        assert grants.open_to_others((str(module), str(inner), str(inner / "missing.py")))
+        for path in (outer, module):
+            path.chmod(0o700)
+            assert not grants.open_to_others((str(module), str(inner)))
+            path.chmod(0o755)

@@ -30,9 +30,9 @@ SOME: dict[str, Callable[[Sequence[int]], bool]] = {
 }
 #: Each is put in each place: processes, flags, requests and pointers, and what they become in 32 bits.
 EDGES = (
-    [0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1]
-    + [0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C]
-    + [0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000]
+    *(0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1),
+    *(0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C),
+    *(0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000),
 )
 
 

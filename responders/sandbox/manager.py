@@ -25,10 +25,12 @@ from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.errors import HostError
 
 Role = Literal["robot", "responder"]
+Play = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
 _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
+_BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
 _FOLDERS = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
 
 
@@ -50,10 +52,10 @@ FULL = Walls()
 NONE = Walls(landlock=0, seccomp=False)
 
 
-def stamp(landlock: int, seccomp: bool, own_user: bool = False) -> str:
+def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str) -> str:
     """What grades and reports say of the layers that stood."""
     layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp + ["own user"] * own_user
-    return ", ".join([*layers, "process limits"]) if layers else "process limits only"
+    return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
 class Zygote:
@@ -67,29 +69,44 @@ class Zygote:
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
 
-    def spawn(self, limits: ChildLimits, folder: Path | None = None) -> Child:
+    def spawn(self, limits: ChildLimits, folder: Path | None = None, play: Play = "role") -> Child:
         """A fresh child in ``folder``, or with none. Raises HostError when the machine cannot give one."""
         if self._forks >= _RECYCLE_AFTER:
             self.close()
         self._forks += 1
         for attempt in (1, 2):
             try:
-                return self._spawn(limits, folder)
+                return self._spawn(limits, folder, play)
             except (OSError, EOFError) as error:
                 self.close()
                 if attempt == 2:
                     raise HostError(f"the {self._role} zygote does not answer ({error})") from error
         raise AssertionError
 
+    def try_walls(self) -> str:
+        """Let a child try the short battery of escapes; which walls held. Raises WallsMissing if one did not."""
+        child = self.spawn(_BATTERY_LIMITS, play="battery")
+        try:
+            told = child.receive(wire.BATTERY, lambda: None)
+        except ChildStopped as stop:
+            raise _walls_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
+        finally:
+            child.close()
+        if told["through"] and self._walls == FULL:
+            raise _walls_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
+        refused = told["tried"] - len(told["through"])
+        return f"{child.walls} (battery {told['version']}: {refused} of {told['tried']} refused)"
+
     def reap(self, pid: int) -> int:
-        """The wait status of a child that has been killed or has ended."""
+        """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
         try:
             answer, _ = self._ask({"do": "reap", "pid": pid})
             self.children_cpu_seconds += float(answer["cpu"])
             return int(answer["status"])
-        except (OSError, EOFError):
+        except (OSError, EOFError) as error:
+            # Its children died with it, and that is no fault of a student's.
             self.close()
-            return 0
+            raise HostError(f"the {self._role} zygote ended while a program ran") from error
 
     def close(self) -> None:
         if self._control is not None:
@@ -101,7 +118,7 @@ class Zygote:
             self._process = None
         self._forks = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None) -> Child:
+    def _spawn(self, limits: ChildLimits, folder: Path | None, play: Play) -> Child:
         self._start()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         descriptors = [theirs.fileno()]
@@ -111,6 +128,7 @@ class Zygote:
             answer, received = self._ask(
                 {
                     "do": "spawn",
+                    "play": play,
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "file_size": _FILE_BYTES,
@@ -149,7 +167,7 @@ class Zygote:
             raise _walls_missing(standing["missing"])
         if bool(standing["landlock"]) != bool(self._walls.landlock) or standing["seccomp"] != self._walls.seccomp:
             raise _walls_missing("a wall that was asked for does not stand")
-        child.walls = stamp(standing["landlock"], standing["seccomp"], standing["own_user"])
+        child.walls = stamp(standing["landlock"], standing["seccomp"], standing["own_user"], standing["policy"])
 
     def _start(self) -> None:
         """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
@@ -217,15 +235,16 @@ class Sandboxes:
 
     def spawn(self, role: Role, limits: ChildLimits, folder: Path | None = None) -> Child:
         """A fresh child for a robot program or a responder."""
-        if role not in self._zygotes:
-            self._zygotes[role] = Zygote(role, self._walls)
-        return self._zygotes[role].spawn(limits, folder)
+        return self._zygote(role).spawn(limits, folder)
 
     def check(self, role: Role = "robot") -> str:
-        """Put up the walls once, round nothing, and say which stand. Raises WallsMissing when one cannot."""
-        child = self.spawn(role, ChildLimits(1.0, 64 << 20))
-        child.close()
-        return child.walls
+        """Put up the walls round a child that tries to get out; say which hold. Raises WallsMissing if any does not."""
+        return self._zygote(role).try_walls()
+
+    def _zygote(self, role: Role) -> Zygote:
+        if role not in self._zygotes:
+            self._zygotes[role] = Zygote(role, self._walls)
+        return self._zygotes[role]
 
     @property
     def children_cpu_seconds(self) -> float:

@@ -16,10 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
+from sim.errors import HostError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
 _STALLED_SECONDS = 5.0
+#: Of the child's own time, and of real time once it does not even wait for a processor.
+_LAST_WORD_CPU_SECONDS = 0.04
 _LAST_WORD_SECONDS = 0.1
 #: What is read at most while a child that is to be stopped has its last word.
 _UNREAD_BYTES = 1 << 20
@@ -124,7 +127,8 @@ class Child:
         self._kill()
         self._socket.close()
         os.close(self._pidfd)
-        self._reap(self._pid)
+        with contextlib.suppress(HostError):
+            self._reap(self._pid)
 
     def _read_line(self, pulse: Callable[[], None]) -> tuple[bytes, bytes]:
         last_cpu, still_since = -1.0, time.monotonic()
@@ -187,8 +191,11 @@ class Child:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
         deadline = time.monotonic() + _LAST_WORD_SECONDS
+        enough = self.cpu_seconds() + _LAST_WORD_CPU_SECONDS
         data = self._pending
-        while time.monotonic() < deadline and len(data) < _UNREAD_BYTES:
+        while len(data) < _UNREAD_BYTES and self.cpu_seconds() < enough:
+            if time.monotonic() > deadline and not self._runnable():
+                break
             try:
                 more = self._socket.recv(wire.MOST)
             except TimeoutError:

@@ -8,12 +8,10 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
-import signal
 import struct
 
 from attacks.tools import (
     EITHER,
-    NEWER,
     SECCOMP,
     UNTRIED,
     attack,
@@ -130,8 +128,9 @@ def listen_to_ones_own_system_calls():
 
 
 @attack(UNTRIED)
-def become_root():
-    return any(libc[name](0) == 0 and False for name in ("setuid", "setgid")) or call("capset", space(8), space(24)) > 0
+def take_roots_powers():
+    everything = b"\xff" * 12 * 2
+    return call("capset", struct.pack("=Ii", 0x20080522, 0), everything) == 0
 
 
 @attack(SECCOMP)
@@ -268,8 +267,3 @@ globals().update(
         ).items()
     }
 )
-
-
-@attack(UNTRIED)
-def read_the_signal_of_another():
-    return signal.pidfd_send_signal(3, 0) is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 
 from attacks.tools import EITHER, LANDLOCK, NEWER, SECCOMP, UNTRIED, attack, call, contents, libc, space, targets
@@ -112,26 +113,24 @@ def get_a_handle_of_another():
 
 @attack(EITHER)
 def read_the_memory_of_another():
-    """The victim is the program that the test itself is: the same address holds the same C library only by chance."""
-    local, remote = _vectors()
-    got = libc.process_vm_readv(targets.victim, ctypes.byref(local), 1, ctypes.byref(remote), 1, 0)
-    if got < 0 and ctypes.get_errno() == 14:  # the address means nothing there, but the right to read was given
-        return True
-    return got > 0
+    return _reaches_memory(libc.process_vm_readv)
 
 
 @attack(EITHER)
 def write_the_memory_of_another():
-    local, remote = _vectors()
-    got = libc.process_vm_writev(targets.victim, ctypes.byref(local), 1, ctypes.byref(remote), 1, 0)
-    return got < 0 and ctypes.get_errno() == 14
+    return _reaches_memory(libc.process_vm_writev)
 
 
-def _vectors():
+def _reaches_memory(function):
+    """At an address that means nothing to anybody: a bad address is said only to those who have the right."""
+
     class Vector(ctypes.Structure):
         _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
 
-    return Vector(ctypes.addressof(space(64)), 8), Vector(4096, 8)
+    own = space(64)
+    local, remote = Vector(ctypes.addressof(own), 8), Vector(4096, 8)
+    got = function(targets.victim, ctypes.byref(local), 1, ctypes.byref(remote), 1, 0)
+    return got < 0 and ctypes.get_errno() == errno.EFAULT
 
 
 @attack(EITHER)

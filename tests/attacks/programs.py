@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import _json
+import ctypes
 import glob
 import os
 import shutil
@@ -211,6 +211,6 @@ def load_a_library_of_ones_own():
 def switch_off_pythons_refusals():
     """They are a courtesy; this module has switched them off, and hears the kernel's own words."""
     try:
-        return os.system("exit 0") == 0
+        return os.system("exit 0") is not None
     except OSError as error:
         return "programs here" not in str(error)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import mmap
 import os
+import resource
 import signal
 import socket
 import threading
@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .frames import Wire
+from .lockdown import Grants
 
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -62,17 +63,15 @@ ATTEMPTS: dict[str, Callable[[], object]] = {
     "set up an I/O ring": _system_call(425, 1, 0),
     "load a filter program": _system_call(321, 0, 0, 0),
     "make an anonymous file": _system_call(319, 0, 0),
-    "lift the limits": lambda: __import__("resource").setrlimit(__import__("resource").RLIMIT_NOFILE, (64, 64)),
+    "change the limits": lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)),
     "change a file's mode": lambda: os.chmod(os.devnull, 0o666),
 }
 
 #: Changes whenever what is tried changes.
 VERSION = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
 
-__all__ = ["ATTEMPTS", "VERSION", "mmap", "run"]
 
-
-def run(wire: Wire) -> None:
+def run(wire: Wire, _: Grants) -> None:
     """Try everything, and report what was not refused."""
     through = []
     for name, attempt in ATTEMPTS.items():

@@ -121,7 +121,14 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame
             seccomp = True
     except lockdown.WallMissing as wall:
         missing = str(wall)
-    return {"do": "walls", "landlock": landlock, "seccomp": seccomp, "own_user": own_user, "missing": missing}
+    return {
+        "do": "walls",
+        "landlock": landlock,
+        "seccomp": seccomp,
+        "own_user": own_user,
+        "policy": lockdown.POLICY,
+        "missing": missing,
+    }
 
 
 def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:

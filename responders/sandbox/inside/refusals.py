@@ -5,6 +5,7 @@ This is courtesy, not protection: the kernel refuses all the same.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -34,8 +35,10 @@ _SENTENCES = {
 
 def install(readable: tuple[str, ...], name: str, tell: Callable[[str, int | None], None]) -> None:
     """Refuse with a sentence from now on; ``tell(sentence, line)`` for the first few, line being the student's."""
-    folders = tuple(path.rstrip("/") + "/" for path in readable)
-    files = frozenset(readable)
+    here = os.getcwd()
+    own = (here,) if here != "/" else ()
+    folders = tuple(path.rstrip("/") + "/" for path in (*readable, *own))
+    files = frozenset((*readable, *own))
     told: set[tuple[str, int | None]] = set()
 
     def refuse(sentence: str) -> PermissionError:

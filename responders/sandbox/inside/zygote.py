@@ -29,13 +29,14 @@ def main(role_name: str, roots: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import child, determinism, grants, lockdown, refusals, student_code  # noqa: F401
+    from . import battery, child, determinism, grants, lockdown, refusals, student_code  # noqa: F401
 
     if role_name == "robot":
         from . import robot_role as role
     else:
         from . import responder_role as role  # type: ignore[no-redef]
     role.preload()
+    plays = {"role": role.run, "battery": battery.run}
     readable = grants.readable(roots)
     allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
     zygote = os.getpid()
@@ -51,7 +52,7 @@ def main(role_name: str, roots: list[str]) -> None:
         if order["do"] == "spawn":
             pid = os.fork()
             if pid == 0:
-                child.start(order, descriptors, allowed, role.run, zygote)
+                child.start(order, descriptors, allowed, plays[order["play"]], zygote)
             _hand_over(control, pid)
             for fd in descriptors:
                 os.close(fd)

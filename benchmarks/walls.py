@@ -1,0 +1,241 @@
+"""What the walls cost and how exactly they hold: from the fork of a child to its end, beside what they should take.
+
+Times are real ones, medians and 95th percentiles; on a busy machine they say more about the machine.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.measurement import Measurement
+from responders import wire
+from responders.sandbox.inside import grants, lockdown
+from responders.sandbox.manager import Role, Sandboxes
+from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
+
+_LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder": ChildLimits(2, 512 << 20)}
+_SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
+_CPU_LIMIT, _STALLED, _OUTPUT = 0.5, 5.0, 65536
+_ECHO = "def responder(text): return text"
+#: Counts what it has printed in a file that outlives it.
+_FLOOD = """
+import mmap, os
+os.ftruncate(fd := os.open("count", os.O_RDWR | os.O_CREAT), 8)
+count = mmap.mmap(fd, 8)
+said = 0
+while True:
+    print("x" * 1000)
+    said += 1001
+    count[:] = said.to_bytes(8, "little")
+"""
+_WORKER = """
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import ChildLimits
+sandboxes = Sandboxes()
+child = sandboxes.spawn("robot", ChildLimits(60, 64 << 20))
+child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none"})
+print(child._pid, flush=True)
+input()
+"""
+
+
+def measure() -> list[Measurement]:
+    """About twenty seconds."""
+    with tempfile.TemporaryDirectory() as made, Sandboxes() as sandboxes:
+        folder = Path(made)
+        cold = _seconds(lambda: _spawn(sandboxes, "responder").close())
+        light = _many(100, lambda: _until_locked(sandboxes, "robot"))
+        heavy = _many(100, lambda: _until_locked(sandboxes, "responder"))
+        answers = _many(50, lambda: _until_answer(sandboxes))
+        ends = _many(100, lambda: _until_gone(sandboxes))
+        turns = _turns(sandboxes)
+        alone = _many(50, _lockdown_alone)
+        dirty, share = _memory(sandboxes)
+        cpu = max(_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
+        stalled = _stall_overshoot(sandboxes)
+        output = _output_overshoot(sandboxes, folder)
+    return [
+        Measurement("walls: fork to locked, robot", _spread(light), "10 ms, p95 15 ms"),
+        Measurement("walls: fork to locked, responder with scikit-learn", _spread(heavy), "15 ms, p95 25 ms"),
+        Measurement("walls: fork to first answer, responder", _spread(answers), "20 ms, p95 30 ms"),
+        Measurement("walls: Landlock and the filter alone", _spread(alone), "5 ms"),
+        Measurement("walls: message and answer", _spread(turns), "0.2 ms"),
+        Measurement("walls: kill and reap, responder", _spread(ends), "p95 15 ms"),
+        Measurement("walls: zygote with scikit-learn, cold start", f"{cold:.2f} s", "5 s"),
+        Measurement(
+            "walls: idle responder of ten, its own and its share", f"{dirty:.1f} MB, {share:.1f} MB", "5 MB, 20 MB"
+        ),
+        Measurement("walls: CPU beyond the limit", f"{cpu * 1000:.0f} ms", "100 ms"),
+        Measurement("walls: waiting beyond the limit", f"{stalled * 1000:.0f} ms", "100 ms"),
+        Measurement("walls: output beyond the limit", f"{output / 1024:.0f} KiB", "128 KiB"),
+        Measurement("walls: worker killed, until nothing is left", f"{_until_nothing_left() * 1000:.0f} ms", "1 s"),
+    ]
+
+
+def _spread(seconds: list[float]) -> str:
+    ordered = sorted(seconds)
+    median, late = ordered[len(ordered) // 2], ordered[len(ordered) * 95 // 100]
+    return f"{median * 1000:.2f} ms, p95 {late * 1000:.2f} ms"
+
+
+def _many(count: int, sample: Callable[[], float]) -> list[float]:
+    """Samples after a few that only warm up."""
+    for _ in range(5):
+        sample()
+    return [sample() for _ in range(count)]
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def _spawn(sandboxes: Sandboxes, role: Role, folder: Path | None = None) -> Child:
+    return sandboxes.spawn(role, _LIMITS[role], folder)
+
+
+def _until_locked(sandboxes: Sandboxes, role: Role) -> float:
+    start = time.perf_counter()
+    child = _spawn(sandboxes, role)
+    taken = time.perf_counter() - start
+    child.close()
+    return taken
+
+
+def _until_gone(sandboxes: Sandboxes) -> float:
+    return _seconds(_spawn(sandboxes, "responder").close)
+
+
+def _until_answer(sandboxes: Sandboxes) -> float:
+    start = time.perf_counter()
+    child = _echo(sandboxes)
+    _turn(child)
+    taken = time.perf_counter() - start
+    child.close()
+    return taken
+
+
+def _turns(sandboxes: Sandboxes) -> list[float]:
+    child = _echo(sandboxes)
+    try:
+        return _many(500, lambda: _seconds(lambda: _turn(child)))
+    finally:
+        child.close()
+
+
+def _echo(sandboxes: Sandboxes) -> Child:
+    child = _spawn(sandboxes, "responder")
+    _start(child, "responder", _ECHO)
+    while child.receive(wire.RESPONDER, lambda: None)["do"] != "ready":
+        pass
+    return child
+
+
+def _start(child: Child, role: Role, text: str) -> None:
+    own = {"preamble": "none"} if role == "robot" else {"function": None}
+    child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
+
+
+def _turn(child: Child) -> None:
+    child.send({"do": "message", "t": 0, "text": "hello"})
+    child.receive(wire.RESPONDER, lambda: None)
+
+
+def _lockdown_alone() -> float:
+    """In a fork of this process, with the grants of a robot program."""
+    readable = grants.readable([])
+    reading, writing = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        start = time.perf_counter()
+        lockdown.drop_capabilities()
+        lockdown.forbid_new_privileges()
+        lockdown.restrict_files(lockdown.Grants(readable, grants.listable()))
+        lockdown.restrict_system_calls()
+        os.write(writing, struct.pack("=d", time.perf_counter() - start))
+        os._exit(0)
+    os.waitpid(pid, 0)
+    taken: float = struct.unpack("=d", os.read(reading, 8))[0]
+    os.close(reading)
+    os.close(writing)
+    return taken
+
+
+def _memory(sandboxes: Sandboxes) -> tuple[float, float]:
+    """Megabytes that are a child's own, and its share of all when it is one of ten; not to be seen by everybody."""
+    children = [_echo(sandboxes) for _ in range(10)]
+    try:
+        lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()
+    except PermissionError:
+        return float("nan"), float("nan")
+    finally:
+        for child in children:
+            child.close()
+    sizes = {line.split(":")[0]: int(line.split()[1]) / 1024 for line in lines if line.endswith("kB")}
+    return sizes["Private_Dirty"], sizes["Pss"]
+
+
+def _run_to_its_end(sandboxes: Sandboxes, text: str, limits: ChildLimits) -> None:
+    child = sandboxes.spawn("robot", limits)
+    _start(child, "robot", text)
+    try:
+        while True:
+            child.receive(wire.ROBOT, lambda: None)
+    except ChildStopped:
+        child.close()
+
+
+def _cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
+    before = sandboxes.children_cpu_seconds
+    _run_to_its_end(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20))
+    return sandboxes.children_cpu_seconds - before - _CPU_LIMIT
+
+
+def _stall_overshoot(sandboxes: Sandboxes) -> float:
+    text = "import select; select.select([], [], [])"
+    return _seconds(lambda: _run_to_its_end(sandboxes, text, _LIMITS["robot"])) - _STALLED
+
+
+def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
+    """What a program could still print after the worker had heard enough."""
+    child = _spawn(sandboxes, "robot", folder)
+    _start(child, "robot", _FLOOD)
+    heard = 0
+    while heard <= _OUTPUT:
+        heard += len(child.receive(wire.ROBOT, lambda: None)["text"]) + 1
+    child.close()
+    with (folder / "count").open("rb") as file, mmap.mmap(file.fileno(), 8, prot=mmap.PROT_READ) as count:
+        return int.from_bytes(count[:], "little") - _OUTPUT
+
+
+def _until_nothing_left() -> float:
+    worker = subprocess.Popen([sys.executable, "-c", _WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert worker.stdout is not None
+    assert worker.stdin is not None
+    child = Path(f"/proc/{int(worker.stdout.readline())}")
+    zygote = Path(f"/proc/{(child / 'stat').read_text().rpartition(')')[2].split()[1]}")
+    start = time.perf_counter()
+    worker.kill()
+    worker.wait()
+    while _runs(child) or _runs(zygote):
+        time.sleep(0.0005)
+    taken = time.perf_counter() - start
+    worker.stdin.close()
+    worker.stdout.close()
+    return taken
+
+
+def _runs(process: Path) -> bool:
+    try:
+        return (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

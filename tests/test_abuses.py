@@ -1,0 +1,195 @@
+"""Programs that want too much: each ends at its own limit with the verdict that says so, and the next one runs well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import pytest
+
+import running
+from responders.sandbox import running_child
+from responders.sandbox.running_child import ChildLimits
+from running import run_program
+from service.grading.rig import Rig
+from sim.recording import Recording, Verdict
+
+HONEST_PROGRAM = 'from time import sleep\nprint("PY::hello")\nsleep(0.5)\ntank_drive.on_for_seconds(20, 20, 1)\n'
+HONEST_RESPONDER = "def responder(text): return text.upper()\n"
+
+
+@dataclass(frozen=True)
+class Abuse:
+    """One file that wants too much, in the one role or the other, and the verdicts that are right for it."""
+
+    name: str
+    text: str
+    verdicts: tuple[Verdict, ...]
+    role: Literal["program", "responder"] = "program"
+
+
+def _abuses(verdicts: tuple[Verdict, ...], role: Literal["program", "responder"], **texts: str) -> list[Abuse]:
+    return [Abuse(name.replace("_", " "), text, verdicts, role) for name, text in texts.items()]
+
+
+def _frame(text: str) -> str:
+    return f"import os; os.write(3, {text.encode()!r} + b'\\n'); import time; time.sleep(1)"
+
+
+_IGNORE = "import signal\nfor n in (1, 2, 3, 14, 15, 24): signal.signal(n, signal.SIG_IGN)\n"
+_WAIT_FOR_EVER = "import select; select.select([], [], [])\n"
+_FILL = "import os\ndef responder(text):\n"
+
+ABUSES = [
+    *_abuses(
+        (Verdict.MEMORY_LIMIT,),
+        "program",
+        a_list_that_grows="held = []\nwhile True: held.append('x' * 100_000)",
+        bytes_all_at_once="bytes(10**12)",
+        a_text_all_at_once="'a' * 2**40",
+        a_number_of_many_digits="1 << (1 << 34)",
+        a_bomb_of_zeros="import zlib\nsmall = zlib.compress(bytes(1 << 20), 9)\nheld = []\n"
+        "while True: held.append(zlib.decompress(small))",
+    ),
+    *_abuses(
+        (Verdict.MEMORY_LIMIT,),
+        "responder",
+        numpy_zeros_touched="import numpy\ndef responder(text):\n    held = []\n"
+        "    while True: held.append(numpy.ones(10**7))",
+    ),
+    *_abuses(
+        (Verdict.PROGRAM_ERROR,),
+        "program",
+        shared_pages="import mmap\nheld = []\n"
+        "while True: held.append(mmap.mmap(-1, 16 << 20)); held[-1].write(b'x' * (16 << 20))",
+    ),
+    *_abuses(
+        (Verdict.CPU_LIMIT,),
+        "program",
+        an_empty_loop="while True: pass",
+        a_loop_that_ignores_the_limit=_IGNORE + "while True: pass",
+        a_loop_in_C="sum(range(10**12))",
+        a_power_in_C="9 ** 9 ** 8",
+        a_catastrophic_expression="import re\nre.match(r'(a+)+$', 'a' * 40 + 'b')",
+        a_storm_of_timers="import signal\nsignal.signal(signal.SIGALRM, lambda *_: None)\n"
+        "signal.setitimer(signal.ITIMER_REAL, 1e-5, 1e-5)\nwhile True: pass",
+        a_loop_that_catches_everything="while True:\n    try:\n        while True: pass\n"
+        "    except BaseException: pass",
+        a_sort_that_never_ends="class E:\n    def __lt__(self, other):\n        while True: pass\nsorted([E(), E()])",
+    ),
+    *_abuses(
+        (Verdict.CPU_LIMIT,),
+        "responder",
+        a_matrix_product_without_end="import numpy\na = numpy.ones((900, 900))\n"
+        "def responder(text):\n    while True: a @ a",
+        a_module_that_never_loads="while True: pass",
+    ),
+    *_abuses(
+        (Verdict.STALLED,),
+        "program",
+        sleeping_for_ever=_WAIT_FOR_EVER,
+        stopping_itself="import os, signal\nos.kill(os.getpid(), signal.SIGSTOP)",
+        ignoring_all_signals=_IGNORE + _WAIT_FOR_EVER,
+        blocking_all_signals="import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, range(1, 65))\n" + _WAIT_FOR_EVER,
+        reading_the_workers_replies="import os\nwhile True: os.read(3, 1000)",
+    ),
+    *_abuses(
+        (Verdict.PROGRAM_ERROR,),
+        "program",
+        a_bomb_of_processes="import os\nwhile True: os.fork()",
+        a_bomb_of_threads="import threading\nwhile True: threading.Thread(target=int).start()",
+        all_descriptors="import os\nwhile True: os.dup(0)",
+        all_pipes="import os\nwhile True: os.pipe()",
+        endless_recursion="def f(): f()\nf()",
+        recursion_past_the_stack="import sys\nsys.setrecursionlimit(10**9)\n"
+        "class A:\n    def __getattr__(self, name): return getattr(self, name)\nA().x",
+        a_null_pointer="import ctypes\nctypes.string_at(0)",
+        an_abort="import os\nos.abort()",
+        a_quit="import os, signal\nos.kill(os.getpid(), signal.SIGQUIT)",
+        leaving_at_once="import os\nos._exit(0)",
+        an_interrupt="raise KeyboardInterrupt",
+        closing_the_wire="import os, time\nos.close(3)\ntime.sleep(1)",
+        leaving_by_an_unknown_status="raise SystemExit(3)",
+    ),
+    *_abuses((Verdict.FINISHED,), "program", leaving_politely="import sys\nsys.exit(0)"),
+    *_abuses(
+        (Verdict.OUTPUT_LIMIT,),
+        "program",
+        a_flood_of_lines="while True: print('x' * 1000)",
+        a_flood_of_errors="import sys\nwhile True: sys.stderr.write('x' * 1000)",
+        a_flood_of_short_lines="while True: print('short')",
+        a_flood_of_speech="while True: say('x' * 10000)",
+    ),
+    *_abuses(
+        (Verdict.OUTPUT_LIMIT,),
+        "responder",
+        a_flood_of_a_responder="def responder(text):\n    while True: print('x' * 1000)",
+        many_files=_FILL + "    n = 0\n    while True:\n        open(f'f{n}', 'wb').write(bytes(4 << 20)); n += 1",
+        many_empty_files=_FILL + "    n = 0\n    while True:\n        os.close(os.open(f'f{n}', os.O_CREAT)); n += 1",
+    ),
+    *_abuses(
+        (Verdict.RESPONDER_ERROR,),
+        "responder",
+        one_big_file=_FILL + "    open('f', 'wb').write(bytes(5 << 20))",
+        files_without_a_name=_FILL + "    held = []\n    while True:\n"
+        "        held.append(open('f', 'wb')); os.unlink('f'); os.write(held[-1].fileno(), b'x')",
+        a_sparse_file=_FILL + "    os.ftruncate(os.open('f', os.O_CREAT | os.O_RDWR), 1 << 40)",
+        nested_folders=_FILL + "    while True:\n        os.mkdir('d'); os.chdir('d')",
+    ),
+    *_abuses(
+        (Verdict.SANDBOX_VIOLATION,),
+        "program",
+        a_frame_without_end="import os\nwhile True: os.write(3, b'x' * 60000)",
+        noise_on_the_wire=_frame("hello"),
+        a_mark=_frame('{"do":"mark","marks":10}'),
+        a_verdict=_frame('{"do":"end","error":null,"verdict":"finished"}'),
+        a_time=_frame('{"do":"wait","units":1,"t":99}'),
+        walls_of_its_own=_frame('{"do":"walls","landlock":99,"seccomp":true,"own_user":true,"missing":null}'),
+        a_responders_frame=_frame('{"do":"answer","kind":"text","text":"JSON::1"}'),
+        the_same_key_twice=_frame('{"do":"print","text":"a","text":"b"}'),
+        not_a_number=_frame('{"do":"motor","port":"outB","speed_sp":NaN}'),
+        a_deep_frame=_frame("[" * 60_000),
+        a_wait_of_an_age=_frame('{"do":"wait","units":' + "9" * 4000 + "}"),
+        an_instruction_of_32_bit_code="import ctypes, mmap\np = mmap.mmap(-1, 4096, prot=7)\n"
+        "p.write(b'\\xb8\\x14\\0\\0\\0\\xcd\\x80\\xc3')\n"
+        "ctypes.CFUNCTYPE(ctypes.c_long)(ctypes.addressof(ctypes.c_char.from_buffer(p)))()",
+    ),
+    *_abuses(
+        (Verdict.SANDBOX_VIOLATION,),
+        "responder",
+        two_answers=_FILL + '    os.write(3, b\'{"do":"ready","error":null}\\n\')\n    return text',
+        a_robots_frame=_FILL + '    os.write(3, b\'{"do":"wait","units":1}\\n\')\n    return text',
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def abused() -> Iterator[Rig]:
+    with Rig() as rig:
+        yield rig
+
+
+@pytest.fixture(autouse=True)
+def _small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tenths of seconds show what seconds would."""
+    monkeypatch.setattr(running, "PROGRAM_LIMITS", ChildLimits(0.4, 64 << 20))
+    monkeypatch.setattr(running, "RESPONDER_LIMITS", ChildLimits(0.6, 128 << 20))
+    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 1.0)
+
+
+def _honest(rig: Rig) -> Recording:
+    return run_program(rig, HONEST_PROGRAM, responder=HONEST_RESPONDER)
+
+
+@pytest.mark.parametrize("abuse", ABUSES, ids=lambda abuse: f"{abuse.role}: {abuse.name}")
+def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: Rig) -> None:
+    before = _honest(abused)
+    program = abuse.text if abuse.role == "program" else HONEST_PROGRAM
+    responder = abuse.text if abuse.role == "responder" else HONEST_RESPONDER
+    recording = run_program(abused, program, responder=responder, output_bytes=100_000)
+    assert recording.verdict in abuse.verdicts, [fault.message for fault in recording.faults]
+    assert {fault.who for fault in recording.faults} <= {abuse.role}
+    after = _honest(abused)
+    assert (after.verdict, after.sha256) == (Verdict.FINISHED, before.sha256)
+    assert [message.text for message in after.messages] == ["PY::hello", "PY::HELLO"]

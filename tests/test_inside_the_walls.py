@@ -1,0 +1,154 @@
+"""What the course teaches works behind the walls: learning, saved models, tables, pictures, ``eval``, late imports."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+from sklearn.ensemble import RandomForestClassifier
+
+from battery import run_text
+from responders.sandbox.manager import Sandboxes
+
+_DATA = """
+import numpy as np
+chance = np.random.default_rng(1)
+X = chance.normal(size=(120, 4)); y = (X[:, 0] + X[:, 1] > 0).astype(int)
+"""
+_LEARN = """
+model.fit(X, y)
+print(model.score(X, y) > 0.8, model.predict(X[:3]).shape)
+"""
+_MODELS = {
+    "forest": "from sklearn.ensemble import RandomForestClassifier\n"
+    "model = RandomForestClassifier(20, n_jobs=4, random_state=1)",
+    "network": "from sklearn.neural_network import MLPClassifier\n"
+    "model = MLPClassifier((8,), max_iter=2000, solver='lbfgs', random_state=1)",
+    "vectors": "from sklearn.svm import SVC\nmodel = SVC()",
+    "neighbours": "from sklearn.neighbors import KNeighborsClassifier\nmodel = KNeighborsClassifier(3, n_jobs=4)",
+    "pipeline": "from sklearn.pipeline import make_pipeline\nfrom sklearn.preprocessing import StandardScaler\n"
+    "from sklearn.linear_model import LogisticRegression\n"
+    "model = make_pipeline(StandardScaler(), LogisticRegression())",
+    "search": "from sklearn.model_selection import GridSearchCV\nfrom sklearn.tree import DecisionTreeClassifier\n"
+    "model = GridSearchCV(DecisionTreeClassifier(), {'max_depth': [2, 4]}, n_jobs=4, cv=3)",
+    "boosting": "from sklearn.ensemble import HistGradientBoostingClassifier\n"
+    "model = HistGradientBoostingClassifier(max_iter=20)",
+}
+
+
+@pytest.fixture(scope="module")
+def sandboxes() -> Iterator[Sandboxes]:
+    with Sandboxes() as made:
+        yield made
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """What a hand-in brings: models saved in several ways, a table and pictures."""
+    chance = np.random.default_rng(1)
+    values = chance.normal(size=(60, 4))
+    model = RandomForestClassifier(5, n_jobs=2, random_state=1).fit(values, values[:, 0] > 0)
+    joblib.dump(model, tmp_path / "plain.joblib")
+    joblib.dump(model, tmp_path / "squeezed.joblib.gz", compress=("gzip", 3))
+    joblib.dump(model, tmp_path / "squeezed.joblib.xz", compress=("xz", 3))
+    joblib.dump({"weights": values}, tmp_path / "arrays.joblib")
+    np.save(tmp_path / "array.npy", values)
+    pd.DataFrame({"a": [1, 2], "b": [3.5, 4.5]}).to_csv(tmp_path / "table.csv", index=False)
+    for kind in ("png", "jpg", "gif", "bmp"):
+        Image.new("RGB", (20, 10), "red").save(tmp_path / f"picture.{kind}")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", _MODELS)
+def test_models_learn(name: str, sandboxes: Sandboxes, tmp_path: Path) -> None:
+    _says(sandboxes, tmp_path, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        pytest.param(
+            "import joblib\nfor name in ('plain.joblib', 'squeezed.joblib.gz', 'squeezed.joblib.xz'):\n"
+            "    print(joblib.load(name).predict([[1, 0, 0, 0]])[0])",
+            ["True"] * 3,
+            id="saved-models",
+        ),
+        pytest.param(
+            "import joblib\nweights = joblib.load('arrays.joblib', mmap_mode='r')['weights']\n"
+            "print(type(weights).__name__, weights.shape)",
+            ["memmap (60, 4)"],
+            id="memory-mapped-model",
+        ),
+        pytest.param(
+            "import numpy as np\nprint(np.load('array.npy', mmap_mode='r').shape)\n"
+            "np.savez_compressed('mine.npz', a=np.arange(3)); print(np.load('mine.npz')['a'].sum())",
+            ["(60, 4)", "3"],
+            id="numpy-files",
+        ),
+        pytest.param(
+            "import pandas as pd\ntable = pd.read_csv('table.csv'); print(table.b.sum())\n"
+            "table.to_csv('mine.csv'); print(len(pd.read_csv('mine.csv').groupby('a').mean()))",
+            ["8.0", "2"],
+            id="tables",
+        ),
+        pytest.param(
+            "from PIL import Image, ImageFilter\nfor kind in ('png', 'jpg', 'gif', 'bmp'):\n"
+            "    picture = Image.open(f'picture.{kind}').convert('L').resize((4, 4)).filter(ImageFilter.BLUR)\n"
+            "    picture.save('mine.' + kind); print(picture.size)",
+            ["(4, 4)"] * 4,
+            id="pictures",
+        ),
+        pytest.param(
+            "print(eval('{\"shape\": [1, 2]}')['shape'], eval('2 ** 10'))\nexec('x = 5')\nprint(x)",
+            ["[1, 2] 1024", "5"],
+            id="eval",
+        ),
+        pytest.param(
+            "import tempfile, os\nwith tempfile.NamedTemporaryFile() as file: file.write(b'x')\n"
+            "print(len(os.listdir(os.getcwd())) > 5, len(open(os.path.abspath('table.csv')).read()) > 5)\n"
+            "with open('logger.txt', 'a') as log: log.write('line')\nos.rename('logger.txt', 'old.txt')\n"
+            "os.remove('old.txt'); print('ok')",
+            ["True True", "ok"],
+            id="own-files",
+        ),
+        pytest.param(
+            "import sqlite3\nd = sqlite3.connect(':memory:'); print(d.execute('select 6 * 7').fetchone()[0])\n"
+            "import csv, io, gzip, bz2, lzma, zipfile, hashlib, decimal, fractions, zoneinfo\n"
+            "print(zoneinfo.ZoneInfo('Europe/London').key, hashlib.sha256(b'').hexdigest()[:4])",
+            ["42", "Europe/London e3b0"],
+            id="standard-library",
+        ),
+    ],
+)
+def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path) -> None:
+    _says(sandboxes, folder, text, said)
+
+
+@pytest.mark.parametrize("role", ["robot", "responder"])
+def test_the_standard_library_can_be_imported_late(role: str, sandboxes: Sandboxes, tmp_path: Path) -> None:
+    """All of it that this interpreter can import at all, but for what would draw or needs a screen."""
+    left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
+    names = sorted(sys.stdlib_module_names - left_out)
+    text = f"""
+import importlib, warnings
+warnings.simplefilter("ignore")
+for name in {names!r}:
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError:
+        pass
+    except BaseException as error:
+        print(name, repr(error))
+"""
+    _says(sandboxes, tmp_path, text, [], role)
+
+
+def _says(sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: str = "responder") -> None:
+    lines, stop = run_text(sandboxes, role, text + "\ndef responder(text): return text\n", folder)
+    assert (lines, stop) == (said, None)

@@ -1,0 +1,104 @@
+"""A machine that lacks a wall: student code is refused, in a sentence that names what is missing.
+
+The machine is this one, behind a filter that says no as an old kernel, a switched-off module or a container would.
+"""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+#: Refuses one system call with one error, for itself and all its children, then runs the rest.
+_BEHIND = """
+import ctypes, struct, sys
+number, error = int(sys.argv[1]), int(sys.argv[2])
+code = [(0x20, 0, 0, 0), (0x15, 0, 1, number), (6, 0, 0, 0x50000 | error), (6, 0, 0, 0x7FFF0000)]
+filter = b"".join(struct.pack("=HBBI", *each) for each in code)
+buffer = ctypes.create_string_buffer(filter, len(filter))
+libc = ctypes.CDLL(None, use_errno=True)
+libc.prctl(38, 1, 0, 0, 0)
+assert libc.syscall(317, 1, 0, struct.pack("=H6xQ", len(code), ctypes.addressof(buffer))) == 0
+"""
+_CHECK = """
+from responders.sandbox.manager import Sandboxes
+from sim.errors import HostError
+try:
+    with Sandboxes() as sandboxes:
+        print("stands:", sandboxes.check())
+except HostError as error:
+    print(f"{type(error).__name__}: {error}")
+    sys.exit(3)
+"""
+_GRADE = """
+from service.cli import main
+sys.argv = ["robomark", "run", sys.argv[3]]
+main()
+"""
+
+_CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED = (
+    444,
+    445,
+    446,
+    317,
+    434,
+    424,
+    126,
+    176,
+)
+
+
+@pytest.mark.parametrize(
+    ("number", "error", "words"),
+    [
+        pytest.param(_CREATE, errno.ENOSYS, "Landlock", id="landlock-too-old"),
+        pytest.param(_CREATE, errno.EOPNOTSUPP, "Landlock", id="landlock-off"),
+        pytest.param(_CREATE, errno.EPERM, "Landlock", id="landlock-denied"),
+        pytest.param(_ADD, errno.EPERM, "Landlock", id="landlock-rules-denied"),
+        pytest.param(_RESTRICT, errno.EPERM, "Landlock", id="landlock-restriction-denied"),
+        pytest.param(_SECCOMP, errno.ENOSYS, "seccomp", id="seccomp-too-old"),
+        pytest.param(_SECCOMP, errno.EPERM, "seccomp", id="seccomp-denied"),
+        pytest.param(_SECCOMP, errno.EINVAL, "seccomp", id="seccomp-without-filters"),
+        pytest.param(_PIDFD_OPEN, errno.ENOSYS, "pidfd_open", id="pidfd-too-old"),
+        pytest.param(_PIDFD_OPEN, errno.EPERM, "pidfd_open", id="pidfd-denied"),
+        pytest.param(_PIDFD_SIGNAL, errno.EPERM, "pidfd_send_signal", id="signals-denied"),
+        pytest.param(_CAPSET, errno.EPERM, "capset", id="capabilities-denied"),
+    ],
+)
+def test_a_missing_wall_is_named(number: int, error: int, words: str) -> None:
+    ran = _run(_CHECK, number, error)
+    assert ran.returncode == 3
+    assert ran.stdout.startswith(f"WallsMissing: this machine cannot wall in student code: {words}:"), ran.stdout
+    assert "Linux 5.13" in ran.stdout
+    assert "Traceback" not in ran.stderr
+
+
+def test_behind_a_filter_that_denies_nothing_they_stand() -> None:
+    ran = _run(_CHECK, _UNUSED, errno.EPERM)
+    assert ran.returncode == 0
+    assert "seccomp" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    ("number", "word"), [(_CREATE, "Landlock"), (_SECCOMP, "seccomp"), (_PIDFD_OPEN, "pidfd_open")]
+)
+def test_the_command_line_refuses(number: int, word: str, tmp_path: Path) -> None:
+    program = tmp_path / "robot.py"
+    program.write_text("print('it ran')\n")
+    ran = _run(_GRADE, number, errno.ENOSYS, str(program))
+    assert ran.returncode == 3
+    assert word in ran.stderr + ran.stdout
+    assert "it ran" not in ran.stdout
+    assert "Traceback" not in ran.stderr
+
+
+def _run(rest: str, number: int, error: int, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", _BEHIND + rest, str(number), str(error), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )

@@ -1,0 +1,158 @@
+"""Children and zygotes come and go: whoever is killed, nothing stays behind, and neither do hundreds of them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from running import run_program
+from service.grading.rig import Rig
+from sim.errors import HostError
+from sim.recording import Verdict
+
+_WORKER = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from running import run_program
+from service.grading.rig import Rig
+with Rig() as rig:
+    while True:
+        run_program(rig, sys.argv[2], responder=sys.argv[3])
+"""
+_ENDLESS = "while True: pass"
+_ECHO = "def responder(text): return text"
+_WAITING = 'import select\nprint("PY::x")\nselect.select([], [], [])'
+
+
+@pytest.mark.parametrize(
+    ("program", "responder"),
+    [
+        pytest.param(_ENDLESS, _ECHO, id="program-computes"),
+        pytest.param(_WAITING, _ECHO, id="program-waits"),
+        pytest.param('print("PY::x")', "def responder(text):\n    while True: pass", id="responder-computes"),
+        pytest.param("pass", _ECHO, id="children-come-and-go"),
+    ],
+)
+@pytest.mark.parametrize("killed", ["worker", "zygotes"])
+def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder: str, tmp_path: Path) -> None:
+    worker = subprocess.Popen(
+        [sys.executable, "-c", _WORKER, str(Path(__file__).parent), program, responder],
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    )
+    try:
+        # Two zygotes, and a child of each.
+        _wait_until(lambda: len(_descendants(worker.pid)) >= 4)
+        zygotes = _children(worker.pid)
+        family = _descendants(worker.pid)
+        if killed == "worker":
+            worker.kill()
+            worker.wait()
+            _wait_until(lambda: not any(_alive(pid) for pid in family))
+        else:
+            for zygote in zygotes:
+                os.kill(zygote, signal.SIGKILL)
+            _wait_until(lambda: not any(_alive(pid) for pid in family))
+    finally:
+        worker.kill()
+        worker.wait()
+
+
+def test_a_killed_zygote_is_our_fault_and_is_replaced() -> None:
+    with Rig() as rig:
+        honest = run_program(rig, "print(1)")
+        zygote = _zygote(os.getpid())
+
+        def kill() -> None:
+            if _alive(zygote):
+                os.kill(zygote, signal.SIGKILL)
+
+        with pytest.raises(HostError, match="zygote"):
+            run_program(rig, _ENDLESS, pulse=kill)
+        again = run_program(rig, "print(1)")
+        assert (again.verdict, again.sha256) == (Verdict.FINISHED, honest.sha256)
+        os.kill(_zygote(os.getpid()), signal.SIGKILL)
+        assert run_program(rig, "print(1)").sha256 == honest.sha256
+
+
+def test_five_hundred_children_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measured after the first fifty, by when everything that is loaded late has been."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    program = 'print("PY::x")'
+    responder = "def responder(text):\n    open('file', 'w').write(text)\n    return text"
+    with Rig() as rig:
+
+        def trials(count: int) -> None:
+            for _ in range(count):
+                assert run_program(rig, program, responder=responder).verdict is Verdict.FINISHED
+
+        trials(25)
+        processes = [os.getpid(), *_children(os.getpid())]
+        before = [_state(pid) for pid in processes]
+        trials(225)
+        for pid, (descriptors, children, memory) in zip(processes, before, strict=True):
+            now = _state(pid)
+            assert now[:2] == (descriptors, children)
+            assert now[2] - memory < 8 << 20
+        assert list(tmp_path.iterdir()) == []
+
+
+def _state(pid: int) -> tuple[int | None, list[int], int]:
+    """Open descriptors (if they may be seen), children, and bytes of memory in use."""
+    try:
+        descriptors = len(list(Path(f"/proc/{pid}/fd").iterdir()))
+    except PermissionError:
+        descriptors = None
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return descriptors, _children(pid), pages * os.sysconf("SC_PAGESIZE")
+
+
+def _zygote(worker: int) -> int:
+    """The newest child of ``worker`` that is a zygote."""
+    return max(pid for pid in _children(worker) if b"inside.zygote" in Path(f"/proc/{pid}/cmdline").read_bytes())
+
+
+def _parents() -> Iterator[tuple[int, int]]:
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+            except OSError:
+                continue
+            if fields[0] != "Z":
+                yield int(entry.name), int(fields[1])
+
+
+def _children(pid: int) -> list[int]:
+    return sorted(child for child, parent in _parents() if parent == pid)
+
+
+def _descendants(pid: int) -> set[int]:
+    found, parents = {pid}, list(_parents())
+    while more := {child for child, parent in parents if parent in found} - found:
+        found |= more
+    return found - {pid}
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def _wait_until(condition: object, seconds: float = 30) -> None:
+    """A second is what is promised; a busy machine gets longer."""
+    assert callable(condition)
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.01)
