@@ -5,6 +5,7 @@ It keeps the messages of one trial and asks the responder's process for answers;
 
 from __future__ import annotations
 
+import errno
 import heapq
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -241,7 +242,8 @@ _PYTHON_2 = (
 
 def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
-    if error["type"] == "MemoryError":
+    out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
+    if error["type"] == "MemoryError" or out_of_memory:
         sentence = f"the {who} asked for more memory than it may have"
         return Fault(now / SECOND, Verdict.MEMORY_LIMIT, _who(who), sentence, error["line"])
     verdict = Verdict.RESPONDER_ERROR if who == "responder" else Verdict.PROGRAM_ERROR

@@ -22,6 +22,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict
 
+_PREFIX = "robomark-trial-"
 _LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
 _MOST_NOTES = 40
@@ -64,15 +65,30 @@ def run_trial(
 @contextlib.contextmanager
 def _private_folder() -> Iterator[Path]:
     """A folder for one trial, removed afterwards whatever the student's code has put into it."""
-    folder = Path(tempfile.mkdtemp(prefix="robomark-"))
+    folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-"))
     try:
         yield folder
     finally:
-        try:
-            shutil.rmtree(folder, ignore_errors=True)
-        except RecursionError:
-            # rmtree recurses; a chain of a thousand folders is a student's doing.
-            subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
+        _remove(folder)
+
+
+def remove_left_overs() -> None:
+    """Remove the folders of trials whose worker was killed before it could do so itself."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*-*"):
+        worker = folder.name.removeprefix(_PREFIX).partition("-")[0]
+        # Another worker may be doing the same at this moment.
+        with contextlib.suppress(FileNotFoundError):
+            mine = folder.lstat().st_uid == os.getuid() and not folder.is_symlink()
+            if worker.isdecimal() and mine and not Path(f"/proc/{worker}").exists():
+                _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+    except RecursionError:
+        # rmtree recurses; a chain of a thousand folders is a student's doing.
+        subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
 
 
 def _recording(

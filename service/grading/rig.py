@@ -11,7 +11,7 @@ from types import TracebackType
 
 from responders.bridge import TrialOrder
 from responders.sandbox.manager import FULL, Sandboxes, Walls
-from responders.trial import run_trial
+from responders.trial import remove_left_overs, run_trial
 from sim.arena import Arena, Rectangle
 from sim.camera import Cameras
 from sim.recording import Recording
@@ -23,6 +23,7 @@ class Rig:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed."""
 
     def __init__(self, walls: Walls = FULL) -> None:
+        remove_left_overs()
         self._sandboxes = Sandboxes(walls)
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
