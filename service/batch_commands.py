@@ -5,11 +5,8 @@ Reading the folder is ``preflight.py``; the grading itself is the workers'.
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
@@ -20,20 +17,19 @@ from rich.table import Table
 from rich.text import Text
 
 from responders.sandbox.manager import Sandboxes
-from service.grading.grade import Grade
+from service.batch_control_commands import BatchId, cancel, pause, resume, retry
+from service.batch_export_command import export
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
 from service.report_files import write_batch
-from service.reports.csv_output import marks_csv, moodle_csv
-from service.reports.json_output import json_document
 from service.settings import Settings, load_settings
-from service.store import batches, grades, intake
+from service.store import batches, intake
 from service.store.batches import BatchLine, JobLine
 from service.store.engine import Store, open_store
-from service.store.models import JobState, Lane
+from service.store.models import BatchState, JobState, Lane
 from service.waiting import Waiting
 from sim.errors import Cancelled, HostError, UsageError
 
@@ -44,20 +40,11 @@ _STYLES: Mapping[JobState, str] = MappingProxyType(
 )
 
 
-class ExportFormat(StrEnum):
-    """What ``batch export`` writes."""
-
-    CSV = "csv"
-    MOODLE = "moodle"
-    JSON = "json"
-
-
-BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning of it.")]
-
-
 @batch_app.command()
 def submit(
-    hand_ins: Annotated[Path, typer.Argument(help="A folder or .zip with a hand-in for each student.")],
+    hand_ins: Annotated[
+        Path, typer.Argument(help="A folder or .zip with a hand-in for each student, or a .csv roster.")
+    ],
     assignment: Annotated[
         str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
     ] = None,
@@ -65,58 +52,65 @@ def submit(
     report: Annotated[
         Path | None, typer.Option(help="Write a report for each hand-in into this folder; waits.")
     ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Grade again what was handed in already.")] = False,
 ) -> None:
     """Queue a hand-in for each student; bad ones are named and stop no other.
+
+    A roster has the columns student, file and assignment, the last not needed with -a; files lie below it. A
+    student's newest hand-in replaces one that still waits, and the same one again changes nothing.
 
     Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
     not be graded.
     """
     if wait or report is not None:
-        refused = submit_and_wait(hand_ins, assignment, report=report)
+        refused = submit_and_wait(hand_ins, assignment, report=report, again=again)
     else:
-        refused = _submit(hand_ins, assignment)
+        refused = _submit(hand_ins, assignment, again=again)
     if refused:
         raise UsageError(f"{refused} of the hand-ins could not be taken in; the others were")
 
 
-def _submit(hand_ins: Path, assignment: str | None) -> int:
+def _submit(hand_ins: Path, assignment: str | None, *, again: bool) -> int:
     settings = load_settings()
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
         checked = _checked(hand_ins, assignment, console)
-        accepted = _accept(store, settings, hand_ins, checked)
+        accepted = _accept(store, settings, hand_ins, checked, again=again, console=console)
         if settings.broker_url:
-            _nudger(settings, store).grade(Lane.BATCH, len(accepted.jobs))
-    console.print(f"batch {accepted.id}: {len(accepted.jobs)} queued", highlight=False)
-    if not settings.broker_url:
+            _nudger(settings, store).grade(Lane.BATCH, _new(accepted))
+    if accepted.batch is not None and not settings.broker_url:
         console.print("A worker grades them: robomark worker", highlight=False)
     return len(checked.problems)
 
 
-def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | None) -> int:
+def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | None, again: bool = True) -> int:
     """Queue hand-ins, grade them with the services that run or with our own, and show the marks.
 
-    Returns how many were refused. Raises UsageError when none could be taken in, HostError when one could not be
-    graded.
+    Returns how many were refused. What was handed in already is graded ``again``, or shown as it is. Raises
+    UsageError when none could be taken in, HostError when one could not be graded, Cancelled when one was
+    cancelled meanwhile.
     """
     settings = load_settings()
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
         checked = _checked(hand_ins, assignment, console)
-        accepted = _accept(store, settings, hand_ins, checked)
-        console.print(f"batch {accepted.id}: {len(accepted.jobs)} queued", highlight=False)
+        accepted = _accept(store, settings, hand_ins, checked, again=again, console=console)
         try:
-            lines = _wait(store, settings, accepted.id, len(accepted.jobs), console)
+            lines = _wait(store, settings, accepted, console)
         except KeyboardInterrupt:
-            raise Cancelled(f"stopped; what is not graded stays queued: robomark batch status {accepted.id}") from None
+            where = f"status {accepted.batch.id}" if accepted.batch else "list"
+            raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
         if report is not None:
             page = write_batch(store, f"Batch {hand_ins.name}", lines, checked.problems, report)
             console.print(f"report: {page}", highlight=False, soft_wrap=True)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
         raise HostError(f"{len(failed)} of {len(lines)} could not be graded; {failed[0].source}: {failed[0].error}")
+    cancelled = [line for line in lines if line.state is JobState.CANCELLED]
+    if cancelled:
+        raise Cancelled(f"{len(cancelled)} of {len(lines)} not graded; {cancelled[0].source}: {cancelled[0].error}")
     return len(checked.problems)
 
 
@@ -147,41 +141,11 @@ def status(batch: BatchId) -> None:
     console.print(_marks_table(lines))
 
 
-@batch_app.command()
-def export(
-    batch: BatchId,
-    form: Annotated[ExportFormat, typer.Option("--format", help="What to write.")] = ExportFormat.CSV,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="A file instead of the screen.")] = None,
-) -> None:
-    """The marks of a batch for a spreadsheet, for Moodle, or as JSON."""
-    settings = load_settings()
-    with open_store(settings) as store:
-        with store.reading() as session:
-            lines = batches.job_lines(session, batches.find_batch(session, batch))
-        text = _EXPORTS[form](list(_grades(store, lines)))
-    if output is None:
-        sys.stdout.write(text)
-        return
-    try:
-        output.write_text(text, encoding="utf-8", newline="")
-    except OSError as error:
-        raise UsageError(f"{output} cannot be written: {error.strerror}") from None
-
-
-def _export_json(found: Sequence[Grade]) -> str:
-    return json.dumps([{"student": grade.student, **json_document(grade)} for grade in found], indent=2) + "\n"
-
-
-_EXPORTS: Mapping[ExportFormat, Callable[[Sequence[Grade]], str]] = MappingProxyType(
-    {ExportFormat.CSV: marks_csv, ExportFormat.MOODLE: moodle_csv, ExportFormat.JSON: _export_json}
-)
-
-
-def _grades(store: Store, lines: Iterable[JobLine]) -> Iterable[Grade]:
-    for line in lines:
-        if line.state is JobState.DONE:
-            with store.reading() as session:
-                yield grades.load(session, line.id)
+batch_app.command()(export)
+batch_app.command()(pause)
+batch_app.command()(resume)
+batch_app.command()(cancel)
+batch_app.command()(retry)
 
 
 def _checked(hand_ins: Path, assignment: str | None, console: Console) -> Preflight:
@@ -192,30 +156,80 @@ def _checked(hand_ins: Path, assignment: str | None, console: Console) -> Prefli
     return checked
 
 
-def _accept(store: Store, settings: Settings, path: Path, checked: Preflight) -> intake.AcceptedBatch:
-    return intake.accept_batch(store, path.name, checked.hand_ins, checked.problems, max_attempts=settings.max_attempts)
+def _accept(
+    store: Store, settings: Settings, path: Path, checked: Preflight, *, again: bool, console: Console
+) -> intake.AcceptedNew:
+    """Take in what passed, and say what was new of it."""
+    batch = (path.name, checked.hand_ins, checked.problems)
+    if again:
+        accepted = intake.AcceptedNew(intake.accept_batch(store, *batch, max_attempts=settings.max_attempts), ())
+    else:
+        accepted = intake.accept_new(store, *batch, max_attempts=settings.max_attempts)
+    if accepted.known:
+        table = Table("nothing new of", "why", box=None, pad_edge=False)
+        for known in accepted.known:
+            dead = f", dead: robomark batch retry {known.batch_id}" if known.state is JobState.DEAD else ""
+            table.add_row(Text(known.student), Text(f"already handed in as {known.job_id}{dead}"))
+        console.print(table)
+    if accepted.batch is None:
+        console.print("nothing new; --again grades it again", highlight=False)
+    else:
+        console.print(f"batch {accepted.batch.id}: {_new(accepted)} queued", highlight=False)
+    return accepted
 
 
-def _wait(store: Store, settings: Settings, batch_id: str, count: int, console: Console) -> list[JobLine]:
-    """Wait for the marks, show them, and wait for the plots."""
+def _new(accepted: intake.AcceptedNew) -> int:
+    return 0 if accepted.batch is None else len(accepted.batch.jobs)
+
+
+def _wait(store: Store, settings: Settings, accepted: intake.AcceptedNew, console: Console) -> list[JobLine]:
+    """Wait for the marks of what was new and of what was known, show them, and wait for the plots."""
+    unfinished = _unfinished(store, accepted, console)
     with ExitStack() as services:
-        if settings.broker_url:
-            broker, keep_up = settings, _nothing
-        else:
-            with Sandboxes() as sandboxes:
-                # Here the reason can be said; a worker that refuses would only be seen to end.
-                sandboxes.check()
-            embedded = services.enter_context(EmbeddedServices(settings, store))
-            broker, keep_up = embedded.settings, embedded.ensure
-        nudger = _nudger(broker, store)
-        nudger.grade(Lane.BATCH, count)
-        waiting = Waiting(store, nudger, batch_id, console, keep_up)
-        waiting.for_marks()
-        with store.reading() as session:
-            lines = batches.job_lines(session, batch_id)
+        waiting: list[Waiting] = []
+        if unfinished:
+            if settings.broker_url:
+                broker, keep_up = settings, _nothing
+            else:
+                with Sandboxes() as sandboxes:
+                    # Here the reason can be said; a worker that refuses would only be seen to end.
+                    sandboxes.check()
+                embedded = services.enter_context(EmbeddedServices(settings, store))
+                broker, keep_up = embedded.settings, embedded.ensure
+            nudger = _nudger(broker, store)
+            nudger.grade(Lane.BATCH, _new(accepted))
+            waiting = [Waiting(store, nudger, batch_id, console, keep_up) for batch_id in unfinished]
+        for each in waiting:
+            each.for_marks()
+        lines = _lines(store, accepted)
         console.print(_marks_table(lines))
-        waiting.for_plots()
+        for each in waiting:
+            each.for_plots()
     return lines
+
+
+def _unfinished(store: Store, accepted: intake.AcceptedNew, console: Console) -> list[str]:
+    """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
+    own = [] if accepted.batch is None else [accepted.batch.id]
+    unfinished = []
+    with store.reading() as session:
+        for batch_id in dict.fromkeys([*own, *(known.batch_id for known in accepted.known if known.batch_id)]):
+            far = batches.progress(session, batch_id)
+            if far.ended == far.jobs and not far.plots_due:
+                continue
+            if batches.batch(session, batch_id).state is BatchState.OPEN:
+                unfinished.append(batch_id)
+            else:
+                console.print(f"batch {batch_id} is paused: robomark batch resume {batch_id}", highlight=False)
+    return unfinished
+
+
+def _lines(store: Store, accepted: intake.AcceptedNew) -> list[JobLine]:
+    with store.reading() as session:
+        lines = [batches.job_line(session, known.job_id) for known in accepted.known]
+        if accepted.batch is not None:
+            lines += batches.job_lines(session, accepted.batch.id)
+    return sorted(lines, key=lambda line: (line.student, line.id))
 
 
 def _nothing() -> None:
@@ -237,7 +251,8 @@ def _print_problems(problems: Sequence[tuple[str, str]], console: Console) -> No
 
 def _summary(line: BatchLine) -> str:
     parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    return ", ".join(parts) or "empty"
+    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
+    return held + (", ".join(parts) or "empty")
 
 
 def _marks_table(lines: Sequence[JobLine]) -> Table:

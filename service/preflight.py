@@ -1,4 +1,4 @@
-"""Reads a folder or zip of hand-ins before anything is queued: what can be graded, and what is wrong with the rest.
+"""Reads a folder, zip or roster of hand-ins before anything is queued: what can be graded, and what not.
 
 Every bad row is named and stops no other. Nothing is stored here.
 """
@@ -10,16 +10,17 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path, PurePosixPath
 
+from service.roster import RosterRow, file_inside, read_roster
 from service.store.intake import HandIn
 from sim.errors import UsageError
 from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment_file import catalogue, find_assignment, read_assignment
 from submissions.bundle import fit_parts, read_submission
 from submissions.raw_files import shown
 
@@ -38,36 +39,52 @@ class Preflight:
     problems: tuple[tuple[str, str], ...]
 
 
-def preflight(path: Path, assignment: str | None) -> Preflight:
-    """Read every hand-in in a folder or zip: a subfolder, a .py or a .zip is one student's.
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A row by the name it is spoken of, and how its hand-in is read; that raises UsageError."""
 
-    Without ``assignment`` each hand-in names its own. Raises UsageError when ``path`` or ``assignment`` itself
-    cannot be used.
+    name: str
+    read: Callable[[], HandIn]
+
+
+def preflight(path: Path, assignment: str | None) -> Preflight:
+    """Read every hand-in of a folder, zip or CSV roster.
+
+    In a folder or zip a subfolder, a .py or a .zip is one student's, and without ``assignment`` each hand-in names
+    its own. A roster names student and file; ``assignment`` is for the rows that name none. Raises UsageError when
+    ``path`` or ``assignment`` itself cannot be used.
     """
     asked = None if assignment is None else find_assignment(assignment)
+    if path.is_file() and path.suffix.lower() == ".csv":
+        find = cache(partial(_roster_assignment, path.parent))
+        return _read(
+            _Row(
+                shown(f"line {row.line}: {row.student}" if row.student else f"line {row.line}"),
+                partial(_roster_hand_in, path.parent, row, asked, find),
+            )
+            for row in read_roster(path)
+        )
     with _opened(path) as folder:
-        return _read(_entries(folder), asked)
+        find_own = cache(find_assignment)
+        return _read([_Row(shown(entry.name), partial(_hand_in, entry, asked, find_own)) for entry in _entries(folder)])
 
 
-def _read(entries: list[Path], asked: Assignment | None) -> Preflight:
+def _read(rows: Iterable[_Row]) -> Preflight:
     hand_ins: list[HandIn] = []
     problems: list[tuple[str, str]] = []
     first: dict[tuple[str, str], str] = {}
-    find = cache(find_assignment)
-    for entry in entries:
-        row = shown(entry.name)
+    for row in rows:
         try:
-            hand_in = _hand_in(entry, asked, find)
+            hand_in = row.read()
         except UsageError as error:
-            problems.append((row, " ".join(str(error).split())))
+            problems.append((row.name, " ".join(str(error).split())))
             continue
         key = (hand_in.submission.student, hand_in.assignment.id)
         if key in first:
-            problems.append(
-                (row, f"{first[key]} is already this student's hand-in for {key[1]}; this one is left out.")
-            )
+            sentence = f"{first[key]} is already this student's hand-in for {key[1]}; this one is left out."
+            problems.append((row.name, sentence))
             continue
-        first[key] = row
+        first[key] = row.name
         hand_ins.append(hand_in)
     return Preflight(tuple(hand_ins), tuple(problems))
 
@@ -80,6 +97,27 @@ def _hand_in(entry: Path, asked: Assignment | None, find: Callable[[str], Assign
         raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
     own = find(submission.assignment)
     return HandIn(fit_parts(submission, own.parts), own, shown(entry.name))
+
+
+def _roster_hand_in(
+    folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment]
+) -> HandIn:
+    if row.problem:
+        raise UsageError(row.problem)
+    if not row.assignment and asked is None:
+        raise UsageError("names no assignment; name it with -a, or in a column assignment.")
+    path = file_inside(folder, row.file)
+    assignment = find(row.assignment) if row.assignment or asked is None else asked
+    submission = read_submission(path, asked=assignment.parts)
+    return HandIn(replace(submission, student=row.student), assignment, shown(row.file))
+
+
+def _roster_assignment(folder: Path, name: str) -> Assignment:
+    """An id of the catalogue, or a folder that the roster names as it names files."""
+    if name in catalogue():
+        return find_assignment(name)
+    path = file_inside(folder, name)
+    return read_assignment(path) if path.is_dir() else find_assignment(name)
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -109,9 +147,11 @@ def _opened(path: Path) -> Iterator[Path]:
             _unzip(path, folder)
             yield _stepped_into(folder)
     elif not path.exists():
-        raise UsageError(f"{path}: does not exist, expected a folder or a .zip of hand-ins.")
+        raise UsageError(f"{path}: does not exist, expected a folder or a .zip of hand-ins, or a .csv roster.")
     else:
-        raise UsageError(f"{path}: is neither a folder nor a .zip, expected one with a hand-in for each student.")
+        raise UsageError(
+            f"{path}: is neither a folder nor a .zip nor a .csv, expected one with a hand-in for each student."
+        )
 
 
 def _stepped_into(folder: Path) -> Path:

@@ -184,7 +184,8 @@ def test_the_newest_hand_in_supersedes_one_that_waits_not_one_that_runs(store: S
     claim = _claim(store)
     second, third = accept_one(store).job_id, accept_one(store).job_id
     states = [_job(store, job_id).state for job_id in (first, second, third)]
-    assert states == [JobState.RUNNING, JobState.SUPERSEDED, JobState.QUEUED]
+    assert states == [JobState.RUNNING, JobState.CANCELLED, JobState.QUEUED]
+    assert _job(store, second).error == f"superseded by {third}"
     _finish(store, claim)
     with store.reading() as session:
         assert session.scalars(select(Submission.attempt).order_by(Submission.id)).all() == [1, 2, 3]

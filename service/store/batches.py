@@ -10,7 +10,17 @@ from sqlalchemy import Row, Select, func, select
 from sqlalchemy.orm import Session
 
 from service.store import models
-from service.store.models import UNFINISHED, AssignmentVersion, Batch, CriterionRow, Enrolment, Job, JobState, PlotState
+from service.store.models import (
+    UNFINISHED,
+    AssignmentVersion,
+    Batch,
+    BatchState,
+    CriterionRow,
+    Enrolment,
+    Job,
+    JobState,
+    PlotState,
+)
 from sim.errors import UsageError
 
 
@@ -46,6 +56,7 @@ class BatchLine:
 
     id: str
     name: str
+    state: BatchState
     created_at: datetime
     problems: tuple[tuple[str, str], ...]  # the rows that were refused: name, sentence
     jobs: int
@@ -86,7 +97,7 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
     states = dict(session.execute(counted).all())
     problems = tuple((name, sentence) for name, sentence in row.problems)
-    return BatchLine(row.id, row.name, row.created_at, problems, sum(states.values()), states)
+    return BatchLine(row.id, row.name, row.state, row.created_at, problems, sum(states.values()), states)
 
 
 def job_lines(session: Session, batch_id: str) -> list[JobLine]:

@@ -18,7 +18,19 @@ from sqlalchemy.orm import Session
 
 from service.store import models
 from service.store.engine import Store, now
-from service.store.models import AssignmentVersion, Batch, Course, Enrolment, Job, JobState, Lane, Person, Role
+from service.store.models import (
+    AssignmentVersion,
+    Batch,
+    BatchState,
+    Course,
+    Enrolment,
+    Job,
+    JobState,
+    Lane,
+    Person,
+    Role,
+    new_id,
+)
 from service.store.plain import from_plain, to_plain
 from sim.errors import HostError, UsageError
 from submissions.assignment import Assignment
@@ -52,6 +64,24 @@ class AcceptedBatch:
     jobs: tuple[Accepted, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A hand-in that changes nothing: the newest of its student is the same, for the same assignment."""
+
+    job_id: str
+    batch_id: str | None
+    student: str
+    state: JobState
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedNew:
+    """What was new of a batch, and what was not; no batch was made when nothing was."""
+
+    batch: AcceptedBatch | None
+    known: tuple[Known, ...]
+
+
 def accept(
     store: Store, hand_in: HandIn, *, course: str = DEFAULT_COURSE, max_attempts: int, lane: Lane = Lane.INTERACTIVE
 ) -> Accepted:
@@ -72,16 +102,39 @@ def accept_batch(
     course: str = DEFAULT_COURSE,
     max_attempts: int,
 ) -> AcceptedBatch:
-    """Take in a whole batch or nothing of it. ``problems`` are the rows that were refused: name, sentence."""
+    """Take in a whole batch or nothing of it, each hand-in as a new one whatever was handed in before.
+
+    ``problems`` are the rows that were refused: name, sentence.
+    """
     packed = _pack(hand_ins)
     with store.transaction() as session:
         at = now(session)
         course_id = _course(session, course, at)
-        batch = Batch(course_id=course_id, name=name, problems=[list(row) for row in problems], created_at=at)
-        session.add(batch)
-        session.flush()
-        jobs = tuple(_accept(session, item, course_id, batch.id, Lane.BATCH, max_attempts, at) for item in packed)
-        return AcceptedBatch(batch.id, jobs)
+        return _accept_batch(session, packed, course_id, name, problems, max_attempts, at)
+
+
+def accept_new(
+    store: Store,
+    name: str,
+    hand_ins: Sequence[HandIn],
+    problems: Sequence[tuple[str, str]],
+    *,
+    course: str = DEFAULT_COURSE,
+    max_attempts: int,
+) -> AcceptedNew:
+    """Take in what is new of a batch, so that handing in the same batch twice changes nothing.
+
+    Not new is what has the bytes of the student's newest hand-in and is marked against the same version of the
+    assignment; but for what was cancelled, which comes in again.
+    """
+    packed = _pack(hand_ins)
+    with store.transaction() as session:
+        at = now(session)
+        course_id = _course(session, course, at)
+        found = [_known(session, item, course_id) for item in packed]
+        new = [item for item, known in zip(packed, found, strict=True) if known is None]
+        batch = _accept_batch(session, new, course_id, name, problems, max_attempts, at) if new else None
+        return AcceptedNew(batch, tuple(known for known in found if known is not None))
 
 
 def load_hand_in(session: Session, job_id: str) -> HandIn:
@@ -140,6 +193,49 @@ def _pack(hand_ins: Sequence[HandIn]) -> list[_Packed]:
     return packed
 
 
+def _known(session: Session, packed: _Packed, course_id: int) -> Known | None:
+    submission, assignment = packed.hand_in.submission, packed.hand_in.assignment
+    query = (
+        select(models.Submission.sha256, AssignmentVersion.sha256, Job.id, Job.state, Job.batch_id, Batch.state)
+        .join(Enrolment, models.Submission.enrolment_id == Enrolment.id)
+        .join(Job, Job.submission_id == models.Submission.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(
+            Enrolment.course_id == course_id,
+            Enrolment.student == submission.student,
+            models.Submission.assignment == assignment.id,
+        )
+        .order_by(models.Submission.attempt.desc(), Job.queued_at.desc(), Job.id)
+        .limit(1)
+    )
+    newest = session.execute(query).one_or_none()
+    if newest is None:
+        return None
+    sha256, version, job_id, state, batch_id, batch_state = newest
+    # A dead job of a cancelled batch cannot be retried, so it too comes in again.
+    cancelled = state is JobState.CANCELLED or (state is JobState.DEAD and batch_state is BatchState.CANCELLED)
+    if cancelled or (sha256, version) != (submission.sha256, packed.content_sha256):
+        return None
+    return Known(job_id, batch_id, submission.student, state)
+
+
+def _accept_batch(
+    session: Session,
+    packed: Sequence[_Packed],
+    course_id: int,
+    name: str,
+    problems: Sequence[tuple[str, str]],
+    max_attempts: int,
+    at: datetime,
+) -> AcceptedBatch:
+    batch = Batch(course_id=course_id, name=name, problems=[list(row) for row in problems], created_at=at)
+    session.add(batch)
+    session.flush()
+    jobs = tuple(_accept(session, item, course_id, batch.id, Lane.BATCH, max_attempts, at) for item in packed)
+    return AcceptedBatch(batch.id, jobs)
+
+
 def _accept(
     session: Session,
     packed: _Packed,
@@ -161,7 +257,9 @@ def _accept(
         Job.state == JobState.QUEUED,
         Job.submission_id.in_(select(models.Submission.id).where(*of_student)),
     )
-    session.execute(update(Job).where(*waiting).values(state=JobState.SUPERSEDED, finished_at=at))
+    job_id = new_id()
+    superseded = {"state": JobState.CANCELLED, "error": f"superseded by {job_id}", "finished_at": at}
+    session.execute(update(Job).where(*waiting).values(**superseded))
     row = models.Submission(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
@@ -176,6 +274,7 @@ def _accept(
     session.add(row)
     session.flush()
     job = Job(
+        id=job_id,
         submission_id=row.id,
         assignment_version_id=version_id,
         enrolment_id=enrolment_id,

@@ -42,8 +42,7 @@ class JobState(StrEnum):
     RUNNING = "running"
     DONE = "done"  # has a grade
     DEAD = "dead"  # could not be graded; ``error`` says why
-    CANCELLED = "cancelled"
-    SUPERSEDED = "superseded"  # a newer hand-in came while it waited
+    CANCELLED = "cancelled"  # by somebody, or because a newer hand-in came; ``error`` says which
 
 
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
@@ -59,8 +58,10 @@ class PlotState(StrEnum):
 
 
 class BatchState(StrEnum):
+    """What a claim looks at; how far a batch is follows from its jobs."""
+
     OPEN = "open"
-    PAUSED = "paused"
+    PAUSED = "paused"  # what runs goes on, what waits is not begun
     CANCELLED = "cancelled"
 
 

@@ -14,6 +14,7 @@ from sqlalchemy import func, or_, select, update
 from service.store.engine import Store, now
 from service.store.jobs import Retry, after_fault
 from service.store.models import Job, JobState, Lane, PlotState
+from service.store.turns import claimable
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +41,10 @@ def take_back_lost(store: Store, retry: Retry) -> int:
 
 
 def wanting_nudges(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
-    """By lane, the jobs that are due, and those of them whose nudge is missing or older than ``older_seconds``."""
+    """By lane, the jobs that could be claimed, and those whose nudge is missing or older than ``older_seconds``."""
     with store.reading() as session:
         at = now(session)
-        due = (Job.state == JobState.QUEUED, Job.due_at <= at)
-        query = select(Job.lane, func.count()).where(*due).group_by(Job.lane)
+        query = select(Job.lane, func.count()).where(*claimable(at)).group_by(Job.lane)
         stale = or_(Job.nudged_at.is_(None), Job.nudged_at < at - timedelta(seconds=older_seconds))
         all_due = dict(session.execute(query).all())
         all_stale = dict(session.execute(query.where(stale)).all())
@@ -57,7 +57,7 @@ def note_nudges(store: Store, lane: Lane, count: int) -> None:
         at = now(session)
         oldest = (
             select(Job.id)
-            .where(Job.state == JobState.QUEUED, Job.due_at <= at, Job.lane == lane)
+            .where(*claimable(at), Job.lane == lane)
             .order_by(func.coalesce(Job.nudged_at, Job.queued_at), Job.id)
             .limit(count)
         )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from sqlalchemy import Subquery, case, func, or_, select
+from sqlalchemy import ColumnElement, Subquery, case, func, or_, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store.models import Batch, BatchState, Job, JobState, Lane
@@ -16,6 +16,16 @@ from service.store.models import Batch, BatchState, Job, JobState, Lane
 SHARE_WINDOW = timedelta(seconds=60)
 #: Of so many jobs begun, one is a batch's even while people wait.
 BATCH_EVERY = 5
+
+
+def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
+    """What holds of a job that may be claimed at ``at``: it waits, it is due, and its batch is not held back."""
+    held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
+    return (
+        Job.state == JobState.QUEUED,
+        Job.due_at <= at,
+        or_(Job.batch_id.is_(None), Job.batch_id.not_in(held_back)),
+    )
 
 
 def next_job(session: Session, at: datetime) -> str | None:
@@ -31,16 +41,11 @@ def next_job(session: Session, at: datetime) -> str | None:
 
     of_batch = _begun(Job.batch_id, at)
     of_student = _begun(Job.enrolment_id, at)
-    held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
     query = (
         select(Job.id)
         .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
         .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
-        .where(
-            Job.state == JobState.QUEUED,
-            Job.due_at <= at,
-            or_(Job.batch_id.is_(None), Job.batch_id.not_in(held_back)),
-        )
+        .where(*claimable(at))
         .order_by(
             case((Job.lane == first, 0), else_=1),
             func.coalesce(of_batch.c.begun, 0),

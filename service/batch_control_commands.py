@@ -1,0 +1,69 @@
+"""``robomark batch pause``, ``resume``, ``cancel`` and ``retry``: each says in one sentence what it changed.
+
+What they do stands in ``store/batch_control.py``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.settings import load_settings
+from service.store import batch_control, batches
+from service.store.engine import Store, open_store
+from sim.errors import UsageError
+
+BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning of it.")]
+
+
+def pause(batch: BatchId) -> None:
+    """Begin no more of a batch; what is being graded is graded to its end."""
+    with open_store(load_settings()) as store:
+        batch_id = _find(store, batch)
+        held = batch_control.pause(store, batch_id)
+    was = "is paused" if held.changed else "was paused already"
+    print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} graded to their end")
+
+
+def resume(batch: BatchId) -> None:
+    """Let a paused batch go on."""
+    with open_store(load_settings()) as store:
+        batch_id = _find(store, batch)
+        held = batch_control.resume(store, batch_id)
+    was = "goes on" if held.changed else "was not paused"
+    print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} being graded")
+
+
+def cancel(batch: BatchId) -> None:
+    """End what of a batch is not graded yet; marks that are there stay."""
+    with open_store(load_settings()) as store:
+        batch_id = _find(store, batch)
+        ended = batch_control.cancel(store, batch_id)
+    if ended.changed:
+        print(f"batch {batch_id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
+    else:
+        print(f"batch {batch_id}: nothing changed, all of it has ended already")
+
+
+def retry(
+    batch: Annotated[str | None, typer.Argument(help="The batch's id, or the beginning of it.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="The dead of all batches.")] = False,
+) -> None:
+    """Queue again what could not be graded."""
+    if (batch is not None) == every:
+        raise UsageError("name one batch, or --all for the dead of all batches")
+    with open_store(load_settings()) as store:
+        batch_id = None if batch is None else _find(store, batch)
+        retried = batch_control.retry(store, batch_id)
+    where = "all batches" if batch_id is None else f"batch {batch_id}"
+    if retried.queued + retried.outdated == 0:
+        print(f"{where}: nothing changed, no hand-in is dead")
+        return
+    outdated = f"; {retried.outdated} left, because a newer hand-in came" if retried.outdated else ""
+    print(f"{where}: {retried.queued} queued again{outdated}")
+
+
+def _find(store: Store, start: str) -> str:
+    with store.reading() as session:
+        return batches.find_batch(session, start)

@@ -1,0 +1,124 @@
+"""What may be done to a whole batch: paused, resumed, cancelled, its dead jobs retried.
+
+A claim looks at the batch's state, and a worker at its job's, so nothing here talks to a worker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, exists, func, or_, select, update
+from sqlalchemy.orm import Session, aliased
+
+from service.store.engine import Store, now
+from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, Submission
+from sim.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    """Whether the batch's state changed, and how many of its jobs waited and ran then."""
+
+    changed: bool
+    waiting: int
+    running: int
+
+
+@dataclass(frozen=True, slots=True)
+class Retried:
+    """How many dead jobs wait again, and how many stay dead because their student handed in anew."""
+
+    queued: int
+    outdated: int
+
+
+def pause(store: Store, batch_id: str) -> Controlled:
+    """Begin no more of the batch; what runs goes on. Raises UsageError for a batch that was cancelled."""
+    return _set(store, batch_id, BatchState.PAUSED)
+
+
+def resume(store: Store, batch_id: str) -> Controlled:
+    """Let a paused batch go on. Raises UsageError for a batch that was cancelled."""
+    return _set(store, batch_id, BatchState.OPEN)
+
+
+def cancel(store: Store, batch_id: str) -> Controlled:
+    """End all jobs of the batch that have not ended; a worker that runs one is told at its next heartbeat.
+
+    A batch with nothing left to end stays as it is.
+    """
+    with store.transaction() as session:
+        _state(session, batch_id)
+        waiting, running = _unfinished(session, batch_id)
+        if waiting + running == 0:
+            return Controlled(False, 0, 0)
+        ended = {"state": JobState.CANCELLED, "lease": None, "lease_until": None, "finished_at": now(session)}
+        _change_jobs(
+            session,
+            (Job.batch_id == batch_id, Job.state.in_(UNFINISHED)),
+            ended | {"error": "the batch was cancelled"},
+        )
+        session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
+        return Controlled(True, waiting, running)
+
+
+def retry(store: Store, batch_id: str | None) -> Retried:
+    """Queue the dead jobs of a batch again, with all their attempts; None for every dead job there is.
+
+    Raises UsageError for a batch that was cancelled; with None their jobs are passed over.
+    """
+    with store.transaction() as session:
+        if batch_id is None:
+            cancelled = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
+            of_batch = or_(Job.batch_id.is_(None), Job.batch_id.not_in(cancelled))
+        else:
+            _refuse_cancelled(_state(session, batch_id), batch_id)
+            of_batch = Job.batch_id == batch_id
+        dead = (of_batch, Job.state == JobState.DEAD)
+        newer = aliased(Submission)
+        outdated = exists().where(
+            newer.enrolment_id == Submission.enrolment_id,
+            newer.assignment == Submission.assignment,
+            newer.attempt > Submission.attempt,
+        )
+        of_newest = select(Submission.id).where(~outdated)
+        before = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
+        at = now(session)
+        values = {"state": JobState.QUEUED, "attempt": 0, "progress": 0.0, "error": None}
+        values |= {"due_at": at, "nudged_at": None, "finished_at": None}
+        _change_jobs(session, (*dead, Job.submission_id.in_(of_newest)), values)
+        left = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
+        return Retried(before - left, left)
+
+
+def _set(store: Store, batch_id: str, state: BatchState) -> Controlled:
+    with store.transaction() as session:
+        before = _state(session, batch_id)
+        _refuse_cancelled(before, batch_id)
+        session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
+        # So that what goes on is nudged for at once.
+        _change_jobs(session, (Job.batch_id == batch_id, Job.state == JobState.QUEUED), {"nudged_at": None})
+        return Controlled(before is not state, *_unfinished(session, batch_id))
+
+
+def _state(session: Session, batch_id: str) -> BatchState:
+    """The batch's state, locked to the end of the transaction."""
+    state = session.scalar(select(Batch.state).where(Batch.id == batch_id).with_for_update())
+    if state is None:
+        raise UsageError(f"there is no batch {batch_id}")
+    return state
+
+
+def _refuse_cancelled(state: BatchState, batch_id: str) -> None:
+    if state is BatchState.CANCELLED:
+        raise UsageError(f"batch {batch_id} was cancelled; hand it in again to have the rest of it graded")
+
+
+def _unfinished(session: Session, batch_id: str) -> tuple[int, int]:
+    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
+    states = dict(session.execute(counted).all())
+    return states.get(JobState.QUEUED, 0), states.get(JobState.RUNNING, 0)
+
+
+def _change_jobs(session: Session, which: tuple[ColumnElement[bool], ...], values: dict[str, object]) -> None:
+    session.execute(update(Job).where(*which).values(**values), execution_options={"synchronize_session": False})

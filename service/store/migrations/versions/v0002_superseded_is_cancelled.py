@@ -1,0 +1,14 @@
+"""What a newer hand-in superseded is cancelled, with that as its reason."""
+
+from __future__ import annotations
+
+from alembic import op
+
+revision = "0002"
+down_revision = "0001"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.execute("UPDATE job SET state = 'cancelled', error = 'superseded by a newer hand-in' WHERE state = 'superseded'")

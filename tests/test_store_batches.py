@@ -1,0 +1,153 @@
+"""Whole batches in the store: handed in again, superseded, paused, cancelled, retried."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import func, select, text
+
+from builders import echo, hand_in
+from service.store import batch_control, batches, jobs
+from service.store.engine import Store
+from service.store.intake import HandIn, accept_batch, accept_new
+from service.store.models import Batch, BatchState, Job, JobState, Lane, Submission
+from service.store.sweep import wanting_nudges
+from sim.errors import UsageError
+
+OTHER = "print('other')\n"
+
+
+def _take(store: Store, *hand_ins: HandIn) -> str:
+    return accept_batch(store, "class", hand_ins, [], max_attempts=2).id
+
+
+def _die(store: Store) -> str:
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.bury(store, claim, "the disk is full")
+    return claim.job_id
+
+
+def _states(store: Store) -> list[tuple[int, JobState]]:
+    """The student's attempt and the state of every job."""
+    query = select(Submission.attempt, Job.state).join(Job, Job.submission_id == Submission.id)
+    with store.reading() as session:
+        return [(attempt, state) for attempt, state in session.execute(query.order_by(Submission.id))]
+
+
+def test_the_same_batch_again_changes_nothing(store: Store) -> None:
+    class_ = [hand_in("ada"), hand_in("bob")]
+    first = accept_new(store, "class", class_, [], max_attempts=2)
+    assert first.batch is not None
+    assert first.known == ()
+    again = accept_new(store, "class", class_, [], max_attempts=2)
+    assert again.batch is None
+    assert [known.job_id for known in again.known] == [job.job_id for job in first.batch.jobs]
+    with store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(Batch)) == 1
+    assert _states(store) == [(1, JobState.QUEUED)] * 2
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [hand_in("ada", OTHER), hand_in("ada", assignment=replace(echo(), title="Another title"))],
+    ids=["other bytes", "other version of the assignment"],
+)
+def test_only_what_differs_is_taken_in_and_supersedes(store: Store, changed: HandIn) -> None:
+    accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
+    second = accept_new(store, "class", [changed, hand_in("bob")], [], max_attempts=2)
+    assert second.batch is not None
+    (new,) = second.batch.jobs
+    assert (new.student, new.attempt) == ("ada", 2)
+    assert [known.student for known in second.known] == ["bob"]
+    assert _states(store) == [(1, JobState.CANCELLED), (1, JobState.QUEUED), (2, JobState.QUEUED)]
+    with store.reading() as session:
+        reason = session.scalars(select(Job.error).where(Job.state == JobState.CANCELLED)).one()
+    assert reason == f"superseded by {new.job_id}"
+
+
+def test_going_back_to_an_earlier_hand_in_is_a_new_attempt(store: Store) -> None:
+    for program in (OTHER, "print('hello')\n", OTHER):
+        accept_new(store, "class", [hand_in("ada", program)], [], max_attempts=2)
+    assert _states(store) == [(1, JobState.CANCELLED), (2, JobState.CANCELLED), (3, JobState.QUEUED)]
+
+
+def test_what_was_cancelled_comes_in_again(store: Store) -> None:
+    first = accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
+    assert first.batch is not None
+    _die(store)
+    batch_control.cancel(store, first.batch.id)
+    again = accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
+    assert again.batch is not None
+    assert [job.attempt for job in again.batch.jobs] == [2, 2]
+
+
+def test_a_paused_batch_is_neither_claimed_nor_nudged_for(store: Store) -> None:
+    batch = _take(store, hand_in("ada"), hand_in("bob"))
+    running = jobs.claim(store, "worker", 60)
+    assert running is not None
+    assert batch_control.pause(store, batch) == batch_control.Controlled(True, 1, 1)
+    assert batch_control.pause(store, batch).changed is False
+    assert jobs.claim(store, "worker", 60) is None
+    assert Lane.BATCH not in wanting_nudges(store, 60)
+    jobs.heartbeat(store, running, 60, 0.5)
+    assert batch_control.resume(store, batch) == batch_control.Controlled(True, 1, 1)
+    assert wanting_nudges(store, 60)[Lane.BATCH].stale == 1
+    assert jobs.claim(store, "worker", 60) is not None
+
+
+def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
+    batch = _take(store, hand_in("ada"), hand_in("bob"), hand_in("eve"))
+    dead = _die(store)
+    running = jobs.claim(store, "worker", 60)
+    assert running is not None
+    assert batch_control.cancel(store, batch) == batch_control.Controlled(True, 1, 1)
+    assert batch_control.cancel(store, batch).changed is False
+    with pytest.raises(jobs.Fenced, match="cancelled"):
+        jobs.heartbeat(store, running, 60, 0.5)
+    for change in (batch_control.pause, batch_control.resume, batch_control.retry):
+        with pytest.raises(UsageError, match="was cancelled; hand it in again"):
+            change(store, batch)
+    assert batch_control.retry(store, None) == batch_control.Retried(0, 0)
+    with store.reading() as session:
+        line = batches.batch(session, batch)
+        assert session.get_one(Job, dead).state is JobState.DEAD
+    assert (line.state, line.states) == (BatchState.CANCELLED, {JobState.DEAD: 1, JobState.CANCELLED: 2})
+
+
+def test_cancelling_what_has_ended_changes_nothing(store: Store) -> None:
+    batch = _take(store, hand_in("ada"))
+    _die(store)
+    assert batch_control.cancel(store, batch).changed is False
+    assert batch_control.retry(store, batch) == batch_control.Retried(1, 0)
+
+
+def test_the_dead_are_tried_again_with_all_their_attempts_but_not_the_outdated(store: Store) -> None:
+    batch = _take(store, hand_in("ada"), hand_in("bob"))
+    dead = {_die(store), _die(store)}
+    other = _take(store, hand_in("bob", OTHER))
+    _die(store)
+    assert batch_control.retry(store, batch) == batch_control.Retried(1, 1)
+    assert batch_control.retry(store, None) == batch_control.Retried(1, 1)
+    assert _states(store) == [(1, JobState.QUEUED), (1, JobState.DEAD), (2, JobState.QUEUED)]
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    with store.reading() as session:
+        job = session.get_one(Job, claim.job_id)
+        assert (job.attempt, job.error, job.finished_at) == (1, None, None)
+        assert job.id in dead or job.batch_id == other
+
+
+def test_what_a_former_release_superseded_is_cancelled(store: Store) -> None:
+    from alembic import command
+
+    from service.store.migrate import configuration
+
+    job_id = accept_batch(store, "class", [hand_in("ada")], [], max_attempts=2).jobs[0].job_id
+    with store.engine.begin() as connection:
+        connection.execute(text("UPDATE job SET state = 'superseded'"))
+        connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+        command.upgrade(configuration(connection), "head")
+    with store.reading() as session:
+        assert session.get_one(Job, job_id).state is JobState.CANCELLED
