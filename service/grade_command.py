@@ -16,7 +16,6 @@ from responders.sandbox.manager import FULL, NONE
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.rig import Rig
-from service.reports.audience import student_view
 from service.reports.gradescope import gradescope_text
 from service.reports.json_output import json_text
 from service.reports.junit import junit_text
@@ -51,7 +50,7 @@ _PRINT: Mapping[Format, Callable[[Grade], None]] = MappingProxyType(
     {
         Format.TEXT: _text,
         Format.JSON: lambda grade: print(json_text(grade)),
-        Format.GRADESCOPE: lambda grade: print(gradescope_text(student_view(grade))),
+        Format.GRADESCOPE: lambda grade: print(gradescope_text(grade)),
         Format.JUNIT: lambda grade: print(junit_text(grade)),
     }
 )

@@ -70,7 +70,7 @@ def run(
     picture: Annotated[Path | None, typer.Option(help="Draw the path over the floor, as PNG.")] = None,
 ) -> None:
     """Run a robot program in the simulator, set up by the flags of %sim_magic; print what it says."""
-    flags, text = split_program(_source(program))
+    flags, text = _program(program)
     values = {
         "b": background,
         "r": robot_setup,
@@ -107,6 +107,14 @@ def run(
         _write(trace_file, json.dumps(trace(recording)).encode())
     if picture is not None:
         _write(picture, _drawn(recording, program.name, chosen, seed))
+
+
+def _program(path: Path) -> tuple[Flags, str]:
+    text = _source(path)
+    try:
+        return split_program(text)
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from None
 
 
 def _source(path: Path) -> str:

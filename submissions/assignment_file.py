@@ -66,9 +66,9 @@ def read_assignment(folder: Path) -> Assignment:
     where = f"{folder.name}/{FILE_NAME}"
     if not folder.is_dir():
         raise AssignmentProblems((f"{folder}: is not there, expected a folder with {FILE_NAME} in it",))
-    files = _folder_files(folder)
-    if FILE_NAME not in files:
+    if not (folder / FILE_NAME).is_file():
         raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
+    files = _folder_files(folder)
     text, document = _parse(files[FILE_NAME], where)
     problems = Problems(where, find_lines(text))
     assignment = build_assignment(document, files, problems)

@@ -97,28 +97,51 @@ class Setup:
 
 
 def split_program(text: str) -> tuple[Flags, str]:
-    """The flags of a program's first line and the program, line numbers kept; the preloaded preamble if it has none."""
-    first, newline, rest = text.partition("\n")
-    line = first.lstrip("\ufeff").strip()
-    if not line.startswith("%"):
+    """The flags of a program's magic line and ``without_magic``; the preloaded preamble if it has none.
+
+    Raises UsageError for a magic or a flag that does not exist.
+    """
+    place = _magic_place(text)
+    if place is None:
         return Flags(), text
-    # The line stays as a comment, so that every other line keeps its number.
-    return parse_magic(line), "#" + newline + rest
+    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), without_magic(text)
 
 
-def parse_magic(line: str) -> Flags:
-    """The flags of a ``%%sim_magic...`` line. Raises UsageError for a magic or a flag that does not exist."""
-    name, _, arguments = line.lstrip("%").partition(" ")
-    if name not in _PREAMBLES:
-        raise UsageError(
-            f"line 1: %{name[:40]} is not a magic that starts a program; expected one of "
-            + ", ".join(f"%%{known}" for known in _PREAMBLES)
-        )
+def without_magic(text: str) -> str:
+    """The program with its magic line as an empty comment, so that every other line keeps its number."""
+    lines = text.split("\n")
+    place = _magic_place(text)
+    if place is not None:
+        lines[place] = "#"
+    return "\n".join(lines)
+
+
+def _magic_place(text: str) -> int | None:
+    """Where the first line is that is neither blank nor a comment, if it is a magic."""
+    for place, line in enumerate(text.split("\n")):
+        stripped = line.lstrip("\ufeff").strip()
+        if stripped and not stripped.startswith("#"):
+            return place if stripped.startswith("%") else None
+    return None
+
+
+def parse_magic(line: str, number: int = 1) -> Flags:
+    """The flags of a ``%%sim_magic...`` line. Raises UsageError, naming line ``number``, for what does not exist."""
+    name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
     try:
-        words = shlex.split(arguments, comments=False)
+        if name not in _PREAMBLES:
+            expected = ", ".join(f"%%{known}" for known in _PREAMBLES)
+            raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}")
+        return _flags(_words(name, "".join(rest)), _PREAMBLES[name])
+    except UsageError as error:
+        raise UsageError(f"line {number}: {error}") from None
+
+
+def _words(name: str, arguments: str) -> list[str]:
+    try:
+        return shlex.split(arguments, comments=False)
     except ValueError as error:
-        raise UsageError(f"line 1: the flags of %%{name} cannot be read: {error}") from None
-    return _flags(words, _PREAMBLES[name])
+        raise UsageError(f"the flags of %%{name} cannot be read: {str(error).lower()}") from None
 
 
 def _flags(words: list[str], preamble: Preamble) -> Flags:
@@ -133,7 +156,7 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
             if long == "previewcode":
                 continue
             if short is None:
-                raise UsageError(f"line 1: there is no flag --{long[:40]}; --help of the course's magic lists them")
+                raise UsageError(f"there is no flag --{long[:40]}; --help of the course's magic lists them")
             if short in _VALUED:
                 values[short] = value if equals else _next(waiting, word)
             else:
@@ -141,7 +164,7 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
         elif word.startswith("-") and len(word) > 1:
             _short_flags(word[1:], waiting, values, switches)
         else:
-            raise UsageError(f"line 1: {word[:40]!r} is not a flag")
+            raise UsageError(f"{word[:40]!r} is not a flag")
     return Flags(preamble, values, frozenset(switches))
 
 
@@ -155,12 +178,12 @@ def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switc
             values[letter] = rest if rest else _next(waiting, f"-{letter}")
             return
         else:
-            raise UsageError(f"line 1: there is no flag -{letter}")
+            raise UsageError(f"there is no flag -{letter}")
 
 
 def _next(waiting: list[str], flag: str) -> str:
     if not waiting:
-        raise UsageError(f"line 1: {flag} needs a value")
+        raise UsageError(f"{flag} needs a value")
     return waiting.pop(0)
 
 

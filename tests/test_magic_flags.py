@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim.errors import UsageError
-from submissions.magics import parse_magic, setup, split_program
+from submissions.magics import Flags, parse_magic, setup, split_program, without_magic
 
 POSES = [
     ("", (200, 800, 0)),
@@ -87,3 +87,29 @@ def test_the_magic_line_keeps_its_place_and_chooses_the_preamble() -> None:
     assert text == "#\nprint(1)\n"
     assert (flags.preamble, flags.values) == ("imports", {"b": "Loop"})
     assert split_program("print(1)")[0].preamble == "preloaded"
+
+
+@pytest.mark.parametrize("before", ["", "\n", "# Ada, 2nd try\n\n", "\ufeff", "\r\n"])
+def test_the_magic_line_may_follow_blank_lines_and_comments(before: str) -> None:
+    flags, text = split_program(f"{before}%%sim_magic_imports\t-b\tLoop\r\nprint(1)\n")
+    assert (flags.preamble, flags.values) == ("imports", {"b": "Loop"})
+    assert "%" not in text
+    assert text.split("\n").index("print(1)") == before.count("\n") + 1
+
+
+def test_a_magic_below_the_first_statement_is_left_for_python_to_refuse() -> None:
+    program = "x = 1\n%%sim_magic -b Loop\n"
+    assert split_program(program) == (Flags(), program)
+
+
+def test_a_refused_line_is_named_by_its_number_and_is_none_of_the_program() -> None:
+    program = "\n%%sim_magic --nope\nprint(1)"
+    with pytest.raises(UsageError, match=r"^line 2: there is no flag --nope"):
+        split_program(program)
+    assert without_magic(program) == "\n#\nprint(1)"
+
+
+@pytest.mark.parametrize("line", ["%", "%%", "%% ", "%%\u00a0"])
+def test_a_magic_without_a_name_is_refused(line: str) -> None:
+    with pytest.raises(UsageError, match=r"^line 1: "):
+        split_program(line)

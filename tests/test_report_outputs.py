@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from dataclasses import replace
 from decimal import Decimal
 from xml.etree import ElementTree
@@ -55,6 +56,11 @@ def test_gradescope_leaves_hiding_to_gradescope_but_tells_nothing_at_the_top() -
     assert "SECRET" not in document["output"]
     assert document["output_format"] == "text"
     json.loads(gradescope_text(build.hostile_grade()))
+
+
+def test_gradescope_names_the_line_of_a_fault() -> None:
+    output = gradescope_document(build.faulty_grade())["output"]
+    assert re.search(r"line \d+: ", output)
 
 
 def test_junit_counts_failures_and_is_well_formed_whatever_was_printed() -> None:

@@ -23,7 +23,7 @@ from sim.errors import UsageError
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
-from submissions.magics import Flags, setup, split_program
+from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.submission import Source, Submission
 
 _MEGABYTE = 1 << 20
@@ -158,8 +158,7 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
         flags, text = split_program(text)
         wanted = setup(flags)
     except UsageError as error:
-        _, _, rest = text.partition("\n")
-        return Flags(), "#\n" + rest, (f"the program's magic line is ignored: {error}",)
+        return Flags(), without_magic(text), (f"the program's magic line is ignored: {error}",)
     world = assignment.world
     notes = []
     if "b" in flags.values and wanted.background != world.background:

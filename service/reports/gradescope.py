@@ -11,6 +11,7 @@ from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
 from service.reports.audience import student_view
+from service.reports.faults import fault_groups
 from service.reports.json_output import json_number
 from service.reports.readable import readable
 from service.reports.verdict_words import verdict_words
@@ -57,6 +58,7 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 def _output(grade: Grade) -> str:
     shown = student_view(grade)
     words = verdict_words(shown.verdict)
-    faults = dict.fromkeys(readable(fault.message, 500) for trial in shown.trials for fault in trial.recording.faults)
-    lines = [words.happened, words.whose, words.next_step, *list(faults)[:10], f"walls: {grade.walls}"]
-    return "\n".join(lines)
+    lines = [words.happened, words.whose, words.next_step]
+    for group in fault_groups(shown, limit=10):
+        lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
+    return "\n".join([*lines, f"walls: {grade.walls}"])

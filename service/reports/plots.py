@@ -126,7 +126,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         yield Plot(
             f"path-{name}", "path", index, scenario, f"{title}: path",
             "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
-            "darts point where it was heading.",
+            "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
             f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
             f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
             f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches.",
