@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
-.PHONY: setup demo test test-all lint bench lock wheel clean
+.PHONY: setup demo test test-long test-all lint bench lock wheel clean
 
 setup: $(VENV)/.ready
 
@@ -27,8 +27,10 @@ demo: setup
 test: setup lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long"
 
-test-all: test
-	$(BIN)/python -m pytest -m long
+test-long: setup
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m long
+
+test-all: test test-long
 
 lint: setup
 	$(BIN)/ruff check .
