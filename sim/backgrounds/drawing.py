@@ -1,15 +1,14 @@
-"""How each floor is drawn: Pillow shapes at fixed picture coordinates (y down, rectangles with both edges).
+"""How the plain floors are drawn: Pillow shapes at fixed picture coordinates (y down, rectangles with both edges).
 
-Only pictures; default poses, labels and obstacles of the floors are in ``floors.py``.
+Only pictures, and not the tracks, digit sheets and competition mats, which have modules of their own;
+default poses, labels and obstacles of the floors are in ``floors.py``.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from bisect import bisect_left
 from collections.abc import Callable
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,16 +198,3 @@ def _radial_channel(quarters: NDArray[np.int64], outer: int, inner: int) -> NDAr
     furthest = range(int(quarters.max()) + 1)
     starts = [bisect_left(furthest, step, key=darkness) for step in range(1, inner - outer + 1)]
     return (inner - np.searchsorted(starts, quarters, side="right")).astype(np.uint8)
-
-
-def line_following_test() -> NDArray[np.uint8]:
-    """Eleven black lines, drawn four times as large and averaged, so that their edges are smooth."""
-    scale = 4
-    text = resources.files(__package__).joinpath("line_following_test.json").read_text(encoding="utf-8")
-    image = Image.new("L", (WIDTH * scale, HEIGHT * scale), 255)
-    canvas = ImageDraw.Draw(image)
-    for line in json.loads(text)["lines"]:
-        points = [(round(x * scale), round(y * scale)) for x, y in line["points"]]
-        canvas.line(points, 0, width=round(line["width"] * scale), joint="curve")
-    level = np.asarray(image.reduce(scale))
-    return np.repeat(level[:, :, None], 3, axis=2)

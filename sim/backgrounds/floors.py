@@ -1,6 +1,7 @@
 """The floors by name: picture, default pose, labels and obstacles, as the course's simulator has them.
 
-The drawing itself is ``drawing.py``; what a flag with an unknown name means is decided where flags are read.
+The drawing itself is in ``drawing.py`` and its neighbours;
+what a flag with an unknown name means is decided where flags are read.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from sim.backgrounds import drawing
+from sim.backgrounds import digits, drawing, mats, tracks
+from sim.backgrounds.testcard import testcard
 from sim.errors import UsageError
 from sim.recording import Pose
 
@@ -84,6 +86,13 @@ class _Plan:
     picture: _Picture
     unlabelled: _Picture | None = None
     labels: tuple[FloorLabel, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _SheetPlan:
+    pose: Pose
+    paper: int
 
 
 def _painted(painter: drawing.Painter, background: drawing.Colour = drawing.WHITE) -> Callable[[], NDArray[np.uint8]]:
@@ -100,7 +109,21 @@ def _shape_labels() -> tuple[FloorLabel, ...]:
     )
 
 
-_PLANS: Mapping[str, _Plan] = MappingProxyType(
+def _digit_labels(shown: tuple[int, ...]) -> tuple[FloorLabel, ...]:
+    """Within 10 mm of where the course stands the left sensor, digit by digit as the sheet gives them."""
+    places = (divmod(place, digits.COLUMNS) for place in range(len(shown)))
+    return tuple(
+        FloorLabel(str(digit), 80.0 + digits.PITCH * column - 10, 1080.0 - digits.PITCH * row - 10, 20.0, 20.0)
+        for digit, (row, column) in zip(shown, places, strict=True)
+    )
+
+
+#: What stands on Obstacles_Test from the start.
+_TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
+    (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
+)
+
+_PLANS: Mapping[str, _Plan | _SheetPlan] = MappingProxyType(
     {
         "Empty_Map": _Plan(Pose(100, 800, 0), _painted(drawing.nothing)),
         "Loop": _Plan(Pose(500, 500, 90), _painted(drawing.loop)),
@@ -113,8 +136,14 @@ _PLANS: Mapping[str, _Plan] = MappingProxyType(
         "Rainbow_bands": _Plan(Pose(100, 800, 0), _painted(drawing.rainbow_bands)),
         "Grey_and_black": _Plan(Pose(400, 700, 90), _painted(drawing.grey_and_black)),
         "Lollipop": _Plan(Pose(750, 375, -180), _painted(drawing.lollipop, drawing.grey(211))),
+        "Testcard": _Plan(Pose(400, 800, 90), testcard),
         "Square": _Plan(Pose(550, 300, -90), _painted(drawing.square)),
-        "Line_Following_Test": _Plan(Pose(141, 125, 90), drawing.line_following_test),
+        "WRO_2019_Regular_Junior": _Plan(Pose(2215, 150, 90), mats.wro_2019_regular_junior),
+        "WRO_2018_Regular_Junior": _Plan(Pose(1181, 150, 90), mats.wro_2018_regular_junior),
+        "FLL_2019_City_Shaper": _Plan(Pose(500, 150, 90), mats.fll_2019_city_shaper),
+        "FLL_2018_Into_Orbit": _Plan(Pose(150, 150, 90), mats.fll_2018_into_orbit),
+        "Line_Following_Test": _Plan(Pose(141, 125, 90), tracks.line_following_test),
+        "Junction_Handling_Test": _Plan(Pose(698, 130, 90), tracks.junction_handling_test),
         "Sensor_Diameter_Test": _Plan(Pose(550, 450, 90), _painted(drawing.sensor_diameter_test)),
         "Simple_Shapes": _Plan(
             Pose(800, 400, 0),
@@ -122,6 +151,10 @@ _PLANS: Mapping[str, _Plan] = MappingProxyType(
             _painted(drawing.simple_shapes),
             _shape_labels(),
         ),
+        "Thruxton_Circuit": _Plan(Pose(457, 242, 120), tracks.thruxton_circuit),
+        "MNIST_Digits": _SheetPlan(Pose(400, 50, 90), paper=255),
+        "MNIST_Digits_Black": _SheetPlan(Pose(400, 50, 90), paper=0),
+        "Obstacles_Test": _Plan(Pose(121, 125, 90), tracks.obstacles_test, obstacles=_TEST_OBSTACLES),
     }
 )
 
@@ -131,17 +164,30 @@ def names() -> tuple[str, ...]:
     return tuple(_PLANS)
 
 
-@functools.cache
-def floor(name: str, *, labels: bool = True) -> Floor:
+def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     """The floor called ``name``; with ``labels=False`` drawn without the grey patches that tell the answer.
 
+    Each ``seed`` gives another digit sheet; on the floors without handwritten digits it changes nothing.
     Raises UsageError for a name that no floor has, and offers the names nearest to it.
     """
-    if name not in _PLANS:
+    plan = _PLANS.get(name)
+    if plan is None:
         raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
-    plan = _PLANS[name]
+    if isinstance(plan, _SheetPlan):
+        return _digit_sheet(name, plan, labels, seed)
+    return _printed(name, plan, labels)
+
+
+@functools.cache
+def _printed(name: str, plan: _Plan, labels: bool) -> Floor:
     draw = plan.picture if labels or plan.unlabelled is None else plan.unlabelled
-    return Floor(name, _read_only(draw()), plan.pose, plan.labels)
+    return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles)
+
+
+@functools.lru_cache(maxsize=8)  # a worker sees ever new seeds, and a picture is 8 MB
+def _digit_sheet(name: str, plan: _SheetPlan, labels: bool, seed: int) -> Floor:
+    sheet = digits.draw_sheet(seed, plan.paper, patches=labels)
+    return Floor(name, _read_only(sheet.picture), plan.pose, _digit_labels(sheet.digits))
 
 
 def floor_from_picture(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
