@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import typer
+from sqlalchemy.exc import DBAPIError
 from typer.exceptions import TyperException
 
 from service.assignment_commands import assignments_app
@@ -68,6 +69,9 @@ def main() -> NoReturn:
     except (BrokenPipeError, SystemExit):
         # Typer itself ends so, and only so, when nobody reads what it prints.
         _end_unread()
+    except DBAPIError as error:
+        _debug()
+        _end(f"the database would not do it: {error.orig}; robomark doctor looks at it", _OURS)
     except OSError as error:
         _debug()
         where = "" if error.filename is None else f"{error.filename}: "

@@ -22,7 +22,12 @@ PREFIX = "ROBOMARK_"
 def default_home() -> Path:
     """The user's data directory, as the XDG base directory specification has it."""
     data = os.environ.get("XDG_DATA_HOME", "")
-    base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
+    try:
+        base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
+    except RuntimeError:
+        raise UsageError(
+            "this user has no home folder: set ROBOMARK_HOME to one where Robomark may keep its data"
+        ) from None
     return base / "robomark"
 
 
@@ -50,7 +55,10 @@ class Settings(BaseSettings):
     @field_validator("home")
     @classmethod
     def _absolute(cls, home: Path) -> Path:
-        return home.expanduser().absolute()
+        try:
+            return home.expanduser().absolute()
+        except RuntimeError:
+            raise ValueError("expected a folder; there is no such user's home") from None
 
     @field_validator("broker_url")
     @classmethod
@@ -65,10 +73,12 @@ class Settings(BaseSettings):
         if not url:
             return url
         try:
-            kind = make_url(url).get_backend_name()
+            parsed = make_url(url)
+            kind = parsed.get_backend_name()
         except ArgumentError as error:
             raise ValueError("expected sqlite:///path or postgresql://user@host/name") from error
-        if kind not in {"sqlite", "postgresql"}:
+        in_memory = kind == "sqlite" and parsed.database in (None, "", ":memory:")
+        if kind not in {"sqlite", "postgresql"} or in_memory:
             raise ValueError("expected sqlite:///path or postgresql://user@host/name")
         return url
 

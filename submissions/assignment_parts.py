@@ -41,6 +41,7 @@ _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "limits", "scenario", "criterion")
 _PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
+_LISTS_OF_TEXTS = {"equals", "starts_with", "contains", "in_order", "to", "to_starts_with", "scenarios", "truth"}
 
 Files = Mapping[str, bytes]
 
@@ -188,6 +189,8 @@ def _criteria(
             problems.add((*place, "check"), f"{said}, expected {listed(SCHEMAS)}{hint}")
             continue
         criterion = _table(SCHEMAS[cast(str, check)], raw, place, problems)
+        for key in _LISTS_OF_TEXTS & {key for key, value in raw.items() if value == []}:
+            problems.add((*place, key), f"{key} is an empty list and asks for nothing, expected at least one text")
         for index, name in enumerate(_texts(raw.get("scenarios"))):
             if name not in scenario_ids:
                 problems.add(
@@ -246,16 +249,19 @@ def _given_parts(parts: PartsTable, files: Files, problems: Problems) -> dict[st
         if name in ("student", "none"):
             continue
         if name not in files or not name.endswith(".py"):
+            none = "" if part == "program" else ', "none"'
             problems.add(
-                ("parts", part), f'{part} is "{name[:60]}", expected "student", "none" or a .py file beside this file'
+                ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
             )
             continue
         try:
             sources[name] = decode_source(files[name], name).text
         except UsageError as error:
             problems.add(("parts", part), str(error).rstrip("."))
-    if parts.program == "none" and parts.responder == "none":
-        problems.add(("parts",), 'both parts are "none", expected a program or a responder')
+    if parts.program == "none":
+        problems.add(
+            ("parts", "program"), 'program is "none", expected "student" or a .py file: a trial runs a program'
+        )
     return sources
 
 

@@ -126,7 +126,17 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
         # JSON is strict about types, and lets a list be a tuple.
         return schema.model_validate_json(json.dumps(table, default=_foreign), strict=True)
     except ValidationError as error:
-        return [_problem(schema, details) for details in error.errors(include_url=False)]
+        found = error.errors(include_url=False)
+        places = [details["loc"] for details in found]
+        return [_problem(schema, details) for details in found if not _follows(details, places)]
+
+
+def _follows(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
+    """Whether a list is called too short only because its entries were refused."""
+    place = details["loc"]
+    return details["type"] == "too_short" and any(
+        len(other) > len(place) and other[: len(place)] == place for other in places
+    )
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -33,6 +33,13 @@ def _one_or_many(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _not_blank(value: Texts) -> Texts:
+    """Refuses a text that is part of every text."""
+    if not all(text.strip() for text in value):
+        raise ValueError("has an empty text in it, which every text contains, expected something to look for")
+    return value
+
+
 class _Criterion(BaseModel):
     """What every criterion has. ``scenarios`` names those it looks at; all, if empty."""
 
@@ -71,6 +78,11 @@ class _TextConditions(_Criterion):
     @classmethod
     def _lists(cls, value: object) -> object:
         return _one_or_many(value)
+
+    @field_validator("starts_with", "contains")
+    @classmethod
+    def _something(cls, value: Texts) -> Texts:
+        return _not_blank(value)
 
     @field_validator("matches")
     @classmethod

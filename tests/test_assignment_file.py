@@ -209,7 +209,7 @@ check = "pose"
         4: '"colour" is not a key here',
         6: 'did you mean "background"?',
         7: 'robot names no robot, expected "Default_Robot"',
-        9: 'program is "robot.py", expected "student", "none" or a .py file beside this file',
+        9: 'program is "robot.py", expected "student" or a .py file beside this file',
         11: 'program_cpu is "2", expected a number',
         17: "poses[2] has too few numbers, expected [x, y, heading]",
         20: 'id "s" is the id of an earlier scenario',
@@ -267,6 +267,10 @@ check = "pose"
             11,
             "needs a responder",
         ),
+        (HEAD + '[parts]\nprogram = "none"\n' + SCENARIO + FINISHES, 4, 'expected "student" or a .py file'),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "prints") + "equals = []\n", 10, "is an empty list"),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "prints") + "in_order = []\n", 10, "is an empty list"),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "says") + 'contains = [""]\n', 10, "empty text"),
         (HEAD + SCENARIO + FINISHES + "\n[world\n", 11, "expected TOML"),
         (HEAD + SCENARIO + FINISHES + 'description = "x', 10, "expected TOML"),
         (HEAD + 'id = "b"\n', 3, "expected TOML"),
@@ -281,6 +285,13 @@ def test_mistake_is_named_with_its_line(tmp_path: Path, text: str, line: int, ph
 def test_criterion_that_asks_for_nothing_is_refused(tmp_path: Path, check: str) -> None:
     found = problems(tmp_path / "bad", HEAD + SCENARIO + FINISHES.replace("finishes", check))
     assert "asks for nothing" in found[0]
+
+
+@pytest.mark.parametrize("poses", ["[1, 2, 3]", '[["a", 2, 3]]', "[[1, 2]]", "[[nan, 2, 3]]"])
+def test_a_list_of_wrong_poses_is_not_called_too_short_as_well(tmp_path: Path, poses: str) -> None:
+    found = problems(tmp_path / "bad", HEAD + f'[[scenario]]\nid = "s"\nposes = {poses}\n' + FINISHES)
+    assert not any("too few entries" in sentence for sentence in found)
+    assert all(sentence.startswith("bad/assignment.toml:5: poses[") for sentence in found), found
 
 
 def test_what_is_no_assignment_is_refused(tmp_path: Path) -> None:

@@ -523,3 +523,17 @@ def test_nine_of_ten_is_at_least_nine_tenths() -> None:
     assert share_of_accuracy(9, 10, 0.9, "share") == 1
     assert share_of_accuracy(8, 10, 0.9, "share") == Fraction(8, 9)
     assert share_of_accuracy(8, 10, 0.9, "all") == 0
+
+
+def test_a_run_of_very_many_messages_is_judged_like_a_short_one() -> None:
+    count = 20_000
+    messages = talk(*[("PY::1", 'JSON::{"message": 1}')] * count)
+    queue = judged(criterion("messages", queue_grows=True), recorded(messages=messages))
+    assert queue.message == f"The robot's queue grew by one for each of {count} messages."
+    answered = judged(criterion("replies", expect={"PY::1": 1}, path="message"), recorded(messages=messages))
+    assert answered.marks == 4
+
+
+@pytest.mark.parametrize(("found", "expected"), [(10**400, 0.5), (-(10**400), 1.0), (float("inf"), 10**400)])
+def test_numbers_beyond_all_fractions_are_compared(found: float, expected: float) -> None:
+    assert not same_value(found, expected)

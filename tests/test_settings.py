@@ -38,6 +38,8 @@ def test_a_child_process_reads_the_same_settings(monkeypatch: pytest.MonkeyPatch
         ("BROKER_URL", "amqp://host", "redis://"),
         ("DATABASE_URL", "mysql://host/name", "postgresql://"),
         ("DATABASE_URL", "somewhere", "sqlite:///path"),
+        ("DATABASE_URL", "sqlite://", "sqlite:///path"),
+        ("HOME", "~no-such-user/data", "expected a folder"),
         ("LOG_LEVEL", "loud", "WARNING"),
     ],
 )
@@ -47,3 +49,11 @@ def test_a_wrong_setting_is_named(monkeypatch: pytest.MonkeyPatch, name: str, va
         load_settings()
     assert str(caught.value).startswith(f"ROBOMARK_{name} is '{value}'")
     assert expected in str(caught.value)
+
+
+def test_a_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.delenv("XDG_DATA_HOME", raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 4_000_000)  # as in a container that runs as nobody in particular
+    with pytest.raises(UsageError, match="set ROBOMARK_HOME"):
+        load_settings()

@@ -6,6 +6,7 @@ Answers are students' texts: whatever they hold, nothing here raises.
 from __future__ import annotations
 
 import json
+from bisect import bisect_left
 from typing import Any
 
 from responders.messages import JSON, parsed_answer
@@ -64,7 +65,10 @@ def same_value(found: Any, expected: Any) -> bool:
     if isinstance(found, bool) or isinstance(expected, bool):
         return found is expected
     if isinstance(found, int | float) and isinstance(expected, int | float):
-        return abs(found - expected) <= 1e-9 * max(1.0, abs(expected))
+        try:
+            return abs(found - expected) <= 1e-9 * max(1.0, abs(expected))
+        except OverflowError:  # a whole number beyond all fractions
+            return found == expected
     if isinstance(found, str) and isinstance(expected, str):
         return found.split() == expected.split()
     if isinstance(found, list) and isinstance(expected, list | tuple):
@@ -74,21 +78,24 @@ def same_value(found: Any, expected: Any) -> bool:
     return found is None and expected is None
 
 
-def silence(recording: Recording, index: int) -> str:
-    """That the message at ``index`` had no answer, and why, where the recording tells."""
-    asked = recording.messages[index].t
-    faults = [fault for fault in recording.faults if fault.who == "responder"]
-    fault = next((fault for fault in faults if fault.t >= asked - 1e-9), faults[-1] if faults else None)
-    return "there was no answer" + (f": {fault_words(fault)}" if fault else "")
+class Answers:
+    """What answered each message of one recording, looked up without a search: a run may hold 100 000 messages."""
 
+    def __init__(self, recording: Recording) -> None:
+        self._messages = recording.messages
+        self._first: dict[int, Message] = {}
+        for message in recording.messages:
+            if message.sender == "responder" and message.note != "duplicated" and message.reply_to is not None:
+                self._first.setdefault(message.reply_to, message)
+        self._faults = sorted((fault for fault in recording.faults if fault.who == "responder"), key=lambda f: f.t)
 
-def reply_to(recording: Recording, index: int) -> Message | None:
-    """The first answer to the message at ``index``, arrived or not; copies that the channel made do not count."""
-    return next(
-        (
-            message
-            for message in recording.messages
-            if message.reply_to == index and message.sender == "responder" and message.note != "duplicated"
-        ),
-        None,
-    )
+    def to(self, index: int) -> Message | None:
+        """The first answer to the message at ``index``, arrived or not; copies that the channel made do not count."""
+        return self._first.get(index)
+
+    def silence(self, index: int) -> str:
+        """That the message at ``index`` had no answer, and why, where the recording tells."""
+        asked = self._messages[index].t
+        place = bisect_left(self._faults, asked - 1e-9, key=lambda fault: fault.t)
+        fault = self._faults[min(place, len(self._faults) - 1)] if self._faults else None
+        return "there was no answer" + (f": {fault_words(fault)}" if fault else "")

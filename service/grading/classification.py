@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from service.grading.answers import NOTHING, as_text, at_path, parsed, reply_to, silence
+from service.grading.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.grade import Accuracy, Evidence, Sight, TrialResult
 from service.grading.outcome import quoted
 from sim.backgrounds import floor, names
-from sim.recording import Image, Line
+from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria import Classification
 
@@ -63,8 +64,9 @@ def classify(
         if not truths[index]:
             truth = _missing_truth(criterion, assignment, trial)
             namings.append(Naming(index, None, finder.canonical(truth), None, "the robot sent no picture"))
+        answers = Answers(trial.recording)
         for image, truth in truths[index]:
-            answer, words = _answer(criterion, trial, image, finder)
+            answer, words = _answer(criterion, trial.recording, answers, image, finder)
             namings.append(Naming(index, image, finder.canonical(truth), answer, words))
     by_index = dict(trials)
     sights = tuple(
@@ -174,18 +176,20 @@ def _labels(criterion: Classification, assignment: Assignment, truths: Iterable[
     return tuple(dict.fromkeys([*on_floor, *listed, *truths, *criterion.aliases]))
 
 
-def _answer(criterion: Classification, trial: TrialResult, image: Image, finder: _Finder) -> tuple[str | None, str]:
+def _answer(
+    criterion: Classification, recording: Recording, answers: Answers, image: Image, finder: _Finder
+) -> tuple[str | None, str]:
     """The label that the answer to a picture names, None if it names none or two; and what happened, in words."""
     if criterion.answer_from == "reply":
-        reply = reply_to(trial.recording, image.message)
+        reply = answers.to(image.message)
         if reply is None:
-            return None, silence(trial.recording, image.message)
+            return None, answers.silence(image.message)
         text = reply.text
         if criterion.answer is not None:
             value = at_path(parsed(text), criterion.answer)
             text = text if value is NOTHING else as_text(value)
     else:
-        heard = _between(trial, image, criterion.answer_from == "speech")
+        heard = _between(recording, image, criterion.answer_from == "speech")
         if not heard:
             said = "said" if criterion.answer_from == "speech" else "printed"
             return None, f"the robot {said} nothing after it"
@@ -198,13 +202,16 @@ def _answer(criterion: Classification, trial: TrialResult, image: Image, finder:
     return found[0], f"it was taken for {quoted(found[0])}"
 
 
-def _between(trial: TrialResult, image: Image, speech: bool) -> list[Line]:
+def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
     """What the robot said or printed after this picture and before the next."""
-    recording = trial.recording
-    later = [other.t for other in recording.images if other.message > image.message]
-    end = min(later, default=math.inf)
+    following = bisect_right(recording.images, image.message, key=lambda other: other.message)
+    end = recording.images[following].t if following < len(recording.images) else math.inf
     lines = recording.spoken if speech else recording.printed
-    return [line for line in lines if image.t <= line.t < end]
+    return lines[bisect_left(lines, image.t, key=_time) : bisect_left(lines, end, key=_time)]
+
+
+def _time(line: Line) -> float:
+    return line.t
 
 
 class _Finder:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from service.grading.answers import NOTHING, as_text, at_path, is_json_answer, parsed, reply_to, same_value, silence
+from service.grading.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
 from service.grading.grade import TrialResult
 from service.grading.outcome import Outcome, failed, listed, passed, pose_at, quoted
 from service.grading.texts import conditions, meets, same_text
@@ -32,9 +32,10 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
             f"Expected the responder to be sent at least {criterion.at_least} of {_messages(criterion)}, but {few}.",
             score=Fraction(0),
         )
+    answers = Answers(recording)
     wrong: list[tuple[Message, str]] = []
     for index, message in asked:
-        mistake = _mistake(criterion, recording, index)
+        mistake = _mistake(criterion, answers, index)
         if mistake:
             wrong.append((message, mistake))
     if not wrong:
@@ -51,6 +52,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
 
 
 def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], recording: Recording) -> Outcome:
+    answers = Answers(recording)
     right = 0
     first: Outcome | None = None
     for text, answer in criterion.expect.items():
@@ -59,7 +61,7 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], record
         if not sent:
             outcome = failed(f"Expected the responder to be sent {quoted(text)}, but it never was.")
         else:
-            mistakes = [_wrong_answer(criterion, recording, index, answer) for index, _ in sent]
+            mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in sent]
             place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
             if place is None:
                 right += 1
@@ -77,11 +79,11 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], record
     return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
 
 
-def _wrong_answer(criterion: Replies, recording: Recording, index: int, answer: object) -> str:
+def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
     """What is wrong with the answer to the message at ``index``; empty if it is the expected one."""
-    reply = reply_to(recording, index)
+    reply = answers.to(index)
     if reply is None:
-        return silence(recording, index)
+        return answers.silence(index)
     if criterion.is_json and not is_json_answer(reply.text):
         return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
     if criterion.path is None:
@@ -97,11 +99,11 @@ def _wrong_answer(criterion: Replies, recording: Recording, index: int, answer: 
     return "" if same else f"it has {quoted(as_text(found))} at {criterion.path}"
 
 
-def _mistake(criterion: Replies, recording: Recording, index: int) -> str:
+def _mistake(criterion: Replies, answers: Answers, index: int) -> str:
     """What is wrong with the answer to the message at ``index``, against the conditions; empty if nothing is."""
-    reply = reply_to(recording, index)
+    reply = answers.to(index)
     if reply is None:
-        return silence(recording, index)
+        return answers.silence(index)
     if criterion.is_json and not is_json_answer(reply.text):
         return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
     text = reply.text

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from responders.messages import JSON, PY
-from service.grading.answers import NOTHING, as_text, at_path, parsed, reply_to
+from service.grading.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.grade import TrialResult
 from service.grading.outcome import Outcome, failed, listed, passed, pose_at, quoted
 from sim.recording import Line, Message, Recording
@@ -211,13 +211,13 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
 
 def _queue(recording: Recording) -> list[Message]:
     """What joined the robot's queue, in order of arrival."""
-    arrived = [
-        message
-        for message in recording.messages
-        if message.sender == "responder" and message.delivered is not None and message.text.startswith(JSON)
-        if message.note != "malformed"
-    ]
-    return sorted(arrived, key=lambda message: message.delivered or 0.0)
+    return sorted(filter(_joined, recording.messages), key=lambda message: message.delivered or 0.0)
+
+
+def _joined(message: Message) -> bool:
+    """Whether it is an answer that joined the robot's queue."""
+    well_formed = message.text.startswith(JSON) and message.note != "malformed"
+    return message.sender == "responder" and message.delivered is not None and well_formed
 
 
 def _queue_grows(recording: Recording) -> Outcome:
@@ -230,16 +230,12 @@ def _queue_grows(recording: Recording) -> Outcome:
     expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
     if not asked:
         return failed(f"{expected}, but the robot sent no PY:: message.")
-    arrivals = [
-        (message, reply.delivered)
-        for index, message in asked
-        if (reply := reply_to(recording, index)) is not None and reply in _queue(recording)
-    ]
+    answers = Answers(recording)
+    replies = [(message, answers.to(index)) for index, message in asked]
+    arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
     score = Fraction(len(arrivals), len(asked))
-    answered = [message for message, _ in arrivals]
-    for index, message in asked:
-        if message not in answered:
-            reply = reply_to(recording, index)
+    for message, reply in replies:
+        if reply is None or not _joined(reply):
             happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
             if reply is not None and reply.delivered is None and reply.note == "undelivered":
                 happened = "got its answer only after the program had ended"
@@ -249,7 +245,7 @@ def _queue_grows(recording: Recording) -> Outcome:
                 pose_at(recording, message.t),
                 score,
             )
-    times = [arrived or 0.0 for _, arrived in arrivals]
+    times = [arrived or 0.0 for arrived in arrivals]
     if times != sorted(times):
         return failed(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
     return passed(

@@ -1,0 +1,91 @@
+"""The command line as people mistype it: one sentence, the right status, and nothing that a terminal would obey."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.cli import main
+from submissions.example_folder import examples
+
+COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
+
+
+def robomark(
+    *arguments: str | Path, out: int = subprocess.PIPE, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        env=os.environ | environment,
+        stdout=out,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("gread", "no such command 'gread'. Did you mean 'grade'"),
+        ("run", "missing argument 'program'"),
+        ("run x.py -Q", "no such option: -Q"),
+        ("run x.py -x", "requires an argument"),
+        ("run x.py --seconds nan", "invalid value for '--seconds'"),
+        ("grade x --format foo", "'foo' is not one of 'text', 'json', 'gradescope', 'junit'"),
+        ("grade nothing-there -a echo-responder", "nothing-there: does not exist"),
+        ("grade x -a /usr", "/usr: has no assignment.toml in it"),
+        ("run \x1b[31mx", "\\x1b[31mx cannot be read"),
+    ],
+)
+def test_what_is_mistyped_gets_one_sentence(
+    line: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["robomark", *line.split(" ")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    shown = capsys.readouterr()
+    assert (ended.value.code, shown.out) == (2, "")
+    assert shown.err.startswith("robomark: ")
+    assert words in shown.err
+    assert shown.err.count("\n") == 1
+    assert "\x1b" not in shown.err
+
+
+def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        ended = robomark("assignments", "list", out=writing)
+    finally:
+        os.close(writing)
+    assert (ended.returncode, ended.stderr) == (130, "")
+
+
+def test_a_full_disk_is_said_in_a_sentence() -> None:
+    with Path("/dev/full").open("w") as full:
+        ended = robomark("assignments", "list", out=full.fileno())
+    assert (ended.returncode, ended.stderr) == (3, "robomark: the machine would not do it: No space left on device\n")
+
+
+def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:
+    program = tmp_path / "robot.py"
+    program.write_text('print("robot \\U0001f916")')
+    ended = robomark("run", program, PYTHONIOENCODING="latin-1")
+    assert r"robot \U0001f916" in ended.stdout
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_title_is_no_markup_and_no_escape(tmp_path: Path) -> None:
+    text = (examples("echo-responder") / "../../catalogue/echo-responder/assignment.toml").resolve().read_text()
+    title = 'title = "Echo what the robot says"'
+    assert title in text
+    (tmp_path / "assignment.toml").write_text(text.replace(title, r'title = "[/] [bold]x \u001b[31m"'))
+    ended = robomark("assignments", "show", tmp_path)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith(r"[/] [bold]x \x1b[31m (echo-responder), 10 marks")
