@@ -25,6 +25,7 @@ from service.queue.embedded import EmbeddedServices
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
 from service.report_files import write_batch
+from service.reports.written import prepare_folder
 from service.settings import Settings, load_settings
 from service.store import batches, intake
 from service.store.batches import BatchLine, JobLine
@@ -91,6 +92,8 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
     UsageError when none could be taken in, HostError when one could not be graded, Cancelled when one was
     cancelled meanwhile.
     """
+    if report is not None:
+        prepare_folder(report)
     settings = load_settings()
     configure_logging(settings.log_level)
     console = Console()

@@ -6,6 +6,7 @@ The commands themselves are in modules of their own, named after them.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 from io import TextIOWrapper
@@ -35,6 +36,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(run)
 app.command()(grade)
@@ -52,6 +54,8 @@ app.command()(demo)
 def main() -> NoReturn:
     """Run the command; 0 when it did what it should, 2 for a mistake of the caller's, 3 when it could not."""
     _prepare_streams()
+    # What a service manager sends is taken like Ctrl-C: children and temporary files are cleared away.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
         ending = app(standalone_mode=False)

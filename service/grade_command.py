@@ -21,7 +21,7 @@ from service.reports.json_output import json_text
 from service.reports.junit import junit_text
 from service.reports.rich_text import rich_report
 from service.reports.text import plain_text
-from service.reports.written import write_report
+from service.reports.written import prepare_folder, write_report
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment
@@ -68,6 +68,8 @@ def grade(
     ] = False,
 ) -> None:
     """Grade hand-ins now; exit status 0 when all were graded, whatever the marks."""
+    if report is not None:
+        prepare_folder(report)
     worst: RobomarkError | None = None
     if unsafe:
         print("robomark: NO WALLS: these hand-ins can read and change everything that you can", file=sys.stderr)

@@ -40,6 +40,11 @@ def robomark(
         ("grade x --format foo", "'foo' is not one of 'text', 'json', 'gradescope', 'junit'"),
         ("grade nothing-there -a echo-responder", "nothing-there: does not exist"),
         ("grade x -a /usr", "/usr: has no assignment.toml in it"),
+        ("grade x -a echo-responder --report /proc/x", "the folder /proc/x cannot be used for reports"),
+        (
+            "batch submit x -a echo-responder --report /dev/null",
+            "/dev/null cannot be used for reports: it is no folder",
+        ),
         ("run \x1b[31mx", "\\x1b[31mx cannot be read"),
     ],
 )
@@ -71,6 +76,16 @@ def test_a_full_disk_is_said_in_a_sentence() -> None:
     with Path("/dev/full").open("w") as full:
         ended = robomark("assignments", "list", out=full.fileno())
     assert (ended.returncode, ended.stderr) == (3, "robomark: the machine would not do it: No space left on device\n")
+
+
+def test_every_flag_of_the_magic_is_taken(tmp_path: Path) -> None:
+    program = tmp_path / "robot.py"
+    program.write_text("print(1)")
+    flags = "-HWZ -a -90 -b Nowhere -N 200 -M 1 -r Small_Robot -o Wall -s roboSim -uCqcOAzXDiRvLSmFp --pencolor red"
+    ended = robomark("run", program, *flags.split(" "))
+    assert ended.returncode == 0
+    assert [line.partition(":")[0] for line in ended.stderr.splitlines()] == ["note"] * 3
+    assert "finished" in ended.stdout
 
 
 def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:

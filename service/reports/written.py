@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from pathlib import Path
 
@@ -16,6 +18,17 @@ def file_name(student: str) -> str:
     """A file name for a student's report: letters, digits, dots and dashes of the name, and nothing else."""
     plain = re.sub(r"[^\w.-]+", "-", student).strip("-._")[:80]
     return f"{plain or 'report'}.html"
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make the folder, before any work is done for it. Raises UsageError when nothing can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        reason = "" if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
+    except OSError as error:
+        reason = "it is no folder" if folder.exists() else str(error.strerror)
+    if reason:
+        raise UsageError(f"the folder {folder} cannot be used for reports: {reason}")
 
 
 def write_page(folder: Path, name: str, page: str) -> Path:
