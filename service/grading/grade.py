@@ -38,6 +38,15 @@ class Sight:
 
 
 @dataclass(frozen=True, slots=True)
+class Measure:
+    """A figure that was measured on the way to a judgement: ``lap time``, 47.3, ``s``."""
+
+    name: str
+    value: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """When and where a criterion was decided, so that a report can point at it."""
 
@@ -46,6 +55,7 @@ class Evidence:
     message: str
     t: float | None = None
     pose: Pose | None = None
+    measures: tuple[Measure, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

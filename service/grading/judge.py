@@ -74,7 +74,7 @@ def _judge_one(criterion: Criterion, assignment: Assignment, trials: Sequence[Tr
         message=_summary(own, outcomes),
         visibility=criterion.visibility,
         evidence=tuple(
-            Evidence(index, outcome.passed, outcome.message, outcome.t, outcome.pose)
+            Evidence(index, outcome.passed, outcome.message, outcome.t, outcome.pose, outcome.measures)
             for (index, _), outcome in zip(own, outcomes, strict=True)
         ),
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from service.grading.grade import Measure
 from sim.recording import Fault, Pose, Recording, Verdict
 
 _LONGEST_QUOTE = 80
@@ -23,15 +24,24 @@ class Outcome:
     message: str
     t: float | None = None
     pose: Pose | None = None
+    measures: tuple[Measure, ...] = ()
 
 
-def passed(message: str, t: float | None = None, pose: Pose | None = None) -> Outcome:
-    return Outcome(True, Fraction(1), message, t, pose)
+def passed(
+    message: str, t: float | None = None, pose: Pose | None = None, measures: tuple[Measure, ...] = ()
+) -> Outcome:
+    return Outcome(True, Fraction(1), message, t, pose, measures)
 
 
-def failed(message: str, t: float | None = None, pose: Pose | None = None, score: Fraction = Fraction(0)) -> Outcome:
+def failed(
+    message: str,
+    t: float | None = None,
+    pose: Pose | None = None,
+    score: Fraction = Fraction(0),
+    measures: tuple[Measure, ...] = (),
+) -> Outcome:
     """``score`` is kept below 1: everything may have been there, and yet in the wrong order."""
-    return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose)
+    return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose, measures)
 
 
 def quoted(text: str) -> str:

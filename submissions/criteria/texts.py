@@ -1,71 +1,22 @@
-"""What can be marked without code: one schema for each kind of criterion, told apart by ``check``.
+"""Criteria about what is printed, said, sent and answered.
 
-Judging is the service's (``service/grading``); this only says what is asked, and refuses what cannot be
-asked.
-
-Every criterion is judged once a trial. A trial passes or fails, and has a score between 0 and 1: the part
-of what was asked that was reached (3 of 5 lines in order, 2 of 3 messages answered), 1 exactly when it
-passes. ``over`` turns the trials into marks: ``share`` is the share of trials that pass, ``all`` is
-everything or nothing, ``mean``, ``median`` and ``worst`` are taken over the scores. Marks are rounded half
-up, once, to two places.
-
-Texts are compared without regard to spaces at the ends and to the length of runs of spaces.
+Only what is asked; judging texts is the service's.
 """
 
 from __future__ import annotations
 
 import re
-from decimal import Decimal
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
 
 #: Longest text of a student's that a pattern is tried on; a pattern that backtracks must not hold a worker.
 LONGEST_MATCHED_TEXT = 1000
 
-Texts = tuple[str, ...]
 
-
-def _one_or_many(value: object) -> object:
-    """A single text stands for a list of one."""
-    if isinstance(value, str):
-        return (value,)
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _not_blank(value: Texts) -> Texts:
-    """Refuses a text that is part of every text."""
-    if not all(text.strip() for text in value):
-        raise ValueError("has an empty text in it, which every text contains, expected something to look for")
-    return value
-
-
-class _Criterion(BaseModel):
-    """What every criterion has. ``scenarios`` names those it looks at; all, if empty."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # from the title, if not given
-    title: str = Field(min_length=1, max_length=200)
-    marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
-    scenarios: tuple[str, ...] = ()
-    #: how the trials become marks
-    over: Literal["share", "all", "mean", "median", "worst"] = "share"
-    visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
-
-
-class Finishes(_Criterion):
-    """The program ends by itself, without a fault of its own, within ``seconds`` if given.
-
-    A responder that raises or answers badly does not make the program fail; running out of time, CPU or
-    memory does.
-    """
-
-    check: Literal["finishes"]
-    seconds: float | None = Field(default=None, gt=0)
-
-
-class _TextConditions(_Criterion):
+class _TextConditions(CriterionBase):
     """Which texts count. A text counts if every condition that is given holds for it."""
 
     equals: Texts = ()  # the text is one of these
@@ -77,12 +28,12 @@ class _TextConditions(_Criterion):
     @field_validator("equals", "starts_with", "contains", mode="before")
     @classmethod
     def _lists(cls, value: object) -> object:
-        return _one_or_many(value)
+        return one_or_many(value)
 
     @field_validator("starts_with", "contains")
     @classmethod
     def _something(cls, value: Texts) -> Texts:
-        return _not_blank(value)
+        return not_blank(value)
 
     @field_validator("matches")
     @classmethod
@@ -213,7 +164,7 @@ class Replies(_TextConditions):
     @field_validator("to", "to_starts_with", mode="before")
     @classmethod
     def _to_lists(cls, value: object) -> object:
-        return _one_or_many(value)
+        return one_or_many(value)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -224,92 +175,3 @@ class Replies(_TextConditions):
         if self.path is None and any(not isinstance(answer, str) for answer in self.expect.values()):
             raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
         return self
-
-
-class Classification(_Criterion):
-    """How often the pictures that the robot sends are named rightly; all trials are pooled.
-
-    ``truth`` is ``"label"`` (what the floor has under the left sensor when the picture was taken) or a
-    list, one label for each pose of the scenario. The answer is looked for in the reply to the picture, at
-    ``answer`` in its JSON if there is such a place, else in the reply's text; with ``answer_from`` in what
-    the robot said or printed between this picture and the next. Case, hyphens and ``aliases`` (label to
-    other names for it) do not matter; an answer that names two different labels is wrong. ``pictures`` says
-    which of a trial's pictures count. A trial without a picture counts as one wrong answer, so that staying
-    silent never helps.
-
-    Marks: without ``at_least`` the marks times the accuracy. With it, all marks from that accuracy on, and
-    ``marks x accuracy / at_least`` below. ``over = "all"``: all marks from ``at_least`` (1 if not given)
-    on, else none.
-    """
-
-    check: Literal["classification"]
-    truth: Literal["label"] | tuple[str, ...] = "label"
-    answer: str | None = Field(default=None, min_length=1)
-    answer_from: Literal["reply", "speech", "print"] = "reply"
-    labels: tuple[str, ...] = ()  # all that could be named; without it those that the floor and the truths have
-    aliases: dict[str, Texts] = Field(default_factory=dict)
-    pictures: Literal["all", "first", "last"] = "all"
-    at_least: float | None = Field(default=None, gt=0, le=1)
-
-    @field_validator("truth", mode="plain")
-    @classmethod
-    def _label_or_list(cls, value: object) -> object:
-        if value == "label":
-            return value
-        if isinstance(value, list | tuple) and value and all(isinstance(label, str) and label for label in value):
-            return tuple(value)
-        raise ValueError('is neither "label" nor a list of labels, expected "label" or one label for each pose')
-
-    @field_validator("aliases", mode="before")
-    @classmethod
-    def _alias_lists(cls, value: object) -> object:
-        return {key: _one_or_many(names) for key, names in value.items()} if isinstance(value, dict) else value
-
-    @field_validator("over")
-    @classmethod
-    def _pooled(cls, value: str, info: ValidationInfo) -> str:
-        if value not in ("share", "all"):
-            raise ValueError('is for criteria judged trial by trial, expected "share" or "all"')
-        return value
-
-
-class EndPose(_Criterion):
-    """Where the robot is at the end: near a point, at a heading, or in a zone; all that is given must hold.
-
-    ``tolerance`` is in mm from (x, y), ``heading_tolerance`` in degrees, full turns ignored; ``zone`` is
-    [left, bottom, right, top] in mm and is about the middle of the axle.
-    """
-
-    check: Literal["pose"]
-    x: float | None = None
-    y: float | None = None
-    tolerance: float = Field(default=20.0, ge=0)
-    heading: float | None = None
-    heading_tolerance: float = Field(default=5.0, ge=0, le=180)
-    zone: tuple[float, float, float, float] | None = None
-
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
-        if (self.x is None) != (self.y is None):
-            raise ValueError("has one of x and y, expected both")
-        if self.x is None and self.heading is None and self.zone is None:
-            raise ValueError("asks for nothing, expected x and y, heading or zone")
-        if self.zone is not None and not (self.zone[0] < self.zone[2] and self.zone[1] < self.zone[3]):
-            raise ValueError("has an empty zone, expected [left, bottom, right, top]")
-        return self
-
-
-Criterion = Annotated[
-    Finishes | Prints | Says | Messages | Replies | Classification | EndPose, Field(discriminator="check")
-]
-
-#: The schema for each value of ``check``.
-SCHEMAS: dict[str, type[_Criterion]] = {
-    "finishes": Finishes,
-    "prints": Prints,
-    "says": Says,
-    "messages": Messages,
-    "replies": Replies,
-    "classification": Classification,
-    "pose": EndPose,
-}
