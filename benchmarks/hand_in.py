@@ -40,7 +40,7 @@ def _once(store: Store, nudger: Nudger, student: str) -> tuple[float, float]:
     """Seconds until the marks are committed, and until the plots are."""
     assignment = find_assignment(_ASSIGNMENT)
     start = time.perf_counter()
-    submission = read_submission(examples(_ASSIGNMENT) / "good", student=student, asked=assignment.parts)
+    submission = read_submission(examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
     job = intake.accept(store, intake.HandIn(submission, assignment, student), max_attempts=3).job_id
     nudger.grade(Lane.INTERACTIVE)
     marks = None

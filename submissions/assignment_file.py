@@ -21,6 +21,8 @@ from submissions.problems import Problems
 from submissions.toml_lines import find_lines
 
 FILE_NAME = "assignment.toml"
+#: What lies in an assignment's folder beside what it is marked by: it may change without changing a mark.
+_ASIDE = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
@@ -47,15 +49,23 @@ def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
 
     Raises UsageError if there is neither, AssignmentProblems for an assignment that cannot be used.
     """
+    return read_assignment(assignment_folder(name_or_path))
+
+
+def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
+    """The folder of the assignment with this id in the catalogue, or this folder itself.
+
+    Raises UsageError if there is neither.
+    """
     name = os.fspath(name_or_path)
     ids = catalogue()
     if name in ids:
-        return read_assignment(_catalogue_folder() / name)
+        return _catalogue_folder() / name
     path = Path(name)
     if path.name == FILE_NAME and path.is_file():
         path = path.parent
     if path.is_dir():
-        return read_assignment(path)
+        return path
     hint = did_you_mean(name, ids) or f"; the catalogue has {', '.join(ids)}"
     raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}.")
 
@@ -108,12 +118,13 @@ def _syntax_problem(message: str, where: str, text: str) -> str:
 
 
 def _folder_files(folder: Path) -> Mapping[str, bytes]:
-    """Everything in the folder by its path within it, but for dot files and what Python leaves behind."""
+    """What the assignment is marked by, by its path in the folder; dot files and what Python leaves are left out."""
     files: dict[str, bytes] = {}
     size = 0
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
-        if any(part.startswith(".") or part == "__pycache__" for part in parts) or not path.is_file():
+        hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
+        if hidden or parts[0] in _ASIDE or not path.is_file():
             continue
         size += path.stat().st_size
         if size > _MAX_FOLDER_BYTES:

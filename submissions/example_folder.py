@@ -1,20 +1,79 @@
-"""Where the example hand-ins lie that come with Robomark.
+"""The example hand-ins beside an assignment, and what each is expected to get: ``examples/`` and ``expected.toml``.
 
 They are hand-ins like any other: nothing here reads or grades them.
 """
 
 from __future__ import annotations
 
-from importlib import resources
+import tomllib
+from decimal import Decimal
 from pathlib import Path
+from typing import Annotated
 
-from sim.errors import UsageError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from sim.errors import AssignmentError, UsageError
+from submissions.assignment_file import assignment_folder
+
+EXAMPLES = "examples"
+EXPECTED = "expected.toml"
+#: The example that must get full marks.
+REFERENCE = "reference"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Expectation(_Table):
+    """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks."""
+
+    marks: Annotated[Decimal, BeforeValidator(str)]
+    verdict: str = "finished"
+    loses: tuple[str, ...] | None = None
+    feedback: tuple[str, ...] = ()  # each must be in what the student is told
+
+
+class OriginalFigure(_Table):
+    """What a program reached in the original simulator, beside the reference's measure of that name."""
+
+    measure: str
+    value: float
+    within: float = Field(default=0.01, ge=0)  # of the value
+    explained: str = ""  # why ours may be further away
+
+
+class Expected(_Table):
+    """The file ``expected.toml``: a table for each example, and the original's figures."""
+
+    examples: dict[str, Expectation]
+    original: tuple[OriginalFigure, ...] = ()
 
 
 def examples(assignment: str) -> Path:
     """The folder with the example hand-ins of an assignment. Raises UsageError if there are none."""
-    root = Path(str(resources.files("submissions"))) / "examples"
-    folders = sorted(folder.name for folder in root.iterdir() if folder.is_dir())
-    if assignment not in folders:
-        raise UsageError(f"There are no examples for {assignment!r}, expected one of {', '.join(folders)}.")
-    return root / assignment
+    folder = assignment_folder(assignment) / EXAMPLES
+    if not folder.is_dir():
+        raise UsageError(f"There are no examples for {assignment!r}, expected the folder {folder}.")
+    return folder
+
+
+def expected(assignment: str) -> Expected:
+    """What the examples of an assignment must get; empty without the file.
+
+    Raises AssignmentError where the file cannot be used.
+    """
+    path = assignment_folder(assignment) / EXPECTED
+    if not path.is_file():
+        return Expected(examples={})
+    where = f"{path.parent.name}/{path.name}"
+    try:
+        document = tomllib.loads(path.read_text("utf-8-sig"))
+        original = document.pop("original", [])
+        return Expected.model_validate({"examples": document, "original": original})
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AssignmentError(f"{where}: {error}, expected TOML") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise AssignmentError(f"{where}: {place}: {first['msg']}") from error

@@ -45,7 +45,7 @@ def robomark(home: Path, *arguments: str | Path, **environment: str) -> Ended:
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]:
     """A home after a batch of two good hand-ins and a bad row; what the command said, and the reports' folder."""
     folder = tmp_path_factory.mktemp("batch") / "class"
-    for name in ("good", "flawed"):
+    for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
     (folder / "[red]odd.txt").write_text("x")
     home = tmp_path_factory.mktemp("home")
@@ -65,12 +65,12 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert ended.status == 2
     assert "1 of the hand-ins could not be taken in" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
-    assert re.search(r"^good +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
-    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "good.html", "index.html"]
-    assert "data:image/png;base64," in (reports / "good.html").read_text()
+    assert re.search(r"^reference +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
+    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "index.html", "reference.html"]
+    assert "data:image/png;base64," in (reports / "reference.html").read_text()
     assert f"report: {reports / 'index.html'}" in ended.out
     index = (reports / "index.html").read_text()
-    assert 'href="good.html"' in index
+    assert 'href="reference.html"' in index
     assert "[red]odd.txt" in index
     assert not (home / "run" / "valkey.sock").exists()
 
@@ -84,14 +84,14 @@ def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
     assert "[red]odd.txt" in status.out
     assert batch in robomark(home, "batch", "list").out
     rows = list(csv.DictReader(io.StringIO(robomark(home, "batch", "export", batch).out)))
-    assert {row["student"]: row["verdict"] for row in rows} == {"good": "finished", "flawed": "finished"}
+    assert {row["student"]: row["verdict"] for row in rows} == {"reference": "finished", "flawed": "finished"}
     exported = json.loads(robomark(home, "batch", "export", batch, "--format", "json").out)
-    assert {row["student"]: row["marks"] for row in exported}["good"] == 10
+    assert {row["student"]: row["marks"] for row in exported}["reference"] == 10
 
 
 def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
     home, ended, _ = graded
-    found = re.search(r"^good .* (\w{12})$", ended.out, re.MULTILINE)
+    found = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
     assert found is not None
     shown = robomark(home, "show", found[1], "--report", tmp_path / "out")
     assert shown.status == 0
@@ -99,7 +99,7 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     pictures = sorted((tmp_path / "out").glob("*.png"))
     assert pictures
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
-    assert (tmp_path / "out" / "good.html").exists()
+    assert (tmp_path / "out" / "reference.html").exists()
 
 
 def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: 
 
 def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
     own = tmp_path / "class" / "spinner"
-    shutil.copytree(examples("echo-responder") / "good", own)
+    shutil.copytree(examples("echo-responder") / "reference", own)
     (own / "robot.py").write_text("while True:\n    pass\n")
     home = tmp_path / "home"
     command = [sys.executable, "-c", "from service.cli import main; main()"]

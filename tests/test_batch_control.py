@@ -32,10 +32,10 @@ SPIN = "while True:\n    pass\n"
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]:
     """A home after a roster of two good rows and a bad one; the roster; what the command said."""
     folder = tmp_path_factory.mktemp("class")
-    for name in ("good", "flawed"):
+    for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
     roster = folder / "roster.csv"
-    roster.write_text("student;file\n=1/2 🤖;good\nbob;flawed\neve;nowhere.zip\n", encoding="utf-8-sig")
+    roster.write_text("student;file\n=1/2 🤖;reference\nbob;flawed\neve;nowhere.zip\n", encoding="utf-8-sig")
     home = tmp_path_factory.mktemp("home")
     return home, roster, robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.cli import main
-from submissions.example_folder import examples
+from submissions.assignment_file import assignment_folder
 
 COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 
@@ -97,7 +97,7 @@ def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:
 
 
 def test_a_title_is_no_markup_and_no_escape(tmp_path: Path) -> None:
-    text = (examples("echo-responder") / "../../catalogue/echo-responder/assignment.toml").resolve().read_text()
+    text = (assignment_folder("echo-responder") / "assignment.toml").read_text()
     title = 'title = "Echo what the robot says"'
     assert title in text
     (tmp_path / "assignment.toml").write_text(text.replace(title, r'title = "[/] [bold]x \u001b[31m"'))

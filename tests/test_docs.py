@@ -16,9 +16,10 @@ import pytest
 from service.settings import Settings
 from submissions.assignment_file import find_assignment
 from submissions.criteria import SCHEMAS
+from submissions.example_folder import examples
 
 ROOT = Path(__file__).parents[1]
-EXAMPLE = ROOT / "submissions" / "examples" / "shape-recognition" / "good"
+EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,9 @@ from service.grading.rig import Rig
 from sim.errors import UsageError
 from submissions.assignment_file import catalogue, find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
-from submissions.example_folder import examples
+from submissions.example_folder import REFERENCE, Expectation, examples, expected
 
 TESTS = Path(__file__).parent
-EXPECTED = TESTS / "expected"
 HANDINS = TESTS / "handins"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((HANDINS / "expected.toml").read_text())
 EXAMPLES = [(name, folder.name) for name in catalogue() for folder in sorted(examples(name).iterdir())]
@@ -30,39 +28,40 @@ def graded(folder: Path, assignment: str, rig: Rig) -> Grade:
     return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
 
 
-def assert_as_expected(result: Grade, expected: Mapping[str, Any]) -> None:
+def assert_as_expected(result: Grade, wanted: Expectation) -> None:
     told = "\n".join(criterion.message for criterion in result.criteria)
-    assert (str(result.verdict), result.marks) == (expected["verdict"], Decimal(expected["marks"])), told
-    for phrase in expected["feedback"]:
+    assert (str(result.verdict), result.marks) == (wanted.verdict, wanted.marks), told
+    for phrase in wanted.feedback:
         assert phrase in told
+    if wanted.loses is not None:
+        lost = {criterion.id for criterion in result.criteria if criterion.marks < criterion.max_marks}
+        assert lost == set(wanted.loses), told
 
 
 @pytest.mark.parametrize(("assignment", "name"), EXAMPLES)
 def test_example_is_marked_as_expected(assignment: str, name: str, rig: Rig) -> None:
-    expected = tomllib.loads((EXPECTED / assignment / f"{name}.toml").read_text())
-    assert_as_expected(graded(examples(assignment) / name, assignment, rig), expected)
+    assert_as_expected(graded(examples(assignment) / name, assignment, rig), expected(assignment).examples[name])
 
 
-def test_every_expectation_has_an_example() -> None:
-    expected = {(path.parent.name, path.stem) for path in EXPECTED.glob("*/*.toml")}
-    assert expected == set(EXAMPLES)
-
-
-def test_every_assignment_has_good_flawed_broken_and_endless_examples() -> None:
+def test_every_assignment_has_a_reference_with_full_marks_and_a_wrong_solution() -> None:
     for assignment in catalogue():
         names = {folder.name for folder in examples(assignment).iterdir()}
-        assert {"seed", "good", "flawed", "broken", "endless"} <= names
+        known = expected(assignment).examples
+        assert known.keys() == names
+        full = find_assignment(assignment).max_marks
+        assert known[REFERENCE].marks == full
+        assert any(each.marks < full for each in known.values())
 
 
 @pytest.mark.parametrize("name", sorted(FAILING))
 def test_failing_hand_in_gets_a_verdict_or_one_sentence(name: str, rig: Rig) -> None:
-    expected = FAILING[name]
-    if "refused" in expected:
+    wanted = FAILING[name]
+    if "refused" in wanted:
         with pytest.raises(UsageError) as refusal:
             graded(HANDINS / name, "echo-responder", rig)
-        assert str(refusal.value) == expected["refused"]
+        assert str(refusal.value) == wanted["refused"]
     else:
-        assert_as_expected(graded(HANDINS / name, "echo-responder", rig), expected)
+        assert_as_expected(graded(HANDINS / name, "echo-responder", rig), Expectation(**wanted))
 
 
 def test_every_failing_hand_in_has_an_expectation() -> None:

@@ -15,6 +15,7 @@ from running import run_program
 from service.grading.rig import Rig
 from sim.recording import Pose, Verdict
 from sim.world import Noise
+from submissions.example_folder import examples
 
 FOLLOWER = """
 while True:
@@ -30,7 +31,7 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
-RESPONDER = Path(__file__).parents[1] / "submissions" / "examples" / "shape-recognition" / "seed" / "responder.py"
+RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
 def chain(name: str, rig: Rig) -> str:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from models import weights_bytes
 from running import run_program
 from service.grading.rig import Rig
 from sim.recording import Pose, Recording, Verdict
+from submissions.example_folder import examples
 from submissions.magics import setup, split_program
 
-EXAMPLES = Path(__file__).parents[1] / "submissions" / "examples"
 NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
 SHAPES = (
     "square",
@@ -25,7 +23,7 @@ SHAPES = (
 
 
 def play(rig: Rig, name: str, start: Pose | None = None) -> Recording:
-    hand_in = EXAMPLES / name / "seed"
+    hand_in = examples(name) / "seed"
     flags, text = split_program((hand_in / "robot.py").read_text())
     chosen = setup(flags)
     return run_program(

@@ -1,0 +1,102 @@
+"""A marked digit sheet: the same for everybody, or a new one each trial, and drawn in reports as it lay there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.reports.plots import draw_all
+from service.store.recordings import from_bytes, to_bytes
+from sim.backgrounds import floor, label_names
+from sim.recording import SENSOR_SIDE, Image
+from submissions.assignment import Assignment
+from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.submission import Source, Submission
+
+ASSIGNMENT = """
+id = "digits"
+title = "Digits"
+[world]
+background = "MNIST_Digits"
+labels = {labels}
+sheet = {sheet}
+[parts]
+responder = "responder.py"
+[[scenario]]
+id = "two"
+poses = [[400, 50, 90]]
+trials = 2
+seconds = 5
+[[criterion]]
+title = "Reads the digit"
+marks = 1
+check = "classification"
+truth = "label"
+"""
+LOOK = Submission("ada", Source("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
+
+
+def assignment(folder: Path, sheet: str, labels: str = "false") -> Assignment:
+    (folder / "assignment.toml").write_text(ASSIGNMENT.format(sheet=sheet, labels=labels))
+    (folder / "responder.py").write_text('def responder(msg):\n    return "7"\n')
+    return read_assignment(folder)
+
+
+def graded(folder: Path, sheet: str, rig: Rig, labels: str = "false") -> Grade:
+    return grade(LOOK, assignment(folder, sheet, labels), rig=rig)
+
+
+def shown(image: Image) -> bytes:
+    """The 14 x 14 grey levels in the middle of the left sensor's picture."""
+    rgba = np.frombuffer(image.left, np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 4)
+    return rgba[3:17, 3:17, 0].tobytes()
+
+
+def on_sheet(seed: int) -> bytes:
+    """The digit that the robot at (400, 50, 90) has under its left sensor on sheet ``seed``."""
+    return floor("MNIST_Digits", seed=seed).picture[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
+
+
+@pytest.mark.parametrize(("sheet", "seed"), [('"fixed"', 0), ("7", 7)])
+def test_every_trial_has_the_same_sheet(tmp_path: Path, rig: Rig, sheet: str, seed: int) -> None:
+    images = [trial.recording.images[0] for trial in graded(tmp_path, sheet, rig).trials]
+    assert {shown(image) for image in images} == {on_sheet(seed)}
+
+
+def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path, rig: Rig) -> None:
+    result = graded(tmp_path, '"per-seed"', rig)
+    for trial in result.trials:
+        image = trial.recording.images[0]
+        assert shown(image) == on_sheet(trial.seed)
+        ground = floor("MNIST_Digits", seed=trial.seed)
+        assert image.truth == ground.label_at(380, 80)
+    assert len({shown(trial.recording.images[0]) for trial in result.trials}) == 2
+    assert result.accuracy is not None
+    assert result.accuracy.labels == label_names("MNIST_Digits") == tuple("0123456789")
+
+
+def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(tmp_path: Path, rig: Rig) -> None:
+    bare = graded(tmp_path, '"per-seed"', rig)
+    recording = bare.trials[0].recording
+    assert (recording.sheet, recording.patches) == (bare.trials[0].seed, False)
+    assert from_bytes(to_bytes(recording)).sheet == recording.sheet
+    path = next(name for name in draw_all(bare) if name.startswith("path"))
+    pictures = {draw_all(bare)[path]}
+    for change in ({"sheet": 0}, {"patches": True}):
+        other = tuple(replace(trial, recording=replace(trial.recording, **change)) for trial in bare.trials)
+        pictures.add(draw_all(replace(bare, trials=other))[path])
+    assert len(pictures) == 3
+
+
+@pytest.mark.parametrize("sheet", ["-1", "true", '"new"', "1.5", "[]"])
+def test_what_is_no_sheet_is_refused(tmp_path: Path, sheet: str) -> None:
+    with pytest.raises(AssignmentProblems) as refused:
+        assignment(tmp_path, sheet)
+    (problem,) = refused.value.problems
+    assert "assignment.toml:7: sheet is no digit sheet, expected" in problem
