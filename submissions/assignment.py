@@ -98,6 +98,7 @@ class Assignment:
     scenarios: tuple[Scenario, ...]
     criteria: tuple[Criterion, ...]
     limits: Limits = Limits()
+    section: str = ""  # where in the course's materials the task is set
     description: str = ""
     given: Mapping[str, bytes] = field(default_factory=dict)  # files copied into the responder's folder
     given_parts: Mapping[str, str] = field(default_factory=dict)  # name -> source of a given program or responder

@@ -72,6 +72,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),
+        section=head.section,
         description=head.description,
         given=MappingProxyType(given),
         given_parts=MappingProxyType(given_parts),

@@ -33,6 +33,7 @@ class HeadTable(Table):
 
     id: str = Slug
     title: str = Field(min_length=1, max_length=200)
+    section: str = Field(default="", max_length=80)  # of the course's materials: 02.2 §2.2.1
     description: str = Field(default="", max_length=20_000)
     given: tuple[str, ...] = ()
     given_models: dict[str, str] = Field(default_factory=dict)

@@ -1,0 +1,157 @@
+"""Grades the example hand-ins of an assignment and compares what they get with what they must get.
+
+It is how an assignment is tested: the reference gets full marks, each wrong solution loses the right ones. It
+prints nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from decimal import Decimal
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from sim.errors import UsageError
+from submissions.assignment import Assignment
+from submissions.assignment_file import find_assignment
+from submissions.bundle import read_submission
+from submissions.example_folder import REFERENCE, Expectation, OriginalFigure, examples, expected
+
+
+@dataclass(frozen=True, slots=True)
+class ExampleResult:
+    """What one example got. ``problems`` has a sentence for each thing that is not as expected."""
+
+    name: str
+    marks: Decimal | None  # None when it was refused
+    lost: tuple[str, ...]  # ids of the criteria without full marks
+    seconds: float  # of real time
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A measure of the reference beside what programs reach in the original simulator."""
+
+    original: OriginalFigure
+    value: float | None  # None when the reference measured nothing of that name
+    unit: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        near = self.original.within * max(abs(self.original.value), 1e-9)
+        return self.value is not None and abs(self.value - self.original.value) <= near + 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedAssignment:
+    """All examples of an assignment, the reference first."""
+
+    assignment: Assignment
+    examples: tuple[ExampleResult, ...]
+    figures: tuple[Figure, ...]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        of_examples = (problem for example in self.examples for problem in example.problems)
+        return (*of_examples, *(problem for figure in self.figures for problem in _figure_problems(figure)))
+
+
+def check_examples(name_or_path: str, *, rig: Rig) -> CheckedAssignment:
+    """Grade every example of the assignment. An assignment without examples has none to be wrong.
+
+    Raises AssignmentError for an assignment, or an ``expected.toml``, that cannot be used.
+    """
+    assignment = find_assignment(name_or_path)
+    wanted = expected(name_or_path)
+    names = example_names(name_or_path)
+    results: list[ExampleResult] = []
+    figures: tuple[Figure, ...] = ()
+    for name in names:
+        result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), rig)
+        results.append(result)
+        if name == REFERENCE and graded is not None:
+            figures = tuple(_figure(original, graded) for original in wanted.original)
+    missing = sorted(wanted.examples.keys() - set(names))
+    results += [ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is no example",)) for name in missing]
+    return CheckedAssignment(assignment, tuple(results), figures)
+
+
+def example_names(name_or_path: str) -> tuple[str, ...]:
+    """The examples' names, the reference first, then sorted; none where there are no examples."""
+    try:
+        folder = examples(name_or_path)
+    except UsageError:
+        return ()
+    names = (path.name for path in folder.iterdir() if not path.name.startswith((".", "_")))
+    return tuple(sorted(names, key=lambda name: (name != REFERENCE, name)))
+
+
+def check_example(name_or_path: str, name: str, *, rig: Rig) -> ExampleResult:
+    """Grade one example and say what is not as expected."""
+    wanted = expected(name_or_path).examples.get(name)
+    return _check_example(name_or_path, name, find_assignment(name_or_path), wanted, rig)[0]
+
+
+def _check_example(
+    name_or_path: str, name: str, assignment: Assignment, wanted: Expectation | None, rig: Rig
+) -> tuple[ExampleResult, Grade | None]:
+    begin = time.monotonic()
+    try:
+        submission = read_submission(examples(name_or_path) / name, asked=assignment.parts)
+        graded = grade(submission, assignment, rig=rig)
+    except UsageError as error:
+        return ExampleResult(name, None, (), time.monotonic() - begin, (f"{name}: {error}",)), None
+    seconds = time.monotonic() - begin
+    lost = tuple(result.id for result in graded.criteria if result.marks < result.max_marks)
+    problems = _differences(graded, lost, wanted if wanted is not None else _usual(name, assignment))
+    return ExampleResult(name, graded.marks, lost, seconds, tuple(f"{name}: {each}" for each in problems)), graded
+
+
+def _usual(name: str, assignment: Assignment) -> Expectation | None:
+    """What an example must get that nothing is written down for: full marks for the reference."""
+    return Expectation(marks=assignment.max_marks) if name == REFERENCE else None
+
+
+def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | None) -> list[str]:
+    if wanted is None:
+        return ["has no table in expected.toml"]
+    found = []
+    told = "\n".join(result.message for result in graded.criteria)
+    if graded.marks != wanted.marks:
+        found.append(f"got {graded.marks} marks, expected {wanted.marks}; {_lost_words(graded)}")
+    if graded.verdict != wanted.verdict:
+        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}")
+    if wanted.loses is not None and set(lost) != set(wanted.loses):
+        found.append(f"lost marks in {', '.join(lost) or 'nothing'}, expected {', '.join(wanted.loses) or 'nothing'}")
+    found += [f'was not told "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
+    return found
+
+
+def _lost_words(graded: Grade) -> str:
+    words = [f"{result.id}: {result.message}" for result in graded.criteria if result.marks < result.max_marks]
+    return " ".join(words) or "nothing was lost"
+
+
+def _figure(original: OriginalFigure, graded: Grade) -> Figure:
+    """The first measure of that name, over criteria and trials in their order."""
+    for result in graded.criteria:
+        for evidence in result.evidence:
+            for measure in evidence.measures:
+                if measure.name == original.measure:
+                    return Figure(original, measure.value, measure.unit)
+    return Figure(original, None)
+
+
+def _figure_problems(figure: Figure) -> tuple[str, ...]:
+    original = figure.original
+    if figure.value is None:
+        return (f"{REFERENCE}: measured no {original.measure}, expected about {original.value:g}",)
+    if figure.agrees or original.explained:
+        return ()
+    return (
+        f"{REFERENCE}: {original.measure} is {figure.value:g} {figure.unit}".rstrip()
+        + f", expected {original.value:g} within {original.within:.0%}, or an explanation",
+    )

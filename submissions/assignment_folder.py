@@ -1,0 +1,115 @@
+"""Makes folders of assignments: a new one to change, a copy of one, and what students may see of one.
+
+Nothing here grades or judges; what a folder must hold is ``assignment_file.py``'s.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+from sim.errors import UsageError
+from submissions.assignment import Assignment
+from submissions.assignment_file import FILE_NAME, assignment_folder, read_assignment
+
+_ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
+_SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
+
+
+def write_new(folder: Path, like: str | None = None) -> None:
+    """Make ``folder`` from the commented example, or from the assignment ``like``, with its own id.
+
+    Raises UsageError when the folder exists, cannot be made, or its name is no id.
+    """
+    name = Path(os.path.abspath(folder)).name  # noqa: PTH100 - a link keeps the name it was given
+    if not _SLUG.fullmatch(name):
+        raise UsageError(
+            f'"{name}" cannot be the id of an assignment, expected small letters, digits, - and _, such as my-task'
+        )
+    source = assignment_folder(like) if like is not None else _template()
+    read_assignment(source)
+    files = _files(source)
+    text = files[FILE_NAME].decode("utf-8")
+    _write(folder, {**files, FILE_NAME: _ID_LINE.sub(f'id = "{name}"', text, count=1).encode()})
+
+
+def export_whole(assignment: str, target: Path) -> int:
+    """Write the assignment's folder, examples and all; how many files. Raises UsageError when it cannot be written."""
+    source = assignment_folder(assignment)
+    read_assignment(source)
+    return _write(target, _files(source))
+
+
+def export_for_students(assignment: str, target: Path) -> int:
+    """Write what students get: the task with the visible criteria, the starter, the given files; how many files.
+
+    Raises UsageError when it cannot be written.
+    """
+    source = assignment_folder(assignment)
+    found = read_assignment(source)
+    prefix = "starter/"
+    starter = {name.removeprefix(prefix): data for name, data in _files(source).items() if name.startswith(prefix)}
+    return _write(target, {**found.given, **starter, "README.md": _task(found).encode()})
+
+
+def _task(assignment: Assignment) -> str:
+    """The task in Markdown. Of what is not visible to students it says only that there is more."""
+    shown = [criterion for criterion in assignment.criteria if criterion.visibility == "visible"]
+    lines = [f"# {assignment.title}", ""]
+    if assignment.description.strip():
+        lines += [assignment.description.strip(), ""]
+    lines += ["| Marks | For |", "|---:|---|"]
+    lines += [f"| {criterion.marks:g} | {criterion.title.replace('|', chr(92) + '|')} |" for criterion in shown]
+    if len(shown) < len(assignment.criteria):
+        rest = assignment.max_marks - sum(criterion.marks for criterion in shown)
+        lines += ["", f"{rest:g} more marks are for checks that are not shown here."]
+    return "\n".join(lines) + "\n"
+
+
+def _template() -> Path:
+    return Path(str(resources.files("submissions"))) / "template"
+
+
+def _files(folder: Path) -> Mapping[str, bytes]:
+    """Everything in the folder but what begins with a dot, and what Python leaves behind."""
+    files = {}
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
+            files["/".join(parts)] = path.read_bytes()
+    return files
+
+
+def _write(target: Path, files: Mapping[str, bytes]) -> int:
+    """Everything or nothing: written beside ``target``, then moved there."""
+    if target.exists() or target.is_symlink():
+        raise UsageError(f"{target} is there already, expected a new folder or .zip")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".robomark-") as scratch:
+            made = Path(scratch) / "made"
+            if target.suffix.lower() == ".zip":
+                _write_zip(made, files)
+            else:
+                _write_folder(made, files)
+            made.rename(target)
+    except OSError as error:
+        raise UsageError(f"{target} cannot be written: {error.strerror}") from error
+    return len(files)
+
+
+def _write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    for name, data in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
+def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)

@@ -1,0 +1,117 @@
+"""``robomark assignments``: a new one, its check, and what students get of it."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from command import robomark
+from service.grading.example_check import Figure, check_examples
+from service.grading.rig import Rig
+from sim.errors import AssignmentError, UsageError
+from submissions.assignment_file import find_assignment, read_assignment
+from submissions.assignment_folder import export_for_students, export_whole, write_new
+from submissions.example_folder import OriginalFigure, expected
+
+
+def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, rig: Rig) -> None:
+    write_new(tmp_path / "my-task")
+    checked = check_examples(str(tmp_path / "my-task"), rig=rig)
+    assert checked.assignment.id == "my-task"
+    assert [(example.name, example.problems) for example in checked.examples] == [
+        ("reference", ()),
+        ("stops-short", ()),
+    ]
+    assert checked.examples[0].marks == checked.assignment.max_marks
+
+
+def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, rig: Rig) -> None:
+    write_new(tmp_path / "my-echo", "echo-responder")
+    mine, theirs = read_assignment(tmp_path / "my-echo"), find_assignment("echo-responder")
+    assert (mine.id, mine.criteria) == ("my-echo", theirs.criteria)
+    assert check_examples(str(tmp_path / "my-echo"), rig=rig).problems == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ('[reference]\nmarks = "5"\n', "reference: got 6.00 marks, expected 5; nothing was lost"),
+        ('[reference]\nmarks = "6"\nloses = ["says"]\n', "reference: lost marks in nothing, expected says"),
+        ('[reference]\nmarks = "6"\nverdict = "time_limit"\n', "reference: ended as finished, expected time_limit"),
+        ('[reference]\nmarks = "6"\nfeedback = ["Bravo"]\n', 'reference: was not told "Bravo", but'),
+        ('[reference]\nmarks = "6"\n[other]\nmarks = "1"\n', "other: is expected, but is no example"),
+        ("", "stops-short: has no table in expected.toml"),
+        (
+            '[reference]\nmarks = "6"\n[[original]]\nmeasure = "height"\nvalue = 3\n',
+            "reference: measured no height, expected about 3",
+        ),
+    ],
+)
+def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Path, rig: Rig) -> None:
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "expected.toml").write_text(change)
+    assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), rig=rig).problems)
+
+
+@pytest.mark.parametrize("text", ["[reference", '[reference]\nmark = "6"\n', '[reference]\nmarks = "many"\n'])
+def test_expectations_that_cannot_be_read_are_refused(text: str, tmp_path: Path) -> None:
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "expected.toml").write_text(text)
+    with pytest.raises(AssignmentError, match=r"^task/expected\.toml: "):
+        expected(str(tmp_path / "task"))
+
+
+@pytest.mark.parametrize(
+    ("value", "agrees"), [(100.0, True), (101.0, True), (99.0, True), (101.1, False), (None, False)]
+)
+def test_a_figure_agrees_within_a_hundredth(value: float | None, agrees: bool) -> None:
+    assert Figure(OriginalFigure(measure="side", value=100), value).agrees == agrees
+
+
+def test_examples_and_starter_do_not_change_the_version(tmp_path: Path) -> None:
+    write_new(tmp_path / "task")
+    version = read_assignment(tmp_path / "task").version
+    (tmp_path / "task" / "starter" / "robot.py").write_text("pass\n")
+    (tmp_path / "task" / "expected.toml").write_text("")
+    assert read_assignment(tmp_path / "task").version == version
+
+
+def test_students_get_the_task_the_starter_and_the_given_files_and_nothing_that_is_hidden(tmp_path: Path) -> None:
+    write_new(tmp_path / "task", "shape-recognition")
+    path = tmp_path / "task" / "assignment.toml"
+    path.write_text(
+        path.read_text().replace('id = "shape-in-noise"\n', 'id = "shape-in-noise"\nvisibility = "hidden"\n')
+    )
+    export_for_students(str(tmp_path / "task"), tmp_path / "out.zip")
+    with zipfile.ZipFile(tmp_path / "out.zip") as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    assert files.keys() == {"README.md", "robot.py", "responder.py", "mlp_shapes_14x14.joblib"}
+    task = files["README.md"].decode()
+    assert "| 6 | Names the right shape |" in task
+    assert "with noise |" not in task
+    assert "2 more marks are for checks that are not shown here." in task
+
+
+def test_an_exported_assignment_is_the_same_assignment(tmp_path: Path) -> None:
+    export_whole("json-queue", tmp_path / "copy")
+    assert read_assignment(tmp_path / "copy").version == find_assignment("json-queue").version
+    assert (tmp_path / "copy" / "examples" / "reference" / "robot.py").is_file()
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "task").mkdir()
+    with pytest.raises(UsageError, match="is there already, expected a new folder"):
+        write_new(tmp_path / "task")
+    with pytest.raises(UsageError, match="cannot be the id of an assignment"):
+        write_new(tmp_path / "My Task")
+
+
+def test_check_says_what_is_wrong_and_ends_with_two(tmp_path: Path) -> None:
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("say('red')\n")
+    ended = robomark("assignments", "check", tmp_path / "task")
+    assert ended.returncode == 2
+    assert "task: reference: got 3.00 marks, expected 6; stops: 0 of 2 trials went as expected." in ended.stderr
+    assert robomark("assignments", "check").returncode == 2
