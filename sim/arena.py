@@ -1,6 +1,6 @@
-"""Walls and obstacles in PyBullet: what an ultrasonic ray meets, and whether the robot's body touches something.
+"""Walls and obstacles in PyBullet: what an ultrasonic ray meets, what the robot's body touches, what may stop it.
 
-Nothing here stops the robot: in free motion the drive's equations alone decide where it goes.
+Nothing here stops the robot: where it gets to is decided in ``motion.py``.
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ import math
 
 from sim.bullet import Client, pb
 from sim.camera import HEIGHT, WIDTH
+from sim.motion import FreeMotion, Motion, Physics, Rectangle, SolidMotion, add_block, gap, walls
+from sim.rigid_wheels import RigidWheels
 from sim.robot import Robot
 from sim.trigonometry import round_half_up, sincos
-
-Rectangle = tuple[float, float, float, float]  # x, y of the lower left corner, width, height
 
 _METRE = 0.001
 _RANGE = 2550.0  # mm
 _RAYS = tuple(math.radians(angle) for angle in (0, 7, -7, 14, -14, 21, -21))
 _HORIZONTAL, _VERTICAL = 2, 4  # collision groups of the edges that run along x and along y
-_WALL = 100.0  # thickness, mm; only the inner face matters
+_TOUCH = 0.5  # mm: Bullet lets a body that is pressed against a wall rest a fraction of a millimetre before it
 
 
 class Arena:
@@ -46,18 +46,32 @@ class Arena:
                 _VERTICAL,
             ),
         }
-        walls = {
-            "left wall": (-_WALL, -_WALL, _WALL, HEIGHT + 2 * _WALL),
-            "right wall": (WIDTH, -_WALL, _WALL, HEIGHT + 2 * _WALL),
-            "bottom wall": (-_WALL, -_WALL, WIDTH + 2 * _WALL, _WALL),
-            "top wall": (-_WALL, HEIGHT, WIDTH + 2 * _WALL, _WALL),
-        }
-        blocks = walls | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
+        blocks = walls() | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
         self._blocks = [(name, box, self._add_block(box)) for name, box in blocks.items()]
         self._bodies: dict[str, int] = {}
+        self._motions: dict[tuple[str, Physics], FreeMotion | SolidMotion | RigidWheels] = {}
 
     def close(self) -> None:
         self._client.close()
+        for motion in self._motions.values():
+            if not isinstance(motion, FreeMotion):
+                motion.close()
+
+    def motion(self, robot: Robot, physics: Physics, x: float, y: float, heading: float) -> Motion:
+        """What moves ``robot`` from this pose on, among these walls and obstacles; heading in radians.
+
+        Kept for the next trial, so it serves one trial at a time.
+        """
+        key = robot.name, physics
+        if key not in self._motions:
+            self._motions[key] = self._make_motion(robot, physics)
+        self._motions[key].place(x, y, heading)
+        return self._motions[key]
+
+    def _make_motion(self, robot: Robot, physics: Physics) -> FreeMotion | SolidMotion | RigidWheels:
+        if physics.drive == "wheels":
+            return RigidWheels(robot, (*walls().values(), *self.obstacles) if physics.solid else ())
+        return SolidMotion(robot, self.obstacles) if physics.solid else FreeMotion(robot)
 
     def distance(self, x: float, y: float, heading: float, forward: float) -> float:
         """What the ultrasonic sensor reads, mm, 0..2550, ``forward`` mm in front of the axle; heading in radians.
@@ -87,8 +101,8 @@ class Arena:
         return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
 
     def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
-        """The names of the walls and obstacles that the robot's body touches or overlaps."""
-        near = [(name, block) for name, box, block in self._blocks if _gap(box, x, y) <= robot.reach]
+        """The names of the walls and obstacles that the robot's body overlaps, or comes within half a millimetre of."""
+        near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + _TOUCH]
         if not near:
             return ()
         body = self._body(robot)
@@ -99,7 +113,7 @@ class Arena:
         return tuple(
             name
             for name, block in near
-            if any(point[8] <= 0 for point in pb.getClosestPoints(body, block, 0.0, physicsClientId=self._client.id))
+            if pb.getClosestPoints(body, block, _TOUCH * _METRE, physicsClientId=self._client.id)
         )
 
     def _body(self, robot: Robot) -> int:
@@ -117,13 +131,7 @@ class Arena:
         return self._bodies[robot.name]
 
     def _add_block(self, box: Rectangle) -> int:
-        x, y, width, height = (value * _METRE for value in box)
-        shape = pb.createCollisionShape(
-            pb.GEOM_BOX, halfExtents=[width / 2, height / 2, 0.1], physicsClientId=self._client.id
-        )
-        body: int = pb.createMultiBody(
-            0, shape, basePosition=[x + width / 2, y + height / 2, 0], physicsClientId=self._client.id
-        )
+        body = add_block(box, self._client)
         pb.setCollisionFilterGroupMask(body, -1, 1, 1, physicsClientId=self._client.id)
         return body
 
@@ -148,9 +156,3 @@ class Arena:
         body: int = pb.createMultiBody(0, shape, physicsClientId=self._client.id)
         pb.setCollisionFilterGroupMask(body, -1, group, -1, physicsClientId=self._client.id)
         return body
-
-
-def _gap(box: Rectangle, x: float, y: float) -> float:
-    """Distance from a point to a rectangle, mm."""
-    left, bottom, width, height = box
-    return math.hypot(max(left - x, 0, x - left - width), max(bottom - y, 0, y - bottom - height))

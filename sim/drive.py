@@ -1,7 +1,7 @@
 """The course's drive: two wheels with a speed, a command and an encoder, advanced a thirtieth of a second at a time.
 
-These are the original's equations, quirks included, because student programs are tuned to them; contact with walls
-is not decided here.
+These are the original's equations, quirks included, because student programs are tuned to them; where the robot gets
+to when its wheels turn is decided in ``motion.py``.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from sim.chance import Stream
+from sim.motion import Motion
 from sim.robot import MAX_SPEED, Robot
-from sim.trigonometry import round_half_up, sincos
+from sim.trigonometry import round_half_up
 
 Command = Literal["", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct", "reset"]
 TWO_PI = 2 * math.pi
@@ -87,6 +88,7 @@ class Drive:
     """Pose and wheels. ``heading`` is radians, wrapped from above only; ``turns`` counts the wraps."""
 
     robot: Robot
+    motion: Motion
     x: float
     y: float
     heading: float
@@ -105,21 +107,18 @@ class Drive:
         return math.degrees(self.heading) + 360.0 * self.turns
 
     def tick(self, clock: int) -> None:
-        """Advance a thirtieth of a second: speeds, travel, then the pose by explicit Euler with the old heading."""
+        """Advance a thirtieth of a second: speeds, travel, then the pose."""
         most = self.robot.acceleration
         self.left.change_speed(most, self._noise(self.left_chance, clock))
         self.right.change_speed(most, self._noise(self.right_chance, clock))
         mm_per_degree = math.pi * self.robot.wheel_diameter / 360
         left = self.left.travel(clock) * mm_per_degree
         right = self.right.travel(clock) * mm_per_degree
-        if left == 0.0 and right == 0.0:
+        before = self.x, self.y
+        self.x, self.y, turned = self.motion.moved(self.x, self.y, self.heading, left, right)
+        if turned == 0.0 and (self.x, self.y) == before:
             self.gyro_rate = 0.0
             return
-        sine, cosine = sincos(self.heading)
-        middle = (left + right) / 2
-        self.x += middle * cosine
-        self.y += middle * sine
-        turned = (right - left) / self.robot.wheel_spacing
         self.heading += turned
         if self.heading > TWO_PI:
             self.heading -= TWO_PI

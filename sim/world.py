@@ -17,6 +17,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Drive
+from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import TICK, Pose, Ticks, Touch
 from sim.robot import Robot
 from sim.sensors import LightReader, Look, look
@@ -63,11 +64,13 @@ class World:
         noise: Noise,
         seed: int,
         chain: Chain,
+        physics: Physics = COURSE_PHYSICS,
     ) -> None:
         self.robot = robot
         self.clock = 0
         self.drive = Drive(
             robot,
+            arena.motion(robot, physics, pose.x, pose.y, math.radians(pose.heading)),
             pose.x,
             pose.y,
             math.radians(pose.heading),
