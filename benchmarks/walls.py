@@ -10,7 +10,6 @@ import os
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -49,8 +48,7 @@ input()
 
 def measure() -> list[Measurement]:
     """About twenty seconds."""
-    with tempfile.TemporaryDirectory() as made, Sandboxes() as sandboxes:
-        folder = Path(made)
+    with Sandboxes() as sandboxes, sandboxes.private_folder() as folder:
         cold = _seconds(lambda: _spawn(sandboxes, "responder").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
         heavy = _many(100, lambda: _until_locked(sandboxes, "responder"))

@@ -23,3 +23,8 @@ def check() -> None:
     with Sandboxes() as sandboxes:
         typer.echo(f"robot programs: {sandboxes.check('robot')}")
         typer.echo(f"responders: {sandboxes.check('responder')}")
+        reason = sandboxes.why_no_bubblewrap()
+    if reason is None:
+        typer.echo("extra: bubblewrap hides the names of files and processes too")
+    else:
+        typer.echo(f"extra: bubblewrap, which would hide the names of files and processes too, is not used: {reason}")

@@ -36,12 +36,13 @@ GETS_THROUGH = {
     tools.UNTRIED: frozenset(),
 }
 SETTINGS = {
-    "full": Walls(),
-    "full-1": Walls(landlock=1),
+    "full": Walls(bubblewrap=False),
+    "full-1": Walls(landlock=1, bubblewrap=False),
+    "bubblewrap": Walls(),
     "none": NONE,
-    "landlock": Walls(seccomp=False),
-    "landlock-1": Walls(landlock=1, seccomp=False),
-    "seccomp": Walls(landlock=0),
+    "landlock": Walls(seccomp=False, bubblewrap=False),
+    "landlock-1": Walls(landlock=1, seccomp=False, bubblewrap=False),
+    "seccomp": Walls(landlock=0, bubblewrap=False),
 }
 #: An interpreter that every user can read, where the machine has one.
 SYSTEM_PYTHON = "/usr/bin/python3.11"
@@ -193,13 +194,14 @@ def scrambled(*secrets: str) -> list[str]:
     return [bytes(byte ^ 0x5A for byte in secret.encode()).hex() for secret in secrets]
 
 
-def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any], folder: Path) -> str:
-    """What came of an attack: ``LEAK ...``, or how it was blocked."""
-    said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
+def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
+    """What came of an attack in a folder of its own: ``LEAK ...``, or how it was blocked."""
+    with sandboxes.private_folder() as folder:
+        said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
-    if stop is not None and "not JSON" in stop.message:
+    if stop is not None and any(words in stop.message for words in ("not JSON", "without its number")):
         return f"LEAK another program wrote on the wire ({stop.message})"
     return stop.message if stop is not None else "\n".join(said)
 

@@ -33,8 +33,17 @@ def _abuses(verdicts: tuple[Verdict, ...], role: Literal["program", "responder"]
     return [Abuse(name.replace("_", " "), text, verdicts, role) for name, text in texts.items()]
 
 
+_FIND_WIRE = "import gc, os\nline = next(o for o in gc.get_objects() if type(o).__qualname__ == 'Wire')\n"
+
+
+def _forged(frame: str) -> str:
+    """Writes a frame with the very number that is due."""
+    return f"line._write(b''); os.write(3, b'{{\"n\":%d,' % line._sent + {frame[1:].encode()!r} + b'\\n')"
+
+
 def _frame(text: str) -> str:
-    return f"import os; os.write(3, {text.encode()!r} + b'\\n'); import time; time.sleep(1)"
+    write = _forged(text) if text.startswith("{") else f"os.write(3, {text.encode()!r} + b'\\n')"
+    return f"{_FIND_WIRE}{write}\nimport time; time.sleep(1)"
 
 
 _IGNORE = "import signal\nfor n in (1, 2, 3, 14, 15, 24): signal.signal(n, signal.SIG_IGN)\n"
@@ -125,6 +134,14 @@ ABUSES = [
         many_empty_files=_FILL + "    n = 0\n    while True:\n        os.close(os.open(f'f{n}', os.O_CREAT)); n += 1",
     ),
     *_abuses(
+        (Verdict.STALLED,),
+        "program",
+        many_little_sleeps="import select\nwhile True: select.select([], [], [], 0.005)",
+        sleeps_between_words="import select\nwhile True: select.select([], [], [], 0.005); print('x')",
+        sleeps_between_questions=_FIND_WIRE
+        + "import select\nwhile True: select.select([], [], [], 0.005); left_motor_state = tank_drive.left_motor.state",
+    ),
+    *_abuses(
         (Verdict.RESPONDER_ERROR,),
         "responder",
         one_big_file=_FILL + "    open('f', 'wb').write(bytes(5 << 20))",
@@ -141,6 +158,10 @@ ABUSES = [
         a_mark=_frame('{"do":"mark","marks":10}'),
         a_verdict=_frame('{"do":"end","error":null,"verdict":"finished"}'),
         a_time=_frame('{"do":"wait","units":1,"t":99}'),
+        a_frame_without_a_number=_FIND_WIRE
+        + 'line._write(b\'\'); os.write(3, b\'{"do":"print","text":"x"}\\n\'); import time; time.sleep(1)',
+        a_number_of_the_past=_FIND_WIRE + "print('x'); line._sent -= 1; print('x')",
+        a_number_of_the_future=_FIND_WIRE + "line._sent += 1; print('x')",
         walls_of_its_own=_frame('{"do":"walls","landlock":99,"seccomp":true,"own_user":true,"missing":null}'),
         a_responders_frame=_frame('{"do":"answer","kind":"text","text":"JSON::1"}'),
         the_same_key_twice=_frame('{"do":"print","text":"a","text":"b"}'),
@@ -154,8 +175,14 @@ ABUSES = [
     *_abuses(
         (Verdict.SANDBOX_VIOLATION,),
         "responder",
-        two_answers=_FILL + '    os.write(3, b\'{"do":"ready","error":null}\\n\')\n    return text',
-        a_robots_frame=_FILL + '    os.write(3, b\'{"do":"wait","units":1}\\n\')\n    return text',
+        ready_again=_FIND_WIRE
+        + "def responder(text):\n    "
+        + _forged('{"do":"ready","error":null}')
+        + "\n    return text",
+        a_robots_frame=_FIND_WIRE
+        + "def responder(text):\n    "
+        + _forged('{"do":"wait","units":1}')
+        + "\n    return text",
     ),
 ]
 
@@ -189,3 +216,48 @@ def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: Rig) 
     after = _honest(abused)
     assert (after.verdict, after.sha256) == (Verdict.FINISHED, before.sha256)
     assert [message.text for message in after.messages] == ["PY::hello", "PY::HELLO"]
+
+
+def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: Rig) -> None:
+    forged = _forged('{"do":"answer","kind":"text","text":"JSON::1"}')
+    responder = f"{_FIND_WIRE}def responder(text):\n    {forged}\n    return text\n"
+    recording = run_program(abused, 'print("PY::one")\nprint("PY::two")', responder=responder)
+    assert [fault.verdict for fault in recording.faults] == [Verdict.SANDBOX_VIOLATION]
+    assert "where frame" in recording.faults[0].message
+
+
+@pytest.mark.parametrize(
+    ("frame", "role"),
+    [
+        ('{"do":"sleep","units":1000000000000000}', "responder"),
+        ('{"do":"call","depth":0,"caller":"a","callee":"b","argument":"' + "c" * 5000 + '","result":"d"}', "responder"),
+        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1}', "responder"),
+        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1}', "program"),
+        ('{"do":"wait","units":0}', "program"),
+    ],
+    ids=lambda value: value[:20],
+)
+def test_frames_without_end_are_paid_for(frame: str, role: str, abused: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written thousands at a time they cost the child nothing, and the worker much; none of them grows it."""
+    monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
+    flood = f"""{_FIND_WIRE}
+def flood():
+    line._write(b"")
+    n = line._sent
+    while True:
+        os.write(3, b"".join(b'{{"n":%d,' % (n + i) + {frame[1:].encode()!r} + b"\\n" for i in range(100)))
+        n += 100
+"""
+    program = f"{flood}flood()" if role == "program" else 'print("PY::x")'
+    responder = f"{flood}def responder(text): flood()" if role == "responder" else HONEST_RESPONDER
+    recording = run_program(abused, program, responder=responder)
+    assert [fault.verdict for fault in recording.faults] in ([Verdict.CPU_LIMIT], [Verdict.STALLED])
+    assert sum(len(note) for note in recording.notes) < 100_000
+    assert sum(len(call.argument) for call in recording.calls) <= 10_000 * 200
+
+
+def test_answers_count_as_output(abused: Rig) -> None:
+    program = "for _ in range(100): print('PY::x')"
+    recording = run_program(abused, program, responder="def responder(text): return 'x' * 5000", output_bytes=100_000)
+    assert recording.verdict is Verdict.OUTPUT_LIMIT
+    assert sum(len(message.text) for message in recording.messages) < 200_000

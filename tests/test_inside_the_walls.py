@@ -14,7 +14,7 @@ from PIL import Image
 from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
-from responders.sandbox.manager import Sandboxes
+from responders.sandbox.manager import Sandboxes, Walls
 
 _DATA = """
 import numpy as np
@@ -42,32 +42,41 @@ _MODELS = {
 }
 
 
-@pytest.fixture(scope="module")
-def sandboxes() -> Iterator[Sandboxes]:
-    with Sandboxes() as made:
+@pytest.fixture(scope="module", params=["bare", "bubblewrap"])
+def sandboxes(request: pytest.FixtureRequest) -> Iterator[Sandboxes]:
+    with Sandboxes(Walls(bubblewrap=request.param == "bubblewrap")) as made:
+        reason = made.why_no_bubblewrap("responder")
+        if request.param == "bubblewrap" and reason is not None:
+            pytest.skip(f"bubblewrap does not work here: {reason}")
         yield made
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def empty(sandboxes: Sandboxes) -> Iterator[Path]:
+    with sandboxes.private_folder() as folder:
+        yield folder
+
+
+@pytest.fixture
+def folder(empty: Path) -> Path:
     """What a hand-in brings: models saved in several ways, a table and pictures."""
     chance = np.random.default_rng(1)
     values = chance.normal(size=(60, 4))
     model = RandomForestClassifier(5, n_jobs=2, random_state=1).fit(values, values[:, 0] > 0)
-    joblib.dump(model, tmp_path / "plain.joblib")
-    joblib.dump(model, tmp_path / "squeezed.joblib.gz", compress=("gzip", 3))
-    joblib.dump(model, tmp_path / "squeezed.joblib.xz", compress=("xz", 3))
-    joblib.dump({"weights": values}, tmp_path / "arrays.joblib")
-    np.save(tmp_path / "array.npy", values)
-    pd.DataFrame({"a": [1, 2], "b": [3.5, 4.5]}).to_csv(tmp_path / "table.csv", index=False)
+    joblib.dump(model, empty / "plain.joblib")
+    joblib.dump(model, empty / "squeezed.joblib.gz", compress=("gzip", 3))
+    joblib.dump(model, empty / "squeezed.joblib.xz", compress=("xz", 3))
+    joblib.dump({"weights": values}, empty / "arrays.joblib")
+    np.save(empty / "array.npy", values)
+    pd.DataFrame({"a": [1, 2], "b": [3.5, 4.5]}).to_csv(empty / "table.csv", index=False)
     for kind in ("png", "jpg", "gif", "bmp"):
-        Image.new("RGB", (20, 10), "red").save(tmp_path / f"picture.{kind}")
-    return tmp_path
+        Image.new("RGB", (20, 10), "red").save(empty / f"picture.{kind}")
+    return empty
 
 
 @pytest.mark.parametrize("name", _MODELS)
-def test_models_learn(name: str, sandboxes: Sandboxes, tmp_path: Path) -> None:
-    _says(sandboxes, tmp_path, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])
+def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
+    _says(sandboxes, empty, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])
 
 
 @pytest.mark.parametrize(
@@ -131,7 +140,7 @@ def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path
 
 
 @pytest.mark.parametrize("role", ["robot", "responder"])
-def test_the_standard_library_can_be_imported_late(role: str, sandboxes: Sandboxes, tmp_path: Path) -> None:
+def test_the_standard_library_can_be_imported_late(role: str, sandboxes: Sandboxes, empty: Path) -> None:
     """All of it that this interpreter can import at all, but for what would draw or needs a screen."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
     names = sorted(sys.stdlib_module_names - left_out)
@@ -146,7 +155,7 @@ for name in {names!r}:
     except BaseException as error:
         print(name, repr(error))
 """
-    _says(sandboxes, tmp_path, text, [], role)
+    _says(sandboxes, empty, text, [], role)
 
 
 def _says(sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: str = "responder") -> None:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 
+from battery import run_text
+from responders.sandbox import bubblewrap
 from responders.sandbox.inside.battery import ATTEMPTS
 from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.running_child import ChildLimits
 from running import run_program
 from service.grading.rig import Rig
 
@@ -16,12 +21,14 @@ from service.grading.rig import Rig
 def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
         said = sandboxes.check(role)  # type: ignore[arg-type]
-    assert re.fullmatch(r"Landlock \d+, seccomp, (own user, )?process limits, policy [0-9a-f]{8} \(battery .*\)", said)
+    assert re.fullmatch(
+        r"Landlock \d+, seccomp, (own user, )?(bubblewrap, )?process limits, policy [0-9a-f]{8} \(battery .*\)", said
+    )
     assert f"{len(ATTEMPTS)} of {len(ATTEMPTS)} refused" in said
 
 
 def test_the_battery_notices_a_wall_that_does_not_stand() -> None:
-    with Sandboxes(Walls(landlock=99, seccomp=False)) as sandboxes:
+    with Sandboxes(Walls(seccomp=False)) as sandboxes:
         said = sandboxes.check()
     refused = re.search(r"(\d+) of (\d+) refused", said)
     assert refused is not None
@@ -30,3 +37,48 @@ def test_the_battery_notices_a_wall_that_does_not_stand() -> None:
 
 def test_each_recording_says_what_stood(rig: Rig) -> None:
     assert run_program(rig, "pass").walls == rig.check_walls().partition(" (battery")[0]
+
+
+def test_bubblewrap_is_used_where_it_works_and_done_without_where_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Sandboxes() as sandboxes:
+        works = sandboxes.why_no_bubblewrap() is None
+        assert ("bubblewrap" in sandboxes.check()) == works
+        honest = _says_what_it_sees(sandboxes)
+        assert (honest == "1 False") == works
+    for program, reason in ((None, "not installed"), ("/bin/false", "status 1"), ("/bin/true", "cannot be seen")):
+        monkeypatch.setattr(bubblewrap, "_PROGRAM", program)
+        with Sandboxes() as sandboxes:
+            assert reason in str(sandboxes.why_no_bubblewrap())
+            assert "bubblewrap" not in sandboxes.check()
+            assert _says_what_it_sees(sandboxes).endswith(" True")
+
+
+def _says_what_it_sees(sandboxes: Sandboxes) -> str:
+    """The number of the zygote, and whether the files of the machine have names."""
+    with sandboxes.private_folder() as folder:
+        text = "import os; print(os.getppid(), os.path.exists('/etc/passwd'))"
+        said, stop = run_text(sandboxes, "robot", text, folder)
+    assert stop is None
+    return said[0]
+
+
+def test_a_trial_is_the_same_inside_bubblewrap_and_out() -> None:
+    program = "from random import random\nfor _ in range(3): print(f'PY::{random()}')"
+    responder = "import os, numpy as np\ndef responder(text): return f'{np.random.rand()} {sorted(os.environ)}'"
+    with Rig() as inside, Rig(Walls(bubblewrap=False)) as outside:
+        one, other = (run_program(rig, program, responder=responder) for rig in (inside, outside))
+    assert one.sha256 == other.sha256
+    assert [message.text for message in one.messages] == [message.text for message in other.messages]
+
+
+def test_a_child_gets_a_private_folder_and_no_other(tmp_path: Path) -> None:
+    with Sandboxes() as sandboxes, pytest.raises(ValueError, match="private"):
+        sandboxes.spawn("robot", ChildLimits(1.0, 1 << 20), tmp_path)
+
+
+def test_a_folder_of_folders_that_was_tidied_away_is_made_again() -> None:
+    with Sandboxes() as sandboxes:
+        for _ in range(2):
+            with sandboxes.private_folder() as folder:
+                assert run_text(sandboxes, "robot", "open('x', 'w'); print('ok')", folder) == (["ok"], None)
+            shutil.rmtree(folder.parent)

@@ -58,6 +58,7 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
         b'{"do":"wait","units":1,"units":2}',
         b'{"do":"motor","port":"outB","speed_sp":NaN}',
         b'{"do":"motor","port":"outB","speed_sp":1e999}',
+        b'{"do":"motor","port":"outB","speed_sp":' + b"9" * 400 + b"}",
         b'{"do":"motor","port":"outA","speed_sp":1}',
         b'{"do":"motor","port":"outB","command":"fly"}',
         b'{"do":"print","text":5}',
@@ -76,3 +77,30 @@ def test_a_frame_that_no_honest_child_sends_is_refused(line: bytes) -> None:
 
 def test_a_lone_surrogate_becomes_a_character_that_can_be_stored() -> None:
     assert wire.parse(rb'{"do":"print","text":"a\ud800b"}', wire.ROBOT)["text"] == "a?b"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b'{"do":"wait"}',
+        b'{"n":-1,"do":"wait"}',
+        b'{"n":01,"do":"wait"}',
+        b'{"n":1.0,"do":"wait"}',
+        b'{"n":true,"do":"wait"}',
+        b'{"n":1000000000000,"do":"wait"}',
+        b'{"n": 1,"do":"wait"}',
+        b'{"n":"1","do":"wait"}',
+        b'{"do":"wait","n":1}',
+    ],
+)
+def test_a_line_begins_with_its_number(line: bytes) -> None:
+    with pytest.raises(wire.WireError, match="without its number"):
+        wire.unnumbered(line)
+
+
+def test_a_second_number_is_a_field_too_many() -> None:
+    number, frame = wire.unnumbered(b'{"n":7,"n":8,"do":"until_said"}')
+    assert number == 7
+    with pytest.raises(wire.WireError):
+        wire.parse(frame, wire.ROBOT)

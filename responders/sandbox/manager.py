@@ -7,6 +7,8 @@ stopping it is ``running_child.py``'s.
 from __future__ import annotations
 
 import array
+import contextlib
+import functools
 import importlib.util
 import json
 import os
@@ -21,6 +23,8 @@ from types import TracebackType
 from typing import Any, Literal
 
 from responders import wire
+from responders.sandbox import bubblewrap
+from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.errors import HostError
 
@@ -38,46 +42,61 @@ class WallsMissing(HostError):
     """This machine cannot put up the walls that student code needs."""
 
 
+class _ZygoteEnded(HostError):
+    """A zygote is gone, and with it every child of its."""
+
+
 @dataclass(frozen=True, slots=True)
 class Walls:
-    """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter."""
+    """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter.
+
+    Bubblewrap is put round them where it works, and done without where it does not.
+    """
 
     landlock: int = 99
     seccomp: bool = True
+    bubblewrap: bool = True
 
 
 #: What every grading needs.
 FULL = Walls()
 #: Limits on the process and nothing else: for development only.
-NONE = Walls(landlock=0, seccomp=False)
+NONE = Walls(landlock=0, seccomp=False, bubblewrap=False)
 
 
-def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str) -> str:
+def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str, bubblewrap: bool) -> str:
     """What grades and reports say of the layers that stood."""
     layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp + ["own user"] * own_user
+    layers += ["bubblewrap"] * bubblewrap
     return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
 class Zygote:
     """A process with the imports of one role loaded, from which children are forked."""
 
-    def __init__(self, role: Role, walls: Walls) -> None:
+    def __init__(self, role: Role, walls: Walls, folders: PrivateFolders) -> None:
         self._role = role
         self._walls = walls
+        self._folders = folders
+        self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
         self._forks = 0
+        #: Why bubblewrap does not stand round it; None when it does.
+        self.without_bubblewrap: str | None = "not asked for"
         self.children_cpu_seconds = 0.0  # of all children that are gone
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
 
     def spawn(self, limits: ChildLimits, folder: Path | None = None, play: Play = "role") -> Child:
-        """A fresh child in ``folder``, or with none. Raises HostError when the machine cannot give one."""
+        """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
+        if folder is not None and folder.parent != self._folders.path:
+            raise ValueError(f"{folder} is not a private folder")
         if self._forks >= _RECYCLE_AFTER:
             self.close()
         self._forks += 1
         for attempt in (1, 2):
             try:
                 return self._spawn(limits, folder, play)
-            except (OSError, EOFError) as error:
+            except (OSError, EOFError, _ZygoteEnded) as error:
                 self.close()
                 if attempt == 2:
                     raise HostError(f"the {self._role} zygote does not answer ({error})") from error
@@ -85,6 +104,10 @@ class Zygote:
 
     def try_walls(self) -> str:
         """Let a child try the short battery of escapes; which walls held. Raises WallsMissing if one did not."""
+        if not self._walls.landlock and not self._walls.seccomp:
+            child = self.spawn(_BATTERY_LIMITS)
+            child.close()
+            return child.walls
         child = self.spawn(_BATTERY_LIMITS, play="battery")
         try:
             told = child.receive(wire.BATTERY, lambda: None)
@@ -92,7 +115,7 @@ class Zygote:
             raise _walls_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
             child.close()
-        if told["through"] and self._walls == FULL:
+        if told["through"] and self._walls.landlock and self._walls.seccomp:
             raise _walls_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
         refused = told["tried"] - len(told["through"])
         return f"{child.walls} (battery {told['version']}: {refused} of {told['tried']} refused)"
@@ -106,7 +129,7 @@ class Zygote:
         except (OSError, EOFError) as error:
             # Its children died with it, and that is no fault of a student's.
             self.close()
-            raise HostError(f"the {self._role} zygote ended while a program ran") from error
+            raise _ZygoteEnded(f"the {self._role} zygote ended while a program ran") from error
 
     def close(self) -> None:
         if self._control is not None:
@@ -116,14 +139,18 @@ class Zygote:
             self._process.kill()
             self._process.wait()
             self._process = None
+        if self._folders_inside >= 0:
+            os.close(self._folders_inside)
+            self._folders_inside = -1
         self._forks = 0
 
     def _spawn(self, limits: ChildLimits, folder: Path | None, play: Play) -> Child:
         self._start()
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
-        descriptors = [theirs.fileno()]
+        descriptors = []
         if folder is not None:
-            descriptors.append(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
+            # Opened as the zygote sees it: with name spaces of its own, our path to it leads nowhere there.
+            descriptors = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             answer, received = self._ask(
                 {
@@ -136,19 +163,20 @@ class Zygote:
                     "landlock": self._walls.landlock,
                     "seccomp": self._walls.seccomp,
                 },
-                descriptors,
+                [theirs.fileno(), *descriptors],
             )
         except BaseException:
             ours.close()
             raise
         finally:
             theirs.close()
-            for fd in descriptors[1:]:
+            for fd in descriptors:
                 os.close(fd)
         if "missing" in answer:
             ours.close()
             raise _walls_missing(answer["missing"])
-        child = Child(self.reap, answer["pid"], received[0], ours, limits, folder)
+        inside = answer["pid"]  # what the zygote calls it
+        child = Child(functools.partial(self.reap, inside), _pid(received[0]), received[0], ours, limits, folder)
         try:
             _try_to_signal(received[0])
             self._check_walls(child)
@@ -167,24 +195,42 @@ class Zygote:
             raise _walls_missing(standing["missing"])
         if bool(standing["landlock"]) != bool(self._walls.landlock) or standing["seccomp"] != self._walls.seccomp:
             raise _walls_missing("a wall that was asked for does not stand")
-        child.walls = stamp(standing["landlock"], standing["seccomp"], standing["own_user"], standing["policy"])
+        child.walls = stamp(
+            standing["landlock"],
+            standing["seccomp"],
+            standing["own_user"],
+            standing["policy"],
+            self.without_bubblewrap is None,
+        )
 
     def _start(self) -> None:
         """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
         if self._process is not None and self._process.poll() is None:
             return
-        self.close()
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         here = Path(__file__).resolve().parent
         package, folder = _FOLDERS[self._role]
         roots = [str(_package_folder(package) / folder)]
+        if self._walls.bubblewrap:
+            wrapping = bubblewrap.wrapping([str(here), *roots], self._folders.path)
+            self.without_bubblewrap = bubblewrap.why_not(wrapping)
+            if self.without_bubblewrap is None and self._exec(wrapping, here, roots):
+                return
+            self.without_bubblewrap = self.without_bubblewrap or "what Python needs cannot be seen in it"
+        if not self._exec([], here, roots):
+            raise HostError(f"the {self._role} zygote did not start")
+
+    def _exec(self, wrapping: list[str], here: Path, roots: list[str]) -> bool:
+        """Whether it comes to be ready."""
+        self.close()
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         code = (
             "import os, sys; os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
-            "from inside.zygote import main; main(sys.argv[3], sys.argv[4:])"
+            "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5:])"
         )
+        arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), *roots]
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-B", "-c", code, str(theirs.fileno()), str(here), self._role, *roots],
+                [*wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
                 pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -199,14 +245,19 @@ class Zygote:
                     "LOKY_MAX_CPU_COUNT": "1",
                     "JOBLIB_MULTIPROCESSING": "0",
                     "PYTHONHASHSEED": "0",
+                    "ORT_DISABLE_TELEMETRY": "1",
                 },
             )
         finally:
             theirs.close()
         self._control = ours
-        if not select.select([ours], [], [], _START_SECONDS)[0] or not ours.recv(1024):
+        try:
+            _, received = self._answer()
+        except (OSError, EOFError):
             self.close()
-            raise HostError(f"the {self._role} zygote did not start")
+            return False
+        self._folders_inside = received[0]
+        return True
 
     def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[dict[str, Any], list[int]]:
         if self._control is None:
@@ -214,6 +265,11 @@ class Zygote:
         payload = array.array("i", descriptors or [])
         ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
         self._control.sendmsg([json.dumps(order).encode()], ancillary)
+        return self._answer()
+
+    def _answer(self) -> tuple[dict[str, Any], list[int]]:
+        if self._control is None:
+            raise EOFError("it is not running")
         if not select.select([self._control], [], [], _START_SECONDS)[0]:
             raise EOFError("no answer")
         data, received, _, _ = self._control.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
@@ -232,18 +288,28 @@ class Sandboxes:
     def __init__(self, walls: Walls = FULL) -> None:
         self._walls = walls
         self._zygotes: dict[Role, Zygote] = {}
+        self._folders = PrivateFolders()
 
     def spawn(self, role: Role, limits: ChildLimits, folder: Path | None = None) -> Child:
-        """A fresh child for a robot program or a responder."""
+        """A fresh child for a robot program or a responder, in a ``private_folder`` or without one."""
         return self._zygote(role).spawn(limits, folder)
 
     def check(self, role: Role = "robot") -> str:
         """Put up the walls round a child that tries to get out; say which hold. Raises WallsMissing if any does not."""
         return self._zygote(role).try_walls()
 
+    def why_no_bubblewrap(self, role: Role = "robot") -> str | None:
+        """What keeps bubblewrap, an extra, from standing round children of ``role``; None if it does."""
+        self.check(role)
+        return self._zygote(role).without_bubblewrap
+
+    def private_folder(self) -> contextlib.AbstractContextManager[Path]:
+        """A folder for one trial, removed afterwards whatever the student's code has put into it."""
+        return self._folders.one()
+
     def _zygote(self, role: Role) -> Zygote:
         if role not in self._zygotes:
-            self._zygotes[role] = Zygote(role, self._walls)
+            self._zygotes[role] = Zygote(role, self._walls, self._folders)
         return self._zygotes[role]
 
     @property
@@ -254,6 +320,7 @@ class Sandboxes:
     def close(self) -> None:
         while self._zygotes:
             self._zygotes.popitem()[1].close()
+        self._folders.close()
 
     def __enter__(self) -> Sandboxes:
         return self
@@ -262,6 +329,12 @@ class Sandboxes:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _pid(pidfd: int) -> int:
+    """What we call the process; in name spaces of its own it has another number."""
+    lines = Path(f"/proc/self/fdinfo/{pidfd}").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Pid:"))
 
 
 def _try_to_signal(pidfd: int) -> None:

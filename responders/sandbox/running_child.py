@@ -6,6 +6,8 @@ A child's word is never taken for how it ended: that is read from the scheduler'
 from __future__ import annotations
 
 import contextlib
+import itertools
+import math
 import os
 import signal
 import socket
@@ -20,6 +22,9 @@ from sim.errors import HostError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
+#: What a child is charged for a frame at least; made by our own code there, one costs it several times this. It keeps
+#: a child that writes thousands of frames at a stroke from holding up the worker, to which each costs more.
+_FRAME_CPU_SECONDS = 1e-6
 _STALLED_SECONDS = 5.0
 #: Of the child's own time, and of real time once it does not even wait for a processor.
 _LAST_WORD_CPU_SECONDS = 0.04
@@ -29,9 +34,10 @@ _UNREAD_BYTES = 1 << 20
 #: Frames that a program sends thousands of times to the letter; each is checked once.
 _REPEATED = frozenset({"read", "wait", "motor_state", "until"})
 _MOST_KNOWN = 100
-#: What a responder may keep in its folder.
+#: What a responder may keep in its folder, beside the files that it was given.
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
+_MOST_GIVEN = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,41 +61,46 @@ class Child:
 
     def __init__(
         self,
-        reap: Callable[[int], int],
+        reap: Callable[[], int],
         pid: int,
         pidfd: int,
         connection: socket.socket,
         limits: ChildLimits,
         folder: Path | None,
     ) -> None:
-        """``reap(pid)`` waits for the child's end and gives its wait status."""
+        """``reap`` waits for the child's end and gives its wait status."""
         self.walls = ""
         self._reap = reap
         self._folder = folder
+        self._given = (0, 0) if folder is None else _content(folder, _MOST_GIVEN)
         self._pid = pid
         self._pidfd = pidfd
         self._socket = connection
         self._limits = limits
         self._pending = b""
+        self._sent = self._received = 0  # frames
         self._known: dict[bytes, wire.Frame] = {}
         self._closed = False
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
+        self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
         connection.settimeout(_POLL_SECONDS)
 
     def send(self, frame: dict[str, Any]) -> None:
         """Send one frame; a child that does not read it shows up at the next ``receive``."""
-        data = memoryview(wire.encode(frame))
-        deadline = time.monotonic() + _STALLED_SECONDS
+        data = memoryview(wire.encode(frame, self._sent))
+        self._sent += 1
+        began = time.monotonic()
         while data:
             try:
                 data = data[self._socket.send(data) :]
             except TimeoutError:
                 self._check_cpu()
-                if time.monotonic() > deadline:
+                if time.monotonic() - began > _STALLED_SECONDS:
                     raise self._stalled() from None
             except OSError:
                 return
+        self._waited += time.monotonic() - began
 
     def receive(self, schema: wire.Schema, pulse: Callable[[], None]) -> wire.Frame:
         """The next frame; ``pulse`` is called now and then while waiting. Raises ChildStopped."""
@@ -97,12 +108,18 @@ class Child:
         if not newline:
             line, rest = self._read_line(pulse)
         self._pending = rest
-        frame = self._known.get(line)
-        if frame is not None:
-            return frame
         try:
+            number, line = wire.unnumbered(line)
+            if number != self._received:
+                raise wire.WireError(f"frame {number} where frame {self._received} was due")
+            self._received += 1
+            frame = self._known.get(line)
+            if frame is not None:
+                return frame
             frame = wire.parse(line, schema)
         except wire.WireError as error:
+            # One that was cut short by the end of its time is not the program's doing.
+            self._check_cpu()
             raise ChildStopped(
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
             ) from None
@@ -128,18 +145,21 @@ class Child:
         self._socket.close()
         os.close(self._pidfd)
         with contextlib.suppress(HostError):
-            self._reap(self._pid)
+            self._reap()
 
     def _read_line(self, pulse: Callable[[], None]) -> tuple[bytes, bytes]:
         last_cpu, still_since = -1.0, time.monotonic()
         pieces = [self._pending]
         size = len(self._pending)
         while True:
+            began = time.monotonic()
             try:
                 data = self._socket.recv(wire.MOST)
             except TimeoutError:
+                self._waited += time.monotonic() - began
                 pulse()
                 used = self._check_cpu()
+                self._check_sleep()
                 if used != last_cpu or self._runnable():
                     last_cpu, still_since = used, time.monotonic()
                 elif time.monotonic() - still_since > _STALLED_SECONDS:
@@ -150,10 +170,12 @@ class Child:
             if not data:
                 raise self._gone()
             now = time.monotonic()
+            self._waited += now - began
             if now - self._checked > _POLL_SECONDS:
                 self._checked = now
                 pulse()
                 self._check_cpu()
+                self._check_sleep()
             pieces.append(data)
             size += len(data)
             if b"\n" in data:
@@ -166,25 +188,37 @@ class Child:
         """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
         self._check_folder()
         used = self.cpu_seconds()
-        if used > self._limits.cpu_seconds:
+        if max(used, self._received * _FRAME_CPU_SECONDS) > self._limits.cpu_seconds:
             raise self._too_busy(self._last_word())
         return used
+
+    def _check_sleep(self) -> None:
+        """Time that it neither ran nor stood in the queue for a processor, while the worker waited, adds up.
+
+        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker.
+        """
+        if self._waited > 2 * _STALLED_SECONDS and self._waited - self._busy_seconds() > 2 * _STALLED_SECONDS:
+            raise self._stalled()
+
+    def _busy_seconds(self) -> float:
+        """What it has run, and waited for a processor; endless where the kernel does not say."""
+        try:
+            run, queued, _ = Path(f"/proc/{self._pid}/schedstat").read_text().split()
+        except (OSError, ValueError):
+            return math.inf
+        return (int(run) + int(queued)) / 1e9
 
     def _check_folder(self) -> None:
         """One flat look: the walls let no folder be made in it, and follow no link."""
         if self._folder is None:
             return
-        size = count = 0
-        with contextlib.suppress(OSError), os.scandir(self._folder) as entries:
-            for entry in entries:
-                count += 1
-                with contextlib.suppress(OSError):
-                    size += entry.stat(follow_symlinks=False).st_size
-                if size > _FOLDER_BYTES or count > _FOLDER_FILES:
-                    raise ChildStopped(
-                        Verdict.OUTPUT_LIMIT,
-                        f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
-                    )
+        most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES
+        size, count = _content(self._folder, most_files + 1)
+        if size > most_bytes or count > most_files:
+            raise ChildStopped(
+                Verdict.OUTPUT_LIMIT,
+                f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
+            )
 
     def _last_word(self) -> int | None:
         """Ask the child which line it is on, and give it a moment to say so."""
@@ -207,7 +241,7 @@ class Child:
             data += more
         for line in reversed(data.splitlines()):
             with contextlib.suppress(wire.WireError):
-                frame = wire.parse(line, {"busy": wire.ROBOT["busy"]})
+                frame = wire.parse(wire.unnumbered(line)[1], {"busy": wire.ROBOT["busy"]})
                 return None if frame["line"] is None else int(frame["line"])
         return None
 
@@ -238,7 +272,7 @@ class Child:
         self._closed = True
         self._socket.close()
         os.close(self._pidfd)
-        status = self._reap(self._pid)
+        status = self._reap()
         if os.WIFSIGNALED(status):
             number = os.WTERMSIG(status)
             if number in (signal.SIGXCPU,):
@@ -252,3 +286,14 @@ class Child:
     def _kill(self) -> None:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+
+
+def _content(folder: Path, most: int) -> tuple[int, int]:
+    """The bytes and the number of the files in a flat folder, of at most ``most`` files."""
+    size = count = 0
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in itertools.islice(entries, most):
+            count += 1
+            with contextlib.suppress(OSError):
+                size += entry.stat(follow_symlinks=False).st_size
+    return size, count

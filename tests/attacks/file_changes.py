@@ -294,3 +294,21 @@ globals().update(
         uselib=(b"lib",),
     )
 )
+
+
+@attack(SECCOMP)
+def leave_a_device_behind_when_renaming():
+    rename_whiteout = 4
+    open("here", "w").close()
+    return call("renameat2", -100, b"here", -100, b"there", rename_whiteout) == 0
+
+
+@attack(SECCOMP)
+def create_a_program_that_changes_the_user():
+    os.umask(0)
+    return os.fstat(os.open("mine", os.O_CREAT | os.O_WRONLY, 0o6755)).st_mode & 0o6000
+
+
+@attack(SECCOMP)
+def create_a_program_that_changes_the_user_the_old_way():
+    return call("open", b"mine-too", os.O_CREAT | os.O_WRONLY, 0o4755) >= 0

@@ -17,26 +17,29 @@ MOST = 65536
 _encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
 
 
-def _line(frame: Frame) -> bytes:
-    return _encode(frame).encode("ascii") + b"\n"
-
-
 class Wire:
     """Sends and receives frames over descriptor ``fd``."""
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
+        self._sent = self._received = 0  # frames
         self._pending = b""
         self._held = b""
 
     def send_later(self, frame: Frame) -> None:
         """Send with the next frame that cannot wait."""
-        self._held += _line(frame)
+        self._held += self._line(frame)
         if len(self._held) > MOST // 2:
             self._write(b"")
 
     def send(self, frame: Frame) -> None:
-        self._write(_line(frame))
+        self._write(self._line(frame))
+
+    def _line(self, frame: Frame) -> bytes:
+        """It, beginning with its number; both sides count."""
+        number = self._sent
+        self._sent += 1
+        return b'{"n":%d,%s\n' % (number, _encode(frame).encode("ascii")[1:])
 
     def _write(self, data: bytes) -> None:
         data = self._held + data
@@ -45,12 +48,15 @@ class Wire:
             data = data[os.write(self._fd, data) :]
 
     def receive(self) -> Frame:
-        """The next frame. Ends the process when the worker has gone."""
+        """The next frame. Ends the process when the worker has gone, or if somebody else has read what was sent."""
         while True:
             line, newline, rest = self._pending.partition(b"\n")
             if newline:
                 self._pending = rest
                 frame: Frame = json.loads(line)
+                if frame.pop("n") != self._received:
+                    os._exit(0)
+                self._received += 1
                 return frame
             data = os.read(self._fd, MOST)
             if not data:

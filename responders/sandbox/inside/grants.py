@@ -26,6 +26,7 @@ _PACKAGES = frozenset(
         "dateutil",
         "six.py",
         "narwhals",
+        "onnxruntime",
         "tzdata",
         "pytz",
     }
@@ -55,12 +56,13 @@ def listable() -> tuple[str, ...]:
 
 
 def open_to_others(paths: tuple[str, ...]) -> bool:
-    """Whether a user who owns nothing here can read ``paths`` and reach them."""
-    folders = {os.path.dirname(os.path.realpath(path)) for path in paths}
+    """Whether a user who owns nothing here can read those of ``paths`` that there are, and reach them."""
+    there = [path for path in paths if os.path.exists(path)]
+    folders = {os.path.dirname(os.path.realpath(path)) for path in there}
     while more := {os.path.dirname(folder) for folder in folders} - folders:
         folders |= more
     return all(_has(folder, 0o001) for folder in folders) and all(
-        _has(path, 0o005 if os.path.isdir(path) else 0o004) for path in paths if os.path.exists(path)
+        _has(path, 0o005 if os.path.isdir(path) else 0o004) for path in there
     )
 
 

@@ -244,7 +244,6 @@ ALLOWED: dict[str, int] = {
     "preadv": 295,
     "pwritev": 296,
     "getcpu": 309,
-    "renameat2": 316,
     "getrandom": 318,
     "membarrier": 324,
     "copy_file_range": 326,
@@ -261,7 +260,8 @@ _ARCH_X86_64 = 0xC000003E
 _X32 = 0x40000000
 _AT_NUMBER, _AT_ARCH = 0, 4
 _OPEN, _OPENAT, _CLONE, _CLONE3 = 2, 257, 56, 435
-_O_ACCMODE, _O_TRUNC = 0o3, 0o1000
+_O_ACCMODE, _O_TRUNC, _O_CREAT, _O_TMPFILE = 0o3, 0o1000, 0o100, 0o20000000
+_SPECIAL_MODES = 0o7000  # set-uid, set-gid, sticky
 
 
 def _argument(index: int) -> int:
@@ -285,6 +285,7 @@ class Rule:
 def _rules(pid: int) -> tuple[Rule, ...]:
     """Calls that depend on an argument; everything not named is refused."""
     tiocgwinsz, tcgets, fionread, fionbio, fioclex, fionclex = 0x5413, 0x5401, 0x541B, 0x5421, 0x5451, 0x5450
+    rename_noreplace, rename_exchange = 1, 2  # but not RENAME_WHITEOUT, which leaves a device behind
     f_dupfd, f_getfd, f_setfd, f_getfl, f_setfl, f_dupfd_cloexec = 0, 1, 2, 3, 4, 1030
     arch_get_fs, arch_set_fs = 0x1003, 0x1002
     return (
@@ -294,6 +295,7 @@ def _rules(pid: int) -> tuple[Rule, ...]:
         Rule(234, 0, (pid,)),  # tgkill
         Rule(157, 0, (15, 16)),  # prctl: the name
         Rule(158, 0, (arch_get_fs, arch_set_fs)),
+        Rule(316, 4, (0, rename_noreplace, rename_exchange)),  # renameat2: the flags
         Rule(302, 2, (0,), whole=True),  # prlimit64: only reading; the argument is a pointer
     )
 
@@ -312,8 +314,8 @@ def program(pid: int) -> bytes:
         code += [(_JUMP_EQUAL, 0, 1, number), (_RETURN, 0, 0, _RET_ALLOW)]
     for rule in _rules(pid):
         code += _only_if(rule.number, _equal_to(rule))
-    code += _only_if(_OPEN, _never_truncating(1))
-    code += _only_if(_OPENAT, _never_truncating(2))
+    code += _only_if(_OPEN, _never_set_uid(1, 2) + _never_truncating(1))
+    code += _only_if(_OPENAT, _never_set_uid(2, 3) + _never_truncating(2))
     code += _only_if(_CLONE3, [(_RETURN, 0, 0, _RET_ERRNO | errno.ENOSYS)])
     code += _only_if(_CLONE, [(_RETURN, 0, 0, _RET_ERRNO | errno.EAGAIN)])
     code.append((_RETURN, 0, 0, _RET_ERRNO | errno.EPERM))
@@ -334,6 +336,17 @@ def _equal_to(rule: Rule) -> list[Instruction]:
     for value in rule.values:
         body += [(_JUMP_EQUAL, 0, 1, value), (_RETURN, 0, 0, _RET_ALLOW)]
     return [*body, refused]
+
+
+def _never_set_uid(flags: int, mode: int) -> list[Instruction]:
+    """Where no file is created nobody sets the mode, and anything may stand there."""
+    return [
+        (_LOAD, 0, 0, _argument(flags)),
+        (_JUMP_SET, 0, 3, _O_CREAT | _O_TMPFILE),
+        (_LOAD, 0, 0, _argument(mode)),
+        (_JUMP_SET, 0, 1, _SPECIAL_MODES),
+        (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
+    ]
 
 
 def _never_truncating(argument: int) -> list[Instruction]:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, refusals, student_code
+from . import determinism, function_calls, model_files, refusals, student_code
 from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
 
@@ -42,6 +42,7 @@ _PRELOADED = (
     "nbev3devsim.load_nbev3devwidget",
     "nn_tools.network_views",
     "nn_tools.sensor_data",
+    "nn_tools.weights",
 )
 
 _NOTED = ("parser", "agent", "logger")
@@ -51,16 +52,30 @@ def preload() -> None:
     """Import what responders use, before any fork."""
     for name in _PRELOADED:
         importlib.import_module(name)
+    model_files.preload_onnx()
+    model_files.explain_joblib()
+    _ask_the_machine()
+    from . import notebook_role  # noqa: F401
+
+
+def _ask_the_machine() -> None:
+    """What scikit-learn asks once about libraries and processors, where it may still open files: neighbours need it."""
+    import joblib
+    from sklearn.utils.parallel import _get_threadpool_controller
+
+    _get_threadpool_controller()
+    joblib.cpu_count(only_physical_cores=True)
 
 
 class Responder:
     """The student's module, and the calls inside it that the sequence diagram shows."""
 
-    def __init__(self, wire: Wire, grants: Grants) -> None:
+    def __init__(self, wire: Wire, grants: Grants, job: Frame) -> None:
         self._wire = wire
         self._grants = grants
-        self._name = ""
-        self._function: str | None = None
+        self._job = job
+        self._name: str = job["name"]
+        self._function: str | None = job["function"]
         self._units = 0
         self._namespace: dict[str, Any] = {}
         self._defines_msg = False
@@ -69,30 +84,47 @@ class Responder:
 
     def run(self) -> None:
         """Load the module, then answer until the worker closes the wire."""
-        job = self._wire.receive()
-        self._name, self._function = job["name"], job["function"]
+        self._prepare()
+        self._wire.send({"do": "ready", "error": self._load(self._job["text"])})
+        self._serve()
+
+    def _prepare(self) -> None:
+        """Everything that stands before student code runs: output, clock, chance, and an empty module."""
+        from nbev3devsim.load_nbev3devwidget import eds, roboSim
+
         signal.signal(signal.SIGXCPU, self._busy)
         student_code.install_output(self._emit)
         determinism.install_clock(lambda: self._units, self._sleep)
-        determinism.install_chance(job["seed"])
+        determinism.install_chance(self._job["seed"])
         refusals.install(self._grants.read, self._name, self._refused)
-        self._wire.send({"do": "ready", "error": self._load(job["text"])})
-        while True:
-            message = self._wire.receive()
-            self._units = max(self._units, message["t"])
-            self._wire.send(self._answer(message["text"]))
-
-    def _load(self, text: str) -> Frame | None:
-        """Run the module; the error that stopped it, or that there is no responder in it."""
-        from nbev3devsim.load_nbev3devwidget import eds, roboSim
-
+        model_files.install_version_notes(self._name, self._refused)
         module = types.ModuleType("__main__")
         sys.modules["__main__"] = module
         self._namespace = module.__dict__
         self._namespace.update(roboSim=roboSim, eds=eds)
+
+    def _serve(self) -> None:
+        while True:
+            message = self._wire.receive()
+            if message["do"] == "call":
+                self._wire.send(function_calls.returned(self._namespace, self._name, message))
+            else:
+                self._hear(message, 0)
+
+    def _hear(self, message: Frame, began: int) -> None:
+        """Answer one message of a run that began at ``began``; what the robot has logged by then comes with it."""
+        from nbev3devsim.load_nbev3devwidget import roboSim
+
+        self._units = max(self._units, began + message["t"])
+        roboSim.collect(message.get("data", []), message.get("images", []))
+        self._wire.send(self._answer(message["text"]))
+
+    def _load(self, text: str) -> Frame | None:
+        """Run the module; the error that stopped it, or that there is no responder in it."""
         try:
             exec(student_code.compile_source(text, self._name), self._namespace)
-            self._find()
+            if self._function != function_calls.NO_RESPONDER:
+                self._find()
         except BaseException as error:
             return student_code.describe(error, self._name)
         self._defines_msg = "msg" in self._namespace
@@ -211,4 +243,9 @@ def _shown(value: Any) -> str:
 
 
 def run(wire: Wire, grants: Grants) -> None:
-    Responder(wire, grants).run()
+    """Receive a module or a notebook, run it, and answer."""
+    from . import notebook_role
+
+    job = wire.receive()
+    player = notebook_role.Player if "cells" in job else Responder
+    player(wire, grants, job).run()

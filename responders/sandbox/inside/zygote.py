@@ -20,8 +20,8 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
 
-def main(role_name: str, roots: list[str]) -> None:
-    """Serve orders on descriptor 3 until the worker closes it."""
+def main(role_name: str, folders: str, roots: list[str]) -> None:
+    """Serve orders on descriptor 3 until the worker closes it. ``folders`` is where children have theirs."""
     _first_to_go()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -44,7 +44,9 @@ def main(role_name: str, roots: list[str]) -> None:
     gc.collect()
     gc.freeze()
     control = socket.socket(fileno=3)
-    _reply(control, {"ready": True})
+    inside = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
+    _reply(control, {"ready": True}, [inside])
+    os.close(inside)
     while True:
         order, descriptors = _receive(control)
         if order is None:

@@ -1,0 +1,81 @@
+"""Bubblewrap round a zygote, where it works: name spaces of its own, and only the folders that Python needs.
+
+It is an extra. What the walls promise they keep without it; with it names outside cannot be found out either, nor
+processes, nor the machine's name.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+_PROGRAM = shutil.which("bwrap", path="/usr/bin:/bin:/usr/local/bin")
+_SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/alternatives", "/etc/localtime", "/etc/ld.so.cache")
+_DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
+_SPACES = ("--unshare-ipc", "--unshare-pid", "--unshare-net", "--unshare-uts", "--unshare-cgroup-try")
+#: What a zygote of root's needs to make each child a user of its own; children drop them.
+_POWERS = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETUID")
+_TRY_SECONDS = 20.0
+
+
+def wrapping(readable: list[str], writable: Path) -> list[str]:
+    """The beginning of a command that runs the interpreter in name spaces of its own.
+
+    Beside the interpreter it sees ``readable`` and, to write in, ``writable``; it is the first process in there, so
+    that nothing outlives it.
+    """
+    command = [_PROGRAM or "bwrap", *_SPACES, "--die-with-parent", "--as-pid-1", "--new-session", "--hostname", "robot"]
+    command += ["--cap-drop", "ALL"]
+    if os.geteuid() == 0:
+        for power in _POWERS:
+            command += ["--cap-add", f"CAP_{power}"]
+    else:
+        command.append("--unshare-user")
+    shown = (*_interpreter(), *readable)
+    for folder in _folders_above(*_SYSTEM, *_DEVICES, *shown, str(writable)):
+        # Left to bubblewrap, nobody but root could enter them.
+        command += ["--dir", folder]
+    for path in _SYSTEM:
+        command += ["--ro-bind-try", path, path]
+    for path in shown:
+        command += ["--ro-bind", path, path]
+    for path in _DEVICES:
+        command += ["--dev-bind", path, path]
+    return [*command, "--bind", str(writable), str(writable), "--proc", "/proc", "--chdir", "/", "--"]
+
+
+def _folders_above(*paths: str) -> list[str]:
+    return sorted({str(folder) for path in paths for folder in Path(path).parents} - {"/"})
+
+
+def why_not(wrapping: list[str]) -> str | None:
+    """Try it on an interpreter that does nothing: what keeps it from working here, or None if it works."""
+    if _PROGRAM is None:
+        return "bwrap is not installed"
+    try:
+        ran = subprocess.run(
+            [*wrapping, sys.executable, "-I", "-S", "-c", "pass"],
+            env={},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TRY_SECONDS,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"bwrap does not run: {error}"
+    if ran.returncode != 0:
+        said = ran.stderr.strip().splitlines()
+        return said[-1][:200] if said else f"bwrap ends with status {ran.returncode}"
+    return None
+
+
+def _interpreter() -> list[str]:
+    """Where the interpreter and its packages lie: of a virtual environment, and of what that was made from."""
+    program = Path(sys.executable)
+    found = {sys.prefix, sys.base_prefix, str(program.parent.parent), str(program.resolve().parent.parent)}
+    return sorted(found - {"/", "/usr"})

@@ -1,0 +1,164 @@
+"""From a notebook's cell, as IPython takes it, to Python: magics, shell lines and questions become calls.
+
+Line numbers stay the cell's own. What the calls do is ``shell.py``'s.
+"""
+
+from __future__ import annotations
+
+import re
+import string
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+_CELL_MAGIC = re.compile(r"%%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
+_LINE_MAGIC = re.compile(r"%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
+_ASSIGNED = re.compile(r"(?P<target>[A-Za-z_][\w.,\[\]'\" ]*=[ \t]*)(?P<rest>[%!].*)\Z")
+_QUESTION = re.compile(r"(?:\?{1,2}[\w.%]+|%{0,2}[A-Za-z_][\w.]*\?{1,2})\Z")
+_PACKAGES = re.compile(r"(?P<name>pip3?|conda|mamba)[ \t]+(?P<line>(?:install|uninstall|list|show|freeze)\b.*)\Z")
+_DOLLAR = re.compile(r"\$(?:(?P<escaped>\$[\w.]*)|(?P<name>[A-Za-z_][\w.]*))")
+
+
+@dataclass(frozen=True, slots=True)
+class CellMagic:
+    """A whole cell that is handed to a magic; ``line`` is what stands beside its name."""
+
+    name: str
+    line: str
+    body: str
+    number: int  # of the line with the name, from 1
+
+
+def cell_magic(source: str) -> CellMagic | None:
+    """The magic that the cell is for, if its first line (after blanks and comments) begins with ``%%``."""
+    lines = source.split("\n")
+    for place, line in enumerate(lines):
+        stripped = line.lstrip("\ufeff").strip()
+        if not stripped or stripped.startswith("#"):
+            continue
+        match = _CELL_MAGIC.match(stripped)
+        if match is None:
+            return None
+        return CellMagic(match["name"], match["line"] or "", "\n".join(lines[place + 1 :]), place + 1)
+    return None
+
+
+def python_source(source: str) -> str:
+    """The cell as Python, line by line."""
+    lines = source.lstrip("\ufeff").split("\n")
+    for place in list(_logical_starts(lines)):
+        line = lines[place]
+        if not _may_be_special(line):
+            continue
+        text, taken = line, 1
+        while text.endswith("\\") and place + taken < len(lines):
+            text = text[:-1] + " " + lines[place + taken].strip()
+            taken += 1
+        rewritten = _rewritten(text)
+        if rewritten is not None:
+            lines[place : place + taken] = [rewritten] + [""] * (taken - 1)
+    return "\n".join(lines)
+
+
+def expanded(line: str, names: Mapping[str, Any]) -> str:
+    """``line`` with ``{expression}`` and ``$name`` replaced by their values; as it is if one cannot be worked out."""
+    try:
+        return "".join(_expanded(line, names))
+    except Exception:
+        return line
+
+
+def _expanded(line: str, names: Mapping[str, Any]) -> Iterator[str]:
+    formatter = string.Formatter()
+    for literal, expression, form, conversion in formatter.parse(line):
+        yield _DOLLAR.sub(
+            lambda match: match["escaped"] or str(eval(match["name"], dict(names))),
+            literal,
+        )
+        if expression is not None:
+            value = formatter.convert_field(eval(expression, dict(names)), conversion)
+            yield format(value, form or "")
+
+
+def _may_be_special(line: str) -> bool:
+    stripped = line.strip()
+    return stripped.startswith(("%", "!", "?")) or stripped.endswith("?") or _looks_assigned(stripped)
+
+
+def _looks_assigned(stripped: str) -> bool:
+    return _ASSIGNED.match(stripped) is not None or _PACKAGES.match(stripped) is not None
+
+
+def _rewritten(text: str) -> str | None:
+    """The call that a line stands for; None if it is Python after all."""
+    stripped = text.strip()
+    indent = text[: len(text) - len(text.lstrip())]
+    assigned = _ASSIGNED.match(stripped)
+    if assigned is not None:
+        call = _call(assigned["rest"].strip(), captured=True)
+        return None if call is None else f"{indent}{assigned['target']}{call}"
+    if _QUESTION.match(stripped):
+        return f"{indent}get_ipython().run_line_magic('pinfo', {stripped.strip('?')!r})"
+    packages = _PACKAGES.match(stripped)
+    if packages is not None:
+        return f"{indent}get_ipython().run_line_magic({packages['name']!r}, {packages['line']!r})"
+    call = _call(stripped, captured=False)
+    return None if call is None else indent + call
+
+
+def _call(text: str, captured: bool) -> str | None:
+    if text.startswith("!!"):
+        return f"get_ipython().getoutput({text[2:]!r})"
+    if text.startswith("!"):
+        return f"get_ipython().{'getoutput' if captured else 'system'}({text[1:]!r})"
+    magic = _LINE_MAGIC.match(text)
+    if magic is None:
+        return None
+    return f"get_ipython().run_line_magic({magic['name']!r}, {(magic['line'] or '').rstrip()!r})"
+
+
+class _State:
+    """Where a reader of Python is after a line: inside a long string, inside brackets, or after a backslash."""
+
+    def __init__(self) -> None:
+        self.quote = ""
+        self.depth = 0
+        self.goes_on = False
+
+    @property
+    def at_start(self) -> bool:
+        return not (self.quote or self.depth or self.goes_on)
+
+
+_TOKEN = re.compile(r"\\.|'''|\"\"\"|['\"#()\[\]{}]", re.DOTALL)
+
+
+def _logical_starts(lines: list[str]) -> Iterator[int]:
+    """Indices of the lines on which a statement may begin."""
+    state = _State()
+    for place, line in enumerate(lines):
+        if state.at_start:
+            yield place
+            # What is rewritten when it is handed out is a whole statement by now.
+            line = lines[place]
+        _read(line, state)
+
+
+def _read(line: str, state: _State) -> None:
+    for match in _TOKEN.finditer(line):
+        token = match[0]
+        if state.quote:
+            if token == state.quote:
+                state.quote = ""
+        elif token == "#":
+            line = ""
+            break
+        elif token in ("'", '"', "'''", '"""'):
+            state.quote = token
+        elif token in "([{":
+            state.depth += 1
+        elif token in ")]}":
+            state.depth = max(0, state.depth - 1)
+    state.goes_on = line.endswith("\\") and not state.quote
+    if len(state.quote) == 1 and not line.endswith("\\"):
+        state.quote = ""

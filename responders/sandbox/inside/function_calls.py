@@ -1,0 +1,48 @@
+"""Calls a function of a loaded module by its name, and hands back what it returns as JSON.
+
+What is called and what the value is worth is the worker's business, on the other side of the wire.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from . import student_code
+from .frames import Frame, fits
+
+#: In place of a responder's name: the module needs none.
+NO_RESPONDER = ""
+
+
+def returned(namespace: dict[str, Any], name: str, order: Frame) -> Frame:
+    """The answer to one ``call`` order; ``name`` is that of the student's file, for line numbers."""
+    function = namespace.get(order["function"])
+    if not callable(function):
+        return {"do": "returned", "kind": "missing"}
+    try:
+        value = function(*order["arguments"], **order["named"])
+        text = _as_json(value)
+    except BaseException as error:
+        return {"do": "returned", "kind": "error", "error": student_code.describe(error, name)}
+    if text is None:
+        return {"do": "returned", "kind": "other", "type": type(value).__name__[:100]}
+    if not fits(text):
+        return {"do": "returned", "kind": "long", "length": len(text)}
+    return {"do": "returned", "kind": "value", "text": text}
+
+
+def _as_json(value: Any) -> str | None:
+    """None for what JSON does not have; arrays are lists."""
+    try:
+        return json.dumps(value, allow_nan=False, default=_plain)
+    except (TypeError, ValueError, RecursionError):
+        return None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, set | frozenset):
+        return sorted(value, key=repr)
+    if hasattr(value, "tolist"):  # numpy and pandas
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no form in JSON")

@@ -1,0 +1,83 @@
+"""What loading students' models needs inside the walls: onnxruntime on one thread, and sentences for what goes wrong.
+
+The files themselves are read by the libraries that wrote them; nothing here trusts one.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from .student_code import line_of
+
+
+def preload_onnx() -> None:
+    """Import onnxruntime, where it is installed, and let every session of it do with one thread: there are no more."""
+    try:
+        runtime: Any = importlib.import_module("onnxruntime")
+    except ImportError:
+        return
+
+    class InferenceSession(runtime.InferenceSession):  # type: ignore[misc]
+        def __init__(self, path_or_bytes: Any, sess_options: Any = None, *args: Any, **more: Any) -> None:
+            options = runtime.SessionOptions() if sess_options is None else sess_options
+            options.intra_op_num_threads = options.inter_op_num_threads = 1
+            super().__init__(path_or_bytes, options, *args, **more)
+
+    runtime.InferenceSession = InferenceSession
+
+
+def explain_joblib() -> None:
+    """Let ``joblib.load`` say which file could not be loaded, and why, in words."""
+    import joblib
+    from joblib import numpy_pickle
+
+    load = joblib.load
+
+    @functools.wraps(load)
+    def explained(filename: Any, *args: Any, **more: Any) -> Any:
+        file = os.path.basename(filename) if isinstance(filename, str) else "the model"
+        try:
+            return load(filename, *args, **more)
+        except (FileNotFoundError, MemoryError):
+            raise
+        except PermissionError as error:
+            words = error.args[1] if len(error.args) > 1 else error
+            raise PermissionError(1, f"{file} was stopped while it was loaded: {words}") from None
+        except ModuleNotFoundError as error:
+            package = str(error.name).partition(".")[0]
+            raise ModuleNotFoundError(
+                f"{file} needs the package {package}, which responders here do not have", name=error.name
+            ) from None
+        except Exception as error:
+            words = f"{type(error).__name__}: {str(error)[:200]}"
+            raise ValueError(
+                f"{file} cannot be loaded as a model, expected one that joblib.dump or pickle.dump wrote ({words})"
+            ) from None
+
+    joblib.load = numpy_pickle.load = explained
+
+
+def install_version_notes(name: str, tell: Callable[[str, int | None], None]) -> None:
+    """Tell, once for each version, that a model was saved by another scikit-learn; other warnings are shown as ever."""
+    from sklearn.exceptions import InconsistentVersionWarning
+
+    show = warnings.showwarning
+    told: set[str] = set()
+
+    def show_or_tell(message: Any, category: Any, *more: Any, **others: Any) -> None:
+        if not isinstance(message, InconsistentVersionWarning):
+            show(message, category, *more, **others)
+            return
+        saved, read = str(message.original_sklearn_version)[:20], str(message.current_sklearn_version)[:20]
+        if saved not in told and len(told) < 3:
+            told.add(saved)
+            sentence = f"a model was saved by scikit-learn {saved} and is read by {read}; it may answer differently"
+            tell(sentence, line_of(sys._getframe(), name))
+
+    warnings.showwarning = show_or_tell

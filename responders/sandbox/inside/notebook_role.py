@@ -1,0 +1,198 @@
+"""Plays a notebook from top to bottom in the responder's process, and answers the robots that its magics start.
+
+A cell that raises is told of and the next one is run. Which run is marked, and what becomes of it, is the worker's.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import linecache
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from . import cell_source, student_code
+from .frames import Frame, Wire, clip, fits
+from .lockdown import Grants
+from .responder_role import Responder
+from .shell import Shell
+
+_MOST_NOTES = 60
+_SHOWN = 2000
+_ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
+
+
+class Player(Responder):
+    """A notebook: its cells share one namespace, one clock and one file name; line numbers run on from cell to cell."""
+
+    def __init__(self, wire: Wire, grants: Grants, job: Frame) -> None:
+        super().__init__(wire, grants, job)
+        self._notes = 0
+        self._muted = False
+        self._robot_runs = False
+        self._given_msg: str | None = None
+
+    @property
+    def namespace(self) -> dict[str, Any]:
+        return self._namespace
+
+    def run(self) -> None:
+        """Play all cells, then answer until the worker closes the wire."""
+        from nbev3devsim import unseen
+
+        self._prepare()
+        shell = Shell(self)
+        unseen.install(shell)
+        self._namespace.update(get_ipython=lambda: shell, display=unseen.display, In=[], Out={})
+        builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
+        text = "".join(source + "\n" for source in self._job["cells"])
+        linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
+        above = 0
+        for place, source in enumerate(self._job["cells"]):
+            self._wire.send({"do": "cell", "place": place})
+            error = self._play(source, above, shell)
+            if error is not None:
+                self._wire.send({"do": "raised", "error": error})
+            above += source.count("\n") + 1
+        self._wire.send({"do": "played", "missing": self._missing()})
+        self._fix_msg()
+        self._serve()
+
+    def note(self, text: str) -> None:
+        """Tell the worker, with the line that is being run."""
+        self._notes += 1
+        if self._notes <= _MOST_NOTES:
+            line = student_code.line_of(sys._getframe(), self._name)
+            self._wire.send({"do": "note", "text": clip(text, 300), "line": line})
+
+    def expand(self, line: str) -> str:
+        """``{expression}`` and ``$name`` in a magic's line, by the names that the cell has there."""
+        if "{" not in line and "$" not in line:
+            return line
+        frame = sys._getframe()
+        while frame is not None and frame.f_code.co_filename != self._name:
+            frame = frame.f_back  # type: ignore[assignment]
+        return cell_source.expanded(line, self._namespace | (frame.f_locals if frame is not None else {}))
+
+    def run_python(self, text: str) -> None:
+        """More code of the cell's, as ``%time`` has it."""
+        exec(compile(text, self._name, "exec", dont_inherit=True), self._namespace)
+
+    def muted(self, work: Callable[[], None]) -> None:
+        self._muted = True
+        try:
+            work()
+        finally:
+            self._muted = False
+
+    def start_robot(self, name: str, arguments: str, body: str | None) -> None:
+        """Hand a robot program or its flags to the worker, and answer until the robot has come to its end."""
+        from nbev3devsim.load_nbev3devwidget import roboSim
+
+        if self._robot_runs:
+            self.note(f"%{name} was skipped: the robot is still running")
+            return
+        if body is not None and not fits(body + arguments):
+            self.note("the robot program was skipped: it is longer than about 60000 characters")
+            return
+        self._fix_msg()
+        self._robot_runs = True
+        began = self._units
+        line = student_code.line_of(sys._getframe(), self._name)
+        self._wire.send(
+            {
+                "do": "magic",
+                "name": name,
+                "arguments": clip(arguments, _SHOWN),
+                "body": body,
+                "line": line,
+                "missing": self._missing(),
+            }
+        )
+        while True:
+            frame = self._wire.receive()
+            if frame["do"] == "message":
+                self._hear(frame, began)
+                continue
+            break
+        self._robot_runs = False
+        self._units = max(self._units, began + frame["t"])
+        roboSim.collect(frame["data"], frame["images"])
+        if frame["state"] is not None:
+            roboSim.robot_state = frame["state"]
+
+    def _play(self, source: str, above: int, shell: Shell) -> Frame | None:
+        """Run one cell, ``above`` being the lines of all before it. The error that ended it, if any."""
+        try:
+            magic = cell_source.cell_magic(source)
+            if magic is not None:
+                self._call_cell_magic(magic, above, shell)
+            else:
+                self._run_cell(cell_source.python_source(source), above)
+        except BaseException as error:
+            if isinstance(error, SystemExit) and error.code in (None, 0):
+                return None
+            return student_code.describe(error, self._name)
+        return None
+
+    def _call_cell_magic(self, magic: cell_source.CellMagic, above: int, shell: Shell) -> None:
+        tree = ast.parse("get_ipython().run_cell_magic(_robomark_name, _robomark_line, _robomark_body)", self._name)
+        ast.increment_lineno(tree, above + magic.number - 1)
+        names = {
+            "_robomark_name": magic.name,
+            "_robomark_line": magic.line,
+            "_robomark_body": magic.body,
+            "get_ipython": lambda: shell,
+        }
+        exec(compile(tree, self._name, "exec", dont_inherit=True), names)
+
+    def _run_cell(self, text: str, above: int) -> None:
+        try:
+            tree = ast.parse(text, self._name)
+        except SyntaxError as error:
+            if error.lineno is not None:
+                error.lineno += above
+            raise
+        last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        ast.increment_lineno(tree, above)
+        exec(compile(tree, self._name, "exec", dont_inherit=True), self._namespace)
+        if last is None:
+            return
+        assert isinstance(last, ast.Expr)
+        shown = ast.Expression(last.value)
+        ast.increment_lineno(shown, above)
+        value = eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
+        if value is not None and not text.rstrip().endswith(";"):
+            self._namespace["_"] = value
+            # Where in memory a thing lies is nobody's business, and another place each time.
+            print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
+
+    def _missing(self) -> str | None:
+        """Why there is nothing in force that could answer the robot, if so."""
+        try:
+            self._find()
+        except LookupError as error:
+            return str(error)
+        return None
+
+    def _fix_msg(self) -> None:
+        """A global ``msg`` of the notebook's own stays; else it is the last text received."""
+        mine = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
+        self._defines_msg = "msg" in self._namespace and not mine
+
+    def _answer(self, text: str) -> Frame:
+        frame = super()._answer(text)
+        if not self._defines_msg:
+            self._given_msg = text
+        return frame
+
+    def _emit(self, text: str) -> None:
+        if not self._muted:
+            super()._emit(text)
+
+
+def _leave(code: object = None) -> None:
+    """``exit()`` in a cell ends that cell."""
+    raise SystemExit(code)

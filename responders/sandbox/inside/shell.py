@@ -1,0 +1,155 @@
+"""What ``get_ipython()`` gives to a notebook's cells: magics by name, and refusals with a sentence.
+
+The magics that start the robot only pass on what they were told; the worker does the rest.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from . import refusals
+from .cell_source import python_source
+
+_ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
+_DIAGRAMS = ("blockdiag", "seqdiag", "actdiag", "nwdiag", "packetdiag", "rackdiag")
+#: What only sets up or shows something in a browser.
+_WITHOUT_EFFECT = frozenset(
+    (
+        *("load_ext", "reload_ext", "unload_ext", "matplotlib", "pylab", "config", "autoreload", "precision", "xmode"),
+        *("colors", "autosave", "alias_magic", "pinfo", "pdoc", "psource"),
+        *("html", "HTML", "javascript", "js", "markdown", "latex", "svg", "SVG"),
+    )
+)
+_PROGRAMS = frozenset(
+    ("bash", "sh", "script", "sx", "system", "cmd", "perl", "ruby", "python", "python2", "python3", "pypy", "R")
+)
+_PACKAGES = frozenset(("pip", "pip3", "conda", "mamba"))
+_NO_PACKAGES = (
+    "packages cannot be installed here; numpy, pandas, scikit-learn, joblib, Pillow and the course's modules are there"
+)
+
+
+class Player(Protocol):
+    """What the shell needs of the notebook that is being played."""
+
+    @property
+    def namespace(self) -> dict[str, Any]: ...
+
+    def note(self, text: str) -> None: ...
+    def start_robot(self, name: str, arguments: str, body: str | None) -> None: ...
+    def run_python(self, text: str) -> None: ...
+    def expand(self, line: str) -> str: ...
+    def muted(self, work: Callable[[], None]) -> None: ...
+
+
+class Shell:
+    """The part of IPython's shell that notebooks of the course use."""
+
+    def __init__(self, player: Player) -> None:
+        self._player = player
+        self._lines: dict[str, Callable[[str], Any]] = {
+            "cat": self._cat,
+            "less": self._cat,
+            "more": self._cat,
+            "pycat": self._cat,
+            "ls": self._ls,
+            "time": lambda line: self._player.run_python(python_source(line)),
+        }
+        self._cells: dict[str, Callable[[str, str], Any]] = {
+            "writefile": self._write,
+            "file": self._write,
+            "time": lambda _, body: self._player.run_python(python_source(body)),
+            "capture": lambda _, body: self._player.muted(lambda: self._player.run_python(python_source(body))),
+        }
+
+    @property
+    def user_ns(self) -> dict[str, Any]:
+        return self._player.namespace
+
+    def run_line_magic(self, magic_name: str, line: str, _stack_depth: int = 1) -> Any:
+        """``%name line``; what cannot be done is noted."""
+        name = str(magic_name).lstrip("%")
+        line = self._player.expand(str(line))
+        if name in _ROBOT:
+            return self._player.start_robot(name, line, None)
+        data = _data_magics().get(name)
+        if data is not None:
+            return data(_words(line))
+        if name in self._lines:
+            return self._lines[name](line)
+        return self._without(name, f"%{name}")
+
+    def run_cell_magic(self, magic_name: str, line: str, cell: str) -> Any:
+        """``%%name line`` and the rest of the cell."""
+        name = str(magic_name).lstrip("%")
+        line, body = self._player.expand(str(line)), str(cell)
+        if name in _ROBOT:
+            return self._player.start_robot(name, line, body)
+        if name in self._cells:
+            return self._cells[name](line, body)
+        if name in _DIAGRAMS:
+            return self._player.note(f"%%{name} was skipped: diagrams are not drawn here")
+        return self._without(name, f"%%{name}")
+
+    def magic(self, arg_s: str) -> Any:
+        name, _, line = str(arg_s).lstrip("%").partition(" ")
+        return self.run_line_magic(name, line)
+
+    def system(self, cmd: str) -> None:
+        """``!cmd``: refused."""
+        self._player.note(f"!{_short(cmd)} was refused: {refusals.PROGRAMS}")
+
+    def getoutput(self, cmd: str, *_: Any, **__: Any) -> list[str]:
+        """``x = !cmd``: refused, and nothing comes of it."""
+        self.system(cmd)
+        return []
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *args, **kwargs: None
+
+    def _without(self, name: str, shown: str) -> None:
+        if name in _PROGRAMS:
+            self._player.note(f"{_short(shown)} was refused: {refusals.PROGRAMS}")
+        elif name in _PACKAGES:
+            self._player.note(f"{shown} was refused: {_NO_PACKAGES}")
+        elif name not in _WITHOUT_EFFECT:
+            self._player.note(f"{_short(shown)} was skipped: it is not known here")
+
+    def _cat(self, line: str) -> None:
+        for name in _words(line):
+            with open(name, encoding="utf-8", errors="replace") as file:
+                print(file.read())
+
+    def _ls(self, _: str) -> None:
+        print("  ".join(sorted(os.listdir("."))))
+
+    def _write(self, line: str, body: str) -> None:
+        words = _words(line)
+        adds = [word for word in words if word in ("-a", "--append")]
+        names = [word for word in words if word not in ("-a", "--append")]
+        if len(names) != 1:
+            raise ValueError("%%writefile needs the name of one file")
+        verb = "Appending to" if adds else "Overwriting" if os.path.exists(names[0]) else "Writing"
+        print(f"{verb} {names[0]}")
+        with open(names[0], "a" if adds else "w", encoding="utf-8") as file:
+            file.write(body if body.endswith("\n") else body + "\n")
+
+
+def _data_magics() -> Mapping[str, Callable[[list[str]], Any]]:
+    from nbev3devsim.data_magics import MAGICS
+
+    return MAGICS
+
+
+def _words(line: str) -> list[str]:
+    return shlex.split(line, comments=False)
+
+
+def _short(text: str) -> str:
+    line = " ".join(str(text).split())
+    return line if len(line) <= 60 else line[:57] + "..."

@@ -1,0 +1,27 @@
+"""``robomark floors``: a page with every floor, to choose one and to read coordinates off it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import track
+
+from service.reports.figure import png
+from service.reports.floor_plot import draw_floor
+from service.reports.html import PrintedFloor, gallery
+from service.reports.written import prepare_folder, write_page
+from sim.backgrounds import floor, label_names, names
+
+
+def floors(
+    folder: Annotated[Path, typer.Argument(help="The folder to write index.html into.")],
+    sheet: Annotated[int, typer.Option(min=0, help="The seed of the handwriting on the digit sheets.")] = 0,
+) -> None:
+    """Draw every floor with its scale, the robot's start and its labels."""
+    prepare_folder(folder)
+    printed = []
+    for name in track(names(), "drawing", transient=True):
+        printed.append(PrintedFloor(name, png(draw_floor(floor(name, seed=sheet))), label_names(name)))
+    typer.echo(f"floors: {write_page(folder, 'index.html', gallery(printed))}")

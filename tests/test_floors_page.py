@@ -1,0 +1,18 @@
+"""The page of floors, as an instructor makes it to choose one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from command import robomark
+from sim.backgrounds import names
+
+
+def test_the_page_shows_every_floor_by_name_and_loads_nothing(tmp_path: Path) -> None:
+    ended = robomark("floors", tmp_path / "floors")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    page = (tmp_path / "floors" / "index.html").read_text()
+    assert re.findall(r'<img src="data:image/png;base64,[^"]{2000,}" alt="The floor (\w+)\.">', page) == list(names())
+    assert "labels: square, right facing triangle" in page
+    assert not re.search(r'(src|href)="(?!data:)', page)
