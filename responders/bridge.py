@@ -6,19 +6,21 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Conversation, Responder, ResponderOrder, error_fault, refusal
+from responders.conversation import Code, Collected, Conversation, Responder, ResponderOrder, error_fault, refusal
 from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
 from sim.arena import Arena
 from sim.backgrounds import Floor
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
+from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Verdict
 from sim.robot import Robot
 from sim.world import Chain, Noise, World
@@ -29,6 +31,7 @@ _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: How often a program may act without waiting; its own process counts too, and can name the line.
 _FREE_ACTS = 100_100
+_MOST_NOTES = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +59,7 @@ class TrialOrder:
     seconds: float
     seed: int
     pen_down: bool = False
+    physics: Physics = COURSE_PHYSICS
 
 
 class _Cut(Exception):
@@ -83,7 +87,7 @@ class Bridge:
         self._pulse = pulse
         self.now = 0
         self.chain = Chain()
-        self.world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, self.chain)
+        self.world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, self.chain, order.physics)
         self.conversation = Conversation(order.channel, order.seed, self.chain, responder)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
@@ -97,6 +101,9 @@ class Bridge:
         self._values: dict[str, Any] = {}
         self._encoded: dict[str, bytes] = {}
         self._told_in = -1
+        self._told_lines = self._told_images = 0
+        if responder is not None:
+            responder.collected = self.collected
         self._output_left = order.program.output_bytes
 
     def run(self) -> Fault | None:
@@ -127,6 +134,39 @@ class Bridge:
         except _Cut as cut:
             return cut.fault
 
+    def collected(self) -> Collected:
+        """What the program has logged since this was last asked, data and images."""
+        lines, images = self.printed[self._told_lines :], self.image_log[self._told_images :]
+        self._told_lines, self._told_images = len(self.printed), len(self.image_log)
+        data = (messages.datum(line.text, line.t) for line in lines)
+        return Collected(
+            tuple((datum.name, datum.value, datum.simtime, datum.t) for datum in data if datum is not None),
+            tuple(f"{side} {csv} {tick}" for side, csv, tick in images),
+        )
+
+    def robot_state(self) -> dict[str, Any]:
+        """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
+        world = self.world
+        state: dict[str, Any] = {
+            "x": world.pose.x,
+            "y": world.pose.y,
+            "angle": math.radians(world.pose.heading),
+            "ultrasonic": world.ultrasonic,
+            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
+            "penDown": self._order.pen_down,
+            "_sensorNoise": self._order.noise.light,
+            "_wheelNoise": self._order.noise.motor,
+        }
+        sums = (world.left_sums, world.right_sums)
+        for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
+            rgb = [total / world.pixels[number] for total in sums[number]]
+            state[f"sensor{number + 1}dataArray"] = messages.csv(image)
+            state[f"{side}_light_raw"] = rgb
+            state[f"{side}_light"] = int(rgb[0])
+            state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
+            state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
+        return state
+
     def _serve(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "read":
@@ -155,7 +195,8 @@ class Bridge:
             case "stuck":
                 self._never_waits(frame["line"])
             case "refused":
-                self.notes.append(refusal("program", frame))
+                if len(self.notes) < _MOST_NOTES:
+                    self.notes.append(refusal("program", frame))
 
     def _advance(self, units: int) -> None:
         """Let simulated time pass; a tick that is due at the very end of a wait still runs."""

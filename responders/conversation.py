@@ -40,8 +40,25 @@ class ResponderOrder:
     function: str | None = None  # the name of the responder; by the module's own choice if not given
 
 
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """What a robot has logged: name, value, the program's time or None, and the time; and images as the kit keeps them.
+
+    Images are texts ``left 245,226,... 30``: side, RGBA numbers, tick.
+    """
+
+    data: tuple[tuple[str, float, float | None, float], ...] = ()
+    images: tuple[str, ...] = ()
+
+
+def _nothing_collected() -> Collected:
+    return Collected()
+
+
 class Responder:
     """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
+
+    _schema = wire.RESPONDER
 
     def __init__(
         self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, pulse: Callable[[], None]
@@ -53,9 +70,12 @@ class Responder:
         self._output_left = order.output_bytes
         self.calls: list[Call] = []
         self.notes: list[str] = []
+        #: What the robot has logged since it was last asked; set by the bridge that serves the robot.
+        self.collected: Callable[[], Collected] = _nothing_collected
         for name, data in order.files.items():
             (folder / name).write_bytes(data)
         self._child: Child | None = sandboxes.spawn("responder", order.limits, folder)
+        self.walls = self._child.walls
         self._seed = seed
 
     def load(self) -> Fault | None:
@@ -88,8 +108,11 @@ class Responder:
             return None, 0, None
         slept: list[int] = []
         try:
-            self._child.send({"do": "message", "t": t, "text": text})
+            logged = self.collected()
+            self._child.send({"do": "message", "t": t, "text": text, "data": logged.data, "images": logged.images})
             frame = self._until("answer", message, slept)
+            said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
+            self._spend(said, "printed and answered")
         except ChildStopped as stop:
             return None, 0, self._stopped(stop, t)
         answered = t + sum(slept)
@@ -113,37 +136,39 @@ class Responder:
     def _until(self, last: str, message: int, slept: list[int]) -> wire.Frame:
         assert self._child is not None
         while True:
-            frame = self._child.receive(wire.RESPONDER, self._pulse)
-            match frame["do"]:
-                case "print":
-                    self._print(frame["text"])
-                case "refused":
-                    self.notes.append(refusal("responder", frame))
-                case "sleep":
-                    slept.append(frame["units"])
-                case "call":
-                    self.calls.append(
-                        Call(
-                            message,
-                            frame["depth"],
-                            frame["caller"],
-                            frame["callee"],
-                            frame["argument"],
-                            frame["result"],
-                        )
-                    )
-                case kind if kind == last:
-                    return frame
-                case kind:
-                    raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
+            frame = self._child.receive(self._schema, self._pulse)
+            if frame["do"] == last:
+                return frame
+            self._take(frame, message, slept)
+
+    def _take(self, frame: wire.Frame, message: int, slept: list[int]) -> None:
+        """A frame that waits for nothing. Raises ChildStopped for one that no honest child sends now."""
+        match frame["do"]:
+            case "print":
+                self._print(frame["text"])
+            case "refused":
+                self._note(refusal("responder", frame))
+            case "sleep":
+                slept[:] = [sum(slept) + frame["units"]]
+            case "call":
+                if len(self.calls) < _MOST_CALLS:
+                    words = (frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result"))
+                    self.calls.append(Call(message, frame["depth"], *words))
+            case kind:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
+
+    def _note(self, sentence: str) -> None:
+        if len(self.notes) < _MOST_NOTES:
+            self.notes.append(sentence)
 
     def _print(self, text: str) -> None:
-        self._output_left -= len(text.encode()) + 1
-        if self._output_left < 0:
-            raise ChildStopped(
-                Verdict.OUTPUT_LIMIT, f"the responder printed more than {self._order.output_bytes} bytes"
-            )
+        self._spend(text, "printed")
         self.output.append(text)
+
+    def _spend(self, text: str, did: str) -> None:
+        self._output_left -= len(text.encode("utf-8", "replace")) + 1
+        if self._output_left < 0:
+            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the responder {did} more than {self._order.output_bytes} bytes")
 
     def _stopped(self, stop: ChildStopped, t: int) -> Fault:
         self.close()
@@ -233,6 +258,9 @@ class Conversation:
         return ""
 
 
+_MOST_NOTES = 200
+#: Of the calls that are shown, and of the characters of each of their parts.
+_MOST_CALLS, _MOST_SHOWN = 10_000, 200
 _PYTHON_2 = (
     "Missing parentheses in call to",
     "leading zeros in decimal integer literals",

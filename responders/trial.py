@@ -5,13 +5,10 @@ Nothing outlives a trial but its recording; what the program and the responder d
 
 from __future__ import annotations
 
-import contextlib
 import os
-import shutil
 import stat
-import subprocess
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from responders import messages
@@ -22,10 +19,9 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict
 
-_PREFIX = "robomark-trial-"
 _LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
-_MOST_NOTES = 40
+MOST_NOTES = 40
 
 
 def run_trial(
@@ -40,7 +36,7 @@ def run_trial(
     ``pulse`` is called several times a second of real time and may raise to stop the trial.
     Raises HostError when the machine, not the student, fails.
     """
-    with _private_folder() as folder:
+    with sandboxes.private_folder() as folder:
         responder = None
         if order.responder is not None:
             responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
@@ -55,45 +51,24 @@ def run_trial(
         finally:
             if responder is not None:
                 responder.close()
-        log = _read_log(folder) if responder is not None else ""
+        log = read_log(folder) if responder is not None else ""
     bridge.conversation.finish()
     faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
     faults.sort(key=lambda each: each.t)
-    return _recording(order, bridge, responder, tuple(faults), log, program.walls)
+    recording = recording_of(order, bridge, tuple(faults), program.walls)
+    if responder is None:
+        return recording
+    return replace(
+        recording,
+        calls=tuple(responder.calls),
+        responder_output="\n".join(responder.output),
+        responder_log=log,
+        notes=(*recording.notes, *responder.notes)[:MOST_NOTES],
+    )
 
 
-@contextlib.contextmanager
-def _private_folder() -> Iterator[Path]:
-    """A folder for one trial, removed afterwards whatever the student's code has put into it."""
-    folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-"))
-    try:
-        yield folder
-    finally:
-        _remove(folder)
-
-
-def remove_left_overs() -> None:
-    """Remove the folders of trials whose worker was killed before it could do so itself."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*-*"):
-        worker = folder.name.removeprefix(_PREFIX).partition("-")[0]
-        # Another worker may be doing the same at this moment.
-        with contextlib.suppress(FileNotFoundError):
-            mine = folder.lstat().st_uid == os.getuid() and not folder.is_symlink()
-            if worker.isdecimal() and mine and not Path(f"/proc/{worker}").exists():
-                _remove(folder)
-
-
-def _remove(folder: Path) -> None:
-    try:
-        shutil.rmtree(folder, ignore_errors=True)
-    except RecursionError:
-        # rmtree recurses; a chain of a thousand folders is a student's doing.
-        subprocess.run(["rm", "-rf", "--", str(folder)], check=False)
-
-
-def _recording(
-    order: TrialOrder, bridge: Bridge, responder: Responder | None, faults: tuple[Fault, ...], log: str, walls: str
-) -> Recording:
+def recording_of(order: TrialOrder, bridge: Bridge, faults: tuple[Fault, ...], walls: str) -> Recording:
+    """What a bridge that has served its program has seen, but for what the responder's process told of itself."""
     world = bridge.world
     data = (messages.datum(line.text, line.t) for line in bridge.printed)
     return Recording(
@@ -108,22 +83,21 @@ def _recording(
         spoken=tuple(bridge.spoken),
         messages=tuple(bridge.conversation.messages),
         images=tuple(bridge.images),
-        calls=tuple(responder.calls) if responder is not None else (),
         datalog=tuple(datum for datum in data if datum is not None),
         image_log=tuple(bridge.image_log),
         touches=tuple(world.touches),
         faults=faults,
         obstacles=world.obstacles,
+        patches=order.floor.patches,
+        sheet=order.floor.sheet,
         robot=order.robot.name,
         pen=((0, True),) if order.pen_down else (),
-        responder_output="\n".join(responder.output) if responder is not None else "",
-        responder_log=log,
         walls=walls,
-        notes=tuple(bridge.notes + (responder.notes if responder is not None else []))[:_MOST_NOTES],
+        notes=tuple(bridge.notes)[:MOST_NOTES],
     )
 
 
-def _read_log(folder: Path) -> str:
+def read_log(folder: Path) -> str:
     """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped."""
     directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

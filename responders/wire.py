@@ -6,7 +6,8 @@ One strict JSON object a line, of a closed schema; there is no frame that could 
 from __future__ import annotations
 
 import json
-import math
+import re
+import sys
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -23,6 +24,8 @@ class WireError(Exception):
 
 Check = Callable[[object], bool]
 
+_LARGEST = sys.float_info.max
+
 
 def _text(value: object) -> bool:
     return isinstance(value, str)
@@ -37,7 +40,8 @@ def _flag(value: object) -> bool:
 
 
 def _number(value: object) -> bool:
-    return type(value) in (int, float) and math.isfinite(value)  # type: ignore[arg-type]
+    # A whole number of hundreds of digits is finite and no float.
+    return type(value) in (int, float) and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
 
 
 def _one_of(*values: object) -> Check:
@@ -151,6 +155,38 @@ RESPONDER: Schema = MappingProxyType(
     }
 )
 
+#: What the process of a notebook may say.
+NOTEBOOK: Schema = MappingProxyType(
+    {
+        **RESPONDER,
+        "cell": ({"place": _whole(0, 10**5)}, {}),
+        "raised": ({"error": _error}, {}),
+        "note": ({"text": _text, "line": _line}, {}),
+        "magic": (
+            {
+                "name": _one_of("sim_magic", "sim_magic_imports", "sim_magic_preloaded"),
+                "arguments": _text,
+                "body": _or_none(_text),
+                "line": _line,
+                "missing": _or_none(_text),
+            },
+            {},
+        ),
+        "played": ({"missing": _or_none(_text)}, {}),
+    }
+)
+
+#: What a process may say whose functions are called.
+CALLS: Schema = MappingProxyType(
+    {
+        **RESPONDER,
+        "returned": (
+            {"kind": _one_of("value", "missing", "error", "other", "long")},
+            {"text": _text, "error": _error, "type": _text, "length": _whole(0, 10**12)},
+        ),
+    }
+)
+
 #: The field that each kind of answer must have.
 _ANSWER = {"text": "text", "error": "error", "other": "type", "long": "length"}
 
@@ -169,8 +205,22 @@ def _no_duplicates(pairs: list[tuple[str, Any]]) -> Frame:
 _decode = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_no_duplicates).decode
 
 
+_NUMBER = re.compile(rb'\{"n":(0|[1-9][0-9]{0,11}),')
+
+
+def unnumbered(line: bytes) -> tuple[int, bytes]:
+    """The number that every line begins with, and the frame without it. Raises WireError.
+
+    Frames are counted from 0 in each direction: one that was lost, repeated or slipped in shows.
+    """
+    number = _NUMBER.match(line)
+    if number is None:
+        raise WireError("a frame without its number")
+    return int(number[1]), b"{" + line[number.end() :]
+
+
 def parse(line: bytes, schema: Schema) -> Frame:
-    """One frame of ``schema``. Raises WireError for anything else."""
+    """One frame of ``schema``, without its number. Raises WireError for anything else."""
     if len(line) > MOST:
         raise WireError(f"a frame of more than {MOST} bytes")
     try:
@@ -205,6 +255,6 @@ def parse(line: bytes, schema: Schema) -> Frame:
     return frame
 
 
-def encode(frame: Mapping[str, Any]) -> bytes:
-    """A frame for a child, as one line."""
-    return json.dumps(frame, separators=(",", ":")).encode("ascii") + b"\n"
+def encode(frame: Mapping[str, Any], number: int) -> bytes:
+    """A frame for a child, as one line that begins with its number."""
+    return json.dumps({"n": number, **frame}, separators=(",", ":")).encode("ascii") + b"\n"

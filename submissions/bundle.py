@@ -1,4 +1,4 @@
-"""From what a student handed in (a .py file, a folder, a .zip) to one ``Submission``, and to the bytes kept.
+"""From what a student handed in (a .py file, a notebook, a folder, a .zip) to one ``Submission``, and to bytes kept.
 
 Reading files safely is ``raw_files.py``; what a submission is marked against is the assignment's business.
 """
@@ -20,9 +20,11 @@ from typing import Literal
 
 from sim.errors import UsageError
 from submissions.assignment import Parts
+from submissions.marked_cell import marked_site, sites
+from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
 from submissions.source_text import decode_source
-from submissions.submission import Source, Submission
+from submissions.submission import Notebook, Source, Submission
 
 Part = Literal["program", "responder"]
 
@@ -32,6 +34,8 @@ _NAMES: Mapping[str, Part] = MappingProxyType(
 _CANONICAL: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
 _WORDS: Mapping[Part, str] = MappingProxyType({"program": "a robot program", "responder": "a responder"})
 _META = "submission.toml"
+_NOTEBOOK = ".ipynb"
+_PACKED_NOTEBOOK = "notebook.ipynb"
 _LOOKS_LIKE_RESPONDER = re.compile(
     r"^def[ \t]+(?:responder|\w+_responder)[ \t]*\("
     r"|^responder[ \t]*="
@@ -43,7 +47,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 
 
 def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
-    """What one student handed in at ``path``: a .py file, a folder or a .zip.
+    """What one student handed in at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
     ``student`` wins over the hand-in's own submission.toml, and that over the name of the file or folder.
     With ``asked`` a lone .py is the part that the assignment asks for, and a missing part is refused;
@@ -56,7 +60,7 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
     if path.is_symlink():
         raise UsageError(f"{where}: is a link, expected the file or folder itself.")
     if not path.exists():
-        raise UsageError(f"{where}: does not exist, expected a .py file, a folder or a .zip.")
+        raise UsageError(f"{where}: does not exist, expected a .py file, a notebook, a folder or a .zip.")
     suffix = path.suffix.lower()
     if path.is_dir():
         raw, name, candidate = read_folder(path), path.name, path.parent.name
@@ -66,10 +70,12 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
         raw = RawFiles({path.name: read_single_file(path)})
         candidate = path.parent.name
         name = candidate if path.name.lower() in _NAMES else path.stem
-    elif suffix == ".ipynb":
-        raise UsageError(f"{where}: is a notebook, expected robot.py and responder.py as files of their own.")
+    elif suffix == _NOTEBOOK:
+        raw, name, candidate = RawFiles({path.name: read_single_file(path)}), path.stem, path.parent.name
     else:
-        raise UsageError(f"{where}: is of a kind that cannot be read, expected a .py file, a folder or a .zip.")
+        raise UsageError(
+            f"{where}: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip."
+        )
     submission = _assemble(raw, where, name, candidate)
     if student is not None:
         submission = dataclasses.replace(submission, student=clean_name(student))
@@ -84,6 +90,8 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     part is missing.
     """
     where = where or submission.student
+    if submission.notebook is not None:
+        return _fit_notebook(submission, submission.notebook, asked, where)
     notes = list(submission.notes)
     parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
@@ -106,6 +114,32 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             parts[part] = None
     return dataclasses.replace(
         submission, program=parts.get("program"), responder=parts.get("responder"), notes=tuple(notes)
+    )
+
+
+def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
+    """The notebook if it is needed, else the files beside it."""
+    parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
+    givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
+    if all(parts[part] is not None for part, who in givers.items() if who == "student"):
+        note = f"{shown(notebook.name)} was left out: the files beside it are what is asked for."
+        alone = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
+        return fit_parts(alone, asked, where=where)
+    if asked.program == "student":
+        marked_site(notebook, asked.cell)
+    files, notes = dict(submission.files), list(submission.notes)
+    for source in (submission.program, submission.responder):
+        if source is not None:
+            files[source.name] = source.text.encode("utf-8", "surrogatepass")
+            notes.append(f"{shown(source.name)} lies beside the notebook; the notebook is what is run.")
+    if asked.program != "student" and sites(notebook):
+        notes.append(f"{shown(notebook.name)}: the assignment brings the robot program that is marked.")
+    return dataclasses.replace(
+        submission,
+        program=None,
+        responder=None,
+        files=MappingProxyType(dict(sorted(files.items()))),
+        notes=tuple(notes),
     )
 
 
@@ -132,6 +166,9 @@ def pack_submission(submission: Submission) -> bytes:
         if source is not None:
             meta.append(f"{part} = {_toml_text(source.name)}")
             entries[_CANONICAL[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
+    if submission.notebook is not None:
+        meta.append(f"notebook = {_toml_text(submission.notebook.name)}")
+        entries[_PACKED_NOTEBOOK] = pack_notebook(submission.notebook)
     entries[_META] = "\n".join([*meta, ""]).encode()
     buffer = BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
@@ -153,6 +190,10 @@ def unpack_submission(data: bytes) -> Submission:
         name = meta.get(part)
         text = files.pop(canonical, None) if isinstance(name, str) else None
         sources[part] = None if text is None else Source(str(name), text.decode("utf-8", "surrogatepass"))
+    notebook = None
+    if isinstance(meta.get("notebook"), str) and _PACKED_NOTEBOOK in files:
+        packed = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
+        notebook = dataclasses.replace(packed, name=str(meta["notebook"]))
     notes = meta.get("notes", [])
     assignment = meta.get("assignment")
     return Submission(
@@ -162,6 +203,7 @@ def unpack_submission(data: bytes) -> Submission:
         files=MappingProxyType(dict(sorted(files.items()))),
         assignment=assignment if isinstance(assignment, str) else None,
         notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
+        notebook=notebook,
     )
 
 
@@ -171,16 +213,14 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     meta = _read_meta(files.pop(_META, b""), where)
     if not files:
         raise UsageError(f"{where}: has no files in it, expected robot.py and responder.py.")
-    parts = _find_parts(files, where, notes)
+    notebook = _find_notebook(files, where, notes)
+    parts = _find_parts(files, where, notes, alone=notebook is None)
     sources: dict[Part, Source] = {}
     for part, file_name in parts.items():
         decoded = decode_source(files.pop(file_name), shown(file_name))
         sources[part] = Source(file_name, decoded.text)
         if decoded.note:
             notes.append(decoded.note)
-    for file_name in [file_name for file_name in files if file_name.lower().endswith(".ipynb")]:
-        notes.append(f"{shown(file_name)} is a notebook and was left out.")
-        del files[file_name]
     assignment = _text_of(meta, "assignment", where)
     return Submission(
         student=clean_name(_text_of(meta, "student", where) or name),
@@ -189,11 +229,50 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         files=MappingProxyType(dict(sorted(files.items()))),
         assignment=clean_name(assignment or candidate),
         notes=tuple(notes),
+        notebook=notebook,
     )
 
 
-def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str]) -> dict[Part, str]:
-    """Which file is which part: by name, else by what a lone file (or one of a pair) looks like."""
+def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Notebook | None:
+    """The one notebook among the files, or the file that nbconvert made of one; it is taken out of them."""
+    names = sorted(name for name in files if name.lower().endswith(_NOTEBOOK))
+    parts = {part for name in files if (part := _NAMES.get(name.lower()))}
+    if len(parts) == len(_CANONICAL):
+        for name in names:
+            del files[name]
+            notes.append(f"{shown(name)} is a notebook and was left out.")
+        return None
+    try:
+        if len(names) > 1:
+            found = ", ".join(map(shown, names[:5]))
+            raise UsageError(f"{where}: has {len(names)} notebooks in it ({found}), expected one.")
+        if names:
+            read = read_notebook(files[names[0]], shown(names[0]))
+            del files[names[0]]
+            notes.extend(read.notes)
+            return read.notebook
+    except UsageError as error:
+        sentence = str(error) if str(error).startswith(where) else f"{where}: {error}"
+        if not parts:
+            raise UsageError(sentence) from None
+        # What the assignment asks for may be in the .py file beside it.
+        notes.append(sentence)
+        for name in names:
+            del files[name]
+        return None
+    scripts = [name for name in sorted(files) if name.lower().endswith(".py") and _is_script(files[name], name)]
+    if len(scripts) != 1:
+        return None
+    notes.append(f"{shown(scripts[0])} was read as the notebook that it was made of.")
+    return read_script(decode_source(files.pop(scripts[0]), shown(scripts[0])).text, shown(scripts[0]))
+
+
+def _is_script(data: bytes, name: str) -> bool:
+    return b"get_ipython" in data and is_script(decode_source(data, shown(name)).text)
+
+
+def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alone: bool) -> dict[Part, str]:
+    """Which file is which part: by name, else, if ``alone``, by what a lone file (or one of a pair) looks like."""
     parts: dict[Part, str] = {}
     for name in sorted(files):
         part = _NAMES.get(name.lower())
@@ -202,7 +281,7 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str]) -> dic
         if part in parts:
             raise UsageError(f"{where}: has both {parts[part]} and {name}, expected one {_CANONICAL[part]}.")
         parts[part] = name
-    if parts:
+    if parts or not alone:
         return parts
     python = sorted(name for name in files if name.lower().endswith(".py"))
     looks: dict[Part, list[str]] = {"program": [], "responder": []}
@@ -213,8 +292,6 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str]) -> dic
         for part, name in found.items():
             notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
         return found
-    if any(name.lower().endswith(".ipynb") for name in files) and not python:
-        raise UsageError(f"{where}: has only a notebook in it, expected robot.py and responder.py.")
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
     raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both.")
 

@@ -1,4 +1,4 @@
-"""The flags of the notebook's magics, and the set-up that they give a fresh simulator.
+"""The flags of the notebook's magics, and the set-up that they give a simulator.
 
 The order, the clamps and the side effects are the original's (robolab sections 1.2 and 8); a flag that does
 not mean what it seems to say is pointed out in ``notes``.
@@ -6,14 +6,15 @@ not mean what it seems to say is pointed out in ``notes``.
 
 from __future__ import annotations
 
+import math
 import shlex
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from sim.backgrounds import OBSTACLE_PRESETS, floor, names
+from sim.backgrounds import OBSTACLE_PRESETS, names, start_of
 from sim.errors import UsageError
 from sim.recording import Pose
-from sim.robot import ROBOTS
+from sim.robot import ROBOTS, WIDE_EYES, usual_robot
 
 Preamble = Literal["none", "imports", "preloaded"]
 _PREAMBLES: dict[str, Preamble] = {
@@ -24,6 +25,7 @@ _PREAMBLES: dict[str, Preamble] = {
 
 _X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
 _LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
+_PEN_COLOURS = ("red", "orange", "green")
 
 #: Where a robot is put by a fresh widget, and by choosing a robot.
 _FRESH = Pose(200, 800, 0)
@@ -64,6 +66,9 @@ _SWITCHES = {
     "m": "move",
     "F": "refresh",
 }
+#: What only ``%sim_magic`` has, and what it lacks.
+_PLAIN_ONLY = frozenset({"S", "m", "F"})
+_PREVIEW_CODE = "previewcode"
 _LONG = {long: short for short, long in (_VALUED | _SWITCHES).items()}
 
 
@@ -101,7 +106,7 @@ def split_program(text: str) -> tuple[Flags, str]:
 
     Raises UsageError for a magic or a flag that does not exist.
     """
-    place = _magic_place(text)
+    place = magic_place(text)
     if place is None:
         return Flags(), text
     return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), without_magic(text)
@@ -110,14 +115,14 @@ def split_program(text: str) -> tuple[Flags, str]:
 def without_magic(text: str) -> str:
     """The program with its magic line as an empty comment, so that every other line keeps its number."""
     lines = text.split("\n")
-    place = _magic_place(text)
+    place = magic_place(text)
     if place is not None:
         lines[place] = "#"
     return "\n".join(lines)
 
 
-def _magic_place(text: str) -> int | None:
-    """Where the first line is that is neither blank nor a comment, if it is a magic."""
+def magic_place(text: str) -> int | None:
+    """The index of the first line that is neither blank nor a comment, if it is a magic."""
     for place, line in enumerate(text.split("\n")):
         stripped = line.lstrip("\ufeff").strip()
         if stripped and not stripped.startswith("#"):
@@ -125,16 +130,31 @@ def _magic_place(text: str) -> int | None:
     return None
 
 
+def is_program_magic(line: str) -> bool:
+    """Whether a line makes its cell a robot program, as ``%%sim_magic`` does and ``%sim_magic`` does not."""
+    stripped = line.lstrip("\ufeff").strip()
+    return stripped.startswith("%%") and (stripped.split(maxsplit=1) or [""])[0].lstrip("%") in _PREAMBLES
+
+
 def parse_magic(line: str, number: int = 1) -> Flags:
     """The flags of a ``%%sim_magic...`` line. Raises UsageError, naming line ``number``, for what does not exist."""
     name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
     try:
-        if name not in _PREAMBLES:
-            expected = ", ".join(f"%%{known}" for known in _PREAMBLES)
-            raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}")
-        return _flags(_words(name, "".join(rest)), _PREAMBLES[name])
+        return parse_flags(name, "".join(rest))
     except UsageError as error:
         raise UsageError(f"line {number}: {error}") from None
+
+
+def parse_flags(name: str, arguments: str) -> Flags:
+    """The flags of the magic ``name``. Raises UsageError for a magic or a flag that does not exist."""
+    if name not in _PREAMBLES:
+        expected = ", ".join(f"%%{known}" for known in _PREAMBLES)
+        raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}")
+    flags = _flags(_words(name, arguments), _PREAMBLES[name])
+    foreign = sorted(flags.switches & _PLAIN_ONLY)
+    if name != "sim_magic" and foreign:
+        raise UsageError(f"%%{name} has no flag -{foreign[0]}; only %sim_magic has it")
+    return flags
 
 
 def _words(name: str, arguments: str) -> list[str]:
@@ -152,11 +172,9 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
         word = waiting.pop(0)
         if word.startswith("--"):
             long, equals, value = word[2:].partition("=")
-            short = _LONG.get(long)
-            if long == "previewcode":
+            if long == _PREVIEW_CODE and preamble != "none":
                 continue
-            if short is None:
-                raise UsageError(f"there is no flag --{long[:40]}; --help of the course's magic lists them")
+            short = _short_of(long)
             if short in _VALUED:
                 values[short] = value if equals else _next(waiting, word)
             else:
@@ -168,13 +186,23 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
     return Flags(preamble, values, frozenset(switches))
 
 
+def _short_of(long: str) -> str:
+    """The letter of a long flag; the course's magics take any beginning of its name that no other has."""
+    found = [long] if long in _LONG else [name for name in _LONG if long and name.startswith(long)]
+    if len(found) == 1:
+        return _LONG[found[0]]
+    if found:
+        raise UsageError(f"--{long[:40]} may be {' or '.join(f'--{name}' for name in found)}")
+    raise UsageError(f"there is no flag --{long[:40]}; --help of the course's magic lists them")
+
+
 def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
     """Single letters may stand together (-HWZ); one that takes a value takes the rest of the word, or the next word."""
     for place, letter in enumerate(letters):
         if letter in _SWITCHES:
             switches.add(letter)
         elif letter in _VALUED:
-            rest = letters[place + 1 :]
+            rest = letters[place + 1 :].removeprefix("=")
             values[letter] = rest if rest else _next(waiting, f"-{letter}")
             return
         else:
@@ -189,75 +217,104 @@ def _next(waiting: list[str], flag: str) -> str:
 
 def setup(flags: Flags) -> Setup:
     """What a fresh simulator looks like after these flags. Raises UsageError for a number that is none."""
-    return _Widget().apply(flags)
+    return Simulator().apply(flags)
 
 
-class _Widget:
-    """The original's page: sliders that clamp, and moves that read all three of them."""
+class Simulator:
+    """The original's page: sliders that clamp, and moves that read all three of them.
+
+    What a flag sets stays until another sets it; switches hold for one magic. It runs nothing.
+    """
 
     def __init__(self) -> None:
         self.background = "Empty_Map"
         self.robot = "Default_Robot"
         self.obstacles: tuple[tuple[float, float, float, float], ...] = ()
         self.pose = _FRESH
-        self.angle_slider = 0
-        self.noise = {"N": 0.0, "M": 0.0}
-        self.notes: list[str] = []
+        self._angle_slider = 0
+        self._noise = {"N": 0.0, "M": 0.0}
+        self._noise_is_heard = True
+        self._notes: list[str] = []
 
     def apply(self, flags: Flags) -> Setup:
+        """What the page shows after these flags. Raises UsageError for a number that is none."""
+        self._notes = []
         values = flags.values
+        wanted = {flag: self._slider(flag, values, most) for flag, most in _SLIDERS.items()}
         if "r" in values:
             self._choose_robot(values["r"])
         if "b" in values:
             self._choose_background(values["b"])
         if "o" in values:
             self._choose_obstacles(values["o"])
-        x, y = self._slider("x", values, _X_MOST), self._slider("y", values, _Y_MOST)
-        angle = self._slider("a", values, _ANGLE_MOST)
-        if x is not None or y is not None or angle is not None:
+        x, y, angle = wanted["x"], wanted["y"], wanted["a"]
+        if "m" in flags.switches or x is not None or y is not None or angle is not None:
             self._move(x, y, angle)
-        light = self._slider("N", values, _LIGHT_NOISE_MOST)
-        if light is not None:
-            self.noise["N"] = light
-            before = self.pose
-            self._move(None, None, None)
-            if before.heading != self.pose.heading:
-                self._note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
-        motor = self._slider("M", values, _MOTOR_NOISE_MOST)
-        if motor is not None:
-            self.noise["M"] = motor
+        self._choose_noise(wanted["N"], wanted["M"])
+        if "P" in values and values["P"] not in _PEN_COLOURS:
+            self._note(f"-P {values['P'][:40]} is no colour of the pen's; it has {', '.join(_PEN_COLOURS)}")
         return Setup(
             self.background,
             self.robot,
             self.obstacles,
             self.pose,
-            self.noise["N"],
-            self.noise["M"],
+            self._noise["N"],
+            self._noise["M"],
             "p" in flags.switches,
             "L" in flags.switches,
-            tuple(self.notes),
+            tuple(self._notes),
         )
 
+    def leave_at(self, pose: Pose) -> None:
+        """A run has ended: the robot stays where it is."""
+        self.pose = pose
+
     def _choose_robot(self, name: str) -> None:
-        if name not in ROBOTS:
+        if name not in ROBOTS or name == WIDE_EYES:
             self._note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator")
             name = "Default_Robot"
         self.robot, self.pose = name, _AFTER_ROBOT
+        self._noise = {"N": 0.0, "M": 0.0}
+        self._noise_is_heard = True
 
     def _choose_background(self, name: str) -> None:
         if name not in names():
             self._note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator")
             name = "Empty_Map"
-        chosen = floor(name)
-        self.background, self.obstacles, self.pose = name, chosen.obstacles, chosen.default_pose
+        self.background = name
+        self.pose, self.obstacles = start_of(name)
         if 0 <= self.pose.heading <= _ANGLE_MOST:
-            self.angle_slider = round(self.pose.heading)
+            self._angle_slider = round(self.pose.heading)
+        if usual_robot(name) == WIDE_EYES:
+            self._note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
+            self.robot = WIDE_EYES
+            self._noise = {"N": 0.0, "M": 0.0}
+            self._noise_is_heard = False
+        elif self.robot == WIDE_EYES:
+            # The original would keep them for the rest of the session; nothing leaks here.
+            self.robot = "Default_Robot"
 
     def _choose_obstacles(self, name: str) -> None:
         if name in OBSTACLE_PRESETS and name != "None":
             self.obstacles = OBSTACLE_PRESETS[name]
         elif name != "None":
             self._note(f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator")
+        elif self.obstacles:
+            self._note(
+                "-o None leaves the obstacles as they are, as in the simulator; choosing a background clears them"
+            )
+
+    def _choose_noise(self, light: int | None, motor: int | None) -> None:
+        if (light or motor) and not self._noise_is_heard:
+            self._note("-N and -M do nothing after -b Radial_grey until a robot is chosen (-r), as in the simulator")
+        if light is not None:
+            self._noise["N"] = light if self._noise_is_heard else 0.0
+            before = self.pose
+            self._move(None, None, None)
+            if before.heading != self.pose.heading:
+                self._note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
+        if motor is not None:
+            self._noise["M"] = motor if self._noise_is_heard else 0.0
 
     def _slider(self, flag: str, values: dict[str, str], most: int) -> int | None:
         """A whole number, moved into the slider's range."""
@@ -269,19 +326,27 @@ class _Widget:
             raise UsageError(f"-{flag} {values[flag][:40]}: expected a whole number between 0 and {most}") from None
         value = min(max(wanted, 0), most)
         if value != wanted:
-            self._note(f"-{flag} {wanted} becomes {value}: the simulator's slider goes from 0 to {most}")
+            self._note(f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {most}")
         return value
 
     def _move(self, x: int | None, y: int | None, angle: int | None) -> None:
         """Every move reads all three sliders; those of x and y follow the robot, that of the angle does not."""
         if angle is not None:
-            self.angle_slider = angle
-        x = min(max(round(self.pose.x), 0), _X_MOST) if x is None else x
-        y = min(max(round(self.pose.y), 0), _Y_MOST) if y is None else y
-        if angle is None and self.pose.heading != self.angle_slider:
-            self._note(f"setting the position turns the robot to {self.angle_slider} degrees; add -a to choose")
-        self.pose = Pose(x, y, self.angle_slider)
+            self._angle_slider = angle
+        x = _on_slider(self.pose.x, _X_MOST) if x is None else x
+        y = _on_slider(self.pose.y, _Y_MOST) if y is None else y
+        if angle is None and self.pose.heading != self._angle_slider:
+            self._note(f"setting the position turns the robot to {self._angle_slider} degrees; add -a to choose")
+        self.pose = Pose(x, y, self._angle_slider)
 
     def _note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes.append(text)
+        if text not in self._notes:
+            self._notes.append(text)
+
+
+_SLIDERS = {"x": _X_MOST, "y": _Y_MOST, "a": _ANGLE_MOST, "N": _LIGHT_NOISE_MOST, "M": _MOTOR_NOISE_MOST}
+
+
+def _on_slider(value: float, most: int) -> int:
+    """Where a slider that follows the robot stands; JavaScript rounds halves up."""
+    return min(max(math.floor(value + 0.5), 0), most)

@@ -79,9 +79,10 @@ class _Budget:
             size += len(chunk)
             self.total += len(chunk)
             if size > MAX_FILE_BYTES:
+                advice = "; clear its outputs before you save it" if name.lower().endswith(".ipynb") else ""
                 raise UsageError(
                     f"{self.where}: {shown(name)} is too large, expected at most "
-                    f"{MAX_FILE_BYTES // MEGABYTE} MB a file."
+                    f"{MAX_FILE_BYTES // MEGABYTE} MB a file{advice}."
                 )
             if self.total > MAX_TOTAL_BYTES:
                 raise UsageError(

@@ -203,7 +203,7 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     assert "kind" in refusal(tmp_path / "a.tar.gz")
     (tmp_path / "empty").mkdir()
     assert "no files" in refusal(tmp_path / "empty")
-    assert "only a notebook" in refusal(folder(tmp_path / "nb", {"a.ipynb": "{}"}))
+    assert "no list of cells" in refusal(folder(tmp_path / "nb", {"a.ipynb": "{}"}))
     assert "found model.joblib" in refusal(folder(tmp_path / "m", {"model.joblib": b"x"}))
     assert "both program.py and robot.py" in refusal(
         folder(tmp_path / "two", {"robot.py": PROGRAM, "program.py": PROGRAM})

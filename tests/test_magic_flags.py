@@ -5,8 +5,42 @@ from __future__ import annotations
 import pytest
 
 from sim.errors import UsageError
-from submissions.magics import Flags, parse_magic, setup, split_program, without_magic
+from sim.recording import Pose
+from submissions.magics import Flags, Setup, Simulator, parse_flags, parse_magic, setup, split_program, without_magic
 
+#: Every flag of the original's magics (robolab section 8), but for --help and --previewcode.
+LETTERS = {
+    "s": "sim",
+    "b": "background",
+    "r": "robotSetup",
+    "o": "obstacles",
+    "x": "xpos",
+    "y": "ypos",
+    "a": "angle",
+    "u": "ultrasound",
+    "p": "pendown",
+    "P": "pencolor",
+    "C": "clear",
+    "q": "quiet",
+    "c": "chart",
+    "O": "output",
+    "A": "array",
+    "z": "noisecontrols",
+    "Z": "settings",
+    "X": "positioning",
+    "D": "code",
+    "i": "instrumentation",
+    "W": "world",
+    "H": "hide",
+    "R": "autorun",
+    "v": "preview",
+    "N": "sensornoise",
+    "M": "motornoise",
+    "L": "collab",
+    "S": "stop",
+    "m": "move",
+    "F": "refresh",
+}
 POSES = [
     ("", (200, 800, 0)),
     ("-b Loop", (500, 500, 90)),
@@ -26,12 +60,15 @@ POSES = [
     ("-r Small_Robot -b Loop", (500, 500, 90)),
     ("-b Nowhere", (100, 800, 0)),
     ("--background=Loop --angle=45", (500, 500, 45)),
+    ("--back Loop --ang 45 -x=7", (7, 500, 45)),
+    ("-b Lollipop -m", (750, 375, 0)),
+    ("-b Square -x 550 -m", (550, 300, 0)),
 ]
 
 
 @pytest.mark.parametrize(("flags", "pose"), POSES)
 def test_pose(flags: str, pose: tuple[float, float, float]) -> None:
-    chosen = setup(parse_magic(f"%%sim_magic_preloaded {flags}")).pose
+    chosen = setup(parse_magic(f"%%sim_magic {flags}")).pose
     assert (chosen.x, chosen.y, chosen.heading) == pose
 
 
@@ -45,6 +82,10 @@ def test_pose(flags: str, pose: tuple[float, float, float]) -> None:
         ("-b Lollipop -x 700", "turns the robot to 0 degrees"),
         ("-N 500", "becomes 128"),
         ("-o Maze", "stay as they are"),
+        ("-b Obstacles_Test -o None", "-o None leaves the obstacles as they are"),
+        ("-P blue", "-P blue is no colour of the pen's; it has red, orange, green"),
+        ("-b Radial_grey", "also sets the light sensors 60 mm to either side"),
+        ("-b Radial_grey -N 10", "-N and -M do nothing after -b Radial_grey"),
     ],
 )
 def test_a_flag_that_does_not_mean_what_it_says_is_pointed_out(flags: str, words: str) -> None:
@@ -69,6 +110,10 @@ def test_single_letters_stand_together_and_the_rest_is_read() -> None:
         "%%sim_magic -x",
         "%%sim_magic loop",
         "%%sim_magic 'x",
+        "%%sim_magic --s 1",
+        "%%sim_magic_preloaded -F",
+        "%%sim_magic_imports -m",
+        "%%sim_magic --previewcode",
     ],
 )
 def test_a_line_that_cannot_be_read_is_refused_in_one_sentence(line: str) -> None:
@@ -113,3 +158,50 @@ def test_a_refused_line_is_named_by_its_number_and_is_none_of_the_program() -> N
 def test_a_magic_without_a_name_is_refused(line: str) -> None:
     with pytest.raises(UsageError, match=r"^line 1: "):
         split_program(line)
+
+
+def pages(*lines: str) -> list[Setup]:
+    """What one simulator shows after each of several magics."""
+    simulator = Simulator()
+    return [simulator.apply(parse_flags("sim_magic", line)) for line in lines]
+
+
+def test_what_a_flag_sets_stays_and_switches_do_not() -> None:
+    first, second, third = pages("-b Loop -N 10 -M 20 -o Wall -p -L", "-x 100", "-b Square")
+    assert (first.pen_down, first.collaborative) == (True, True)
+    assert (second.pen_down, second.collaborative, second.background) == (False, False, "Loop")
+    assert (second.light_noise, second.motor_noise, second.obstacles) == (10, 20, ((1500, 200, 200, 800),))
+    # Choosing a floor clears the obstacles, and not the noise.
+    assert (third.obstacles, third.light_noise) == ((), 10)
+
+
+def test_choosing_a_robot_forgets_the_noise() -> None:
+    _, second = pages("-N 10 -M 20", "-r Small_Robot")
+    assert (second.light_noise, second.motor_noise, second.robot) == (0, 0, "Small_Robot")
+
+
+def test_noise_does_nothing_on_radial_grey_until_a_robot_is_chosen() -> None:
+    first, second, third = pages("-b Radial_grey -N 10 -M 20", "-r Default_Robot -N 10", "-b Loop")
+    assert (first.robot, first.light_noise, first.motor_noise) == ("Default_Robot_Wide_Eyes", 0, 0)
+    assert (second.robot, second.light_noise) == ("Default_Robot", 10)
+    assert third.robot == "Default_Robot"
+    assert pages("-b Radial_grey", "-b Loop")[1].robot == "Default_Robot"
+    assert "Default_Robot is used" in pages("-r Default_Robot_Wide_Eyes")[0].notes[0]
+
+
+def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> None:
+    simulator = Simulator()
+    simulator.leave_at(Pose(321.5, 234.49, -45.25))
+    assert simulator.apply(Flags()).pose == Pose(321.5, 234.49, -45.25)
+    # The sliders follow the robot in whole numbers; that of the angle does not follow.
+    assert simulator.apply(parse_flags("sim_magic", "-y 5")).pose == Pose(322, 5, 0)
+
+
+def test_run_takes_every_flag_of_the_magics() -> None:
+    from typer.main import get_command
+
+    from service.command_line import app
+
+    options = {name for option in get_command(app).commands["run"].params for name in option.opts}  # type: ignore[attr-defined]
+    assert {f"-{letter}" for letter in LETTERS} <= options
+    assert {f"--{name}" for name in LETTERS.values()} <= options

@@ -5,7 +5,15 @@ They are written as students write them and run inside the walls; nothing here i
 
 from importlib import resources
 
-NAMES = ("echo_responder", "json_responder", "image_parser", "shape_responder", "rule_responder")
+NAMES = (
+    "echo_responder",
+    "json_responder",
+    "image_parser",
+    "shape_responder",
+    "rule_responder",
+    "digit_responder",
+    "plain_digit_responder",
+)
 
 
 def source(name: str) -> str:

@@ -5,10 +5,13 @@ There is no widget and no browser here; what only shows something does nothing.
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
+
+_EPOCH = datetime.datetime(2020, 1, 1)
 
 
 class RoboSim:
@@ -18,6 +21,7 @@ class RoboSim:
         self.pyresponder: Callable[[str], Any] | None = None
         self.raw_image_data: list[str] = []
         self.results_log: list[dict[str, Any]] = []
+        self.robot_state: dict[str, Any] = {}
         self.live_image_handler: Callable[[int], Any] | None = None
 
     def process_raw_image_data(self, raw_data: str, mode: str = "rgb", to_str: bool = True) -> str | list[str]:
@@ -41,6 +45,13 @@ class RoboSim:
             side, values, clock = entry.split(" ")[:3]
             rows.append((side, self.process_raw_image_data(values, mode), clock))
         return pd.DataFrame(rows, columns=["side", "vals", "clock"])
+
+    def collect(self, data: list[list[Any]], images: list[str]) -> None:
+        """What the robot has logged: each of ``data`` is name, value, the program's time or None, and the time."""
+        for name, value, simtime, seconds in data:
+            moment = _EPOCH + datetime.timedelta(seconds=seconds)
+            self.results_log.append({"index": moment, "simtime": simtime, name: value})
+        self.raw_image_data.extend(images)
 
     def clear_datalog(self) -> None:
         self.results_log.clear()

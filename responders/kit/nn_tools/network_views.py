@@ -22,8 +22,12 @@ from nn_tools.sensor_data import (
     jiggle,
     make_image_black_and_white,
 )
+from nn_tools.weights import check_classifier
 
-_NO_CNN = "convolutional networks in TensorFlow Lite's format cannot be loaded here; use a scikit-learn network"
+_NO_CNN = (
+    "convolutional networks in TensorFlow Lite's format cannot be loaded here; "
+    "use a scikit-learn network, or ONNX's format with nn_tools.load_onnx"
+)
 
 
 def class_predict_from_image(
@@ -37,6 +41,7 @@ def class_predict_from_image(
     """The class that the network gives the image; what ``zoomview`` and ``confidence`` draw is left out."""
     values = generate_signature(img, linear=True) if signature else get_image_features(img)
     row = normalize([values], norm="max")
+    check_classifier(MLP, len(values))
     prediction = MLP.predict(row)[0]
     if not quiet:
         print(f"MLP predicts {prediction}")

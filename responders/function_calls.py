@@ -1,0 +1,133 @@
+"""Calls functions of a responder, or of an instructor's check, inside the walls and without a robot.
+
+The module is loaded once in a fresh child and its functions are called one after the other; what the values are worth
+is judged elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from responders import wire
+from responders.conversation import Code, Responder, ResponderOrder, error_fault
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import ChildLimits, ChildStopped
+from sim.recording import Fault, Verdict
+
+#: Tells the child that no function of the module has to be a responder.
+_NO_RESPONDER = ""
+
+
+#: The field that each kind of value must have.
+_NEEDED = {"value": "text", "error": "error", "other": "type"}
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionCall:
+    """A function's name and what it is called with; all of it has to have a form in JSON."""
+
+    function: str
+    arguments: Sequence[Any] = ()
+    named: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Returned:
+    """What a call gave: a value as JSON has it, or what went wrong instead."""
+
+    value: Any = None
+    fault: Fault | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Called:
+    """What all calls gave, in their order. ``fault`` is what kept the module from being loaded."""
+
+    returned: tuple[Returned, ...]
+    fault: Fault | None
+    walls: str
+    output: str = ""
+
+
+def call_functions(
+    code: Code,
+    files: Mapping[str, bytes],
+    calls: Sequence[FunctionCall],
+    limits: ChildLimits,
+    output_bytes: int,
+    sandboxes: Sandboxes,
+    seed: int,
+    pulse: Callable[[], None] = lambda: None,
+) -> Called:
+    """Load ``code`` with ``files`` in its folder, and make the calls. ``limits`` are for all of them together.
+
+    Raises HostError when the machine, not the module, fails.
+    """
+    with sandboxes.private_folder() as folder:
+        order = ResponderOrder(code, files, limits, output_bytes, _NO_RESPONDER)
+        caller = _Caller(order, sandboxes, folder, seed, pulse)
+        try:
+            walls = caller.walls
+            fault = caller.load()
+            gave = tuple(caller.call(call) for call in calls) if fault is None else ()
+            return Called(gave, fault, walls, "\n".join(caller.output))
+        finally:
+            caller.close()
+
+
+class _Caller(Responder):
+    """A responder's process that is asked for functions by their names."""
+
+    _schema = wire.CALLS
+
+    def __init__(
+        self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, pulse: Callable[[], None]
+    ) -> None:
+        super().__init__(order, sandboxes, folder, seed, pulse)
+        assert self._child is not None
+        self.walls = self._child.walls
+        self._ended: Fault | None = None
+
+    def call(self, call: FunctionCall) -> Returned:
+        """Never raises for what the called code does; after its process has been stopped, every call has that fault."""
+        if self._child is None:
+            return Returned(fault=self._ended)
+        try:
+            self._child.send(
+                {"do": "call", "function": call.function, "arguments": list(call.arguments), "named": dict(call.named)}
+            )
+            frame = self._until("returned", -1, [])
+            needed = _NEEDED.get(frame["kind"])
+            if needed is not None and needed not in frame:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the process sent a value without its content")
+        except ChildStopped as stop:
+            self._ended = self._stopped(stop, 0)
+            return Returned(fault=self._ended)
+        return _read(frame, call.function)
+
+
+def _read(frame: wire.Frame, function: str) -> Returned:
+    """What a frame says that has the field its kind needs."""
+    match frame["kind"]:
+        case "value":
+            try:
+                return Returned(json.loads(frame["text"], parse_constant=_no_constant))
+            except (ValueError, RecursionError):
+                sentence = f"{function} returned a value that cannot be read"
+        case "missing":
+            sentence = f"there is no function called {function}"
+        case "long":
+            sentence = f"{function} returned a value that is too long to be passed on"
+        case "other":
+            sentence = f"{function} returned {frame['type'][:100]}, which cannot be passed on"
+        case _:
+            return Returned(fault=error_fault(frame["error"], 0, "responder"))
+    return Returned(fault=Fault(0.0, Verdict.RESPONDER_ERROR, "responder", sentence))
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is not JSON")

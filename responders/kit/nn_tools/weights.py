@@ -1,0 +1,228 @@
+"""Networks of one's own from files that are no pickles: plain weights (``.npz``) and, where it is installed, ONNX.
+
+Both answer to ``predict`` and ``predict_proba`` as scikit-learn's do. Nothing here trains a network.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+
+def _logistic(values: Numbers) -> Numbers:
+    return np.asarray(0.5 * (1 + np.tanh(0.5 * values)))
+
+
+_ACTIVATIONS: Mapping[str, Callable[[Numbers], Numbers]] = MappingProxyType(
+    {
+        "relu": lambda values: np.maximum(values, 0),
+        "tanh": lambda values: np.asarray(np.tanh(values)),
+        "logistic": _logistic,
+        "identity": lambda values: values,
+    }
+)
+
+
+class WeightsNetwork:
+    """A multi-layer perceptron from its weights: layer after layer, softmax at the end."""
+
+    def __init__(
+        self, coefs: list[Numbers], intercepts: list[Numbers], activation: str, classes: NDArray[Any], name: str
+    ) -> None:
+        self.coefs_, self.intercepts_, self.activation, self.classes_ = coefs, intercepts, activation, classes
+        self.n_features_in_ = coefs[0].shape[0]
+        self._name = name
+
+    def predict_proba(self, images: Any) -> Numbers:
+        """How likely each class is, shape (images, classes); ``images`` has one row of numbers an image."""
+        values = _rows(images, self.n_features_in_, self._name)
+        for coefs, intercepts in zip(self.coefs_[:-1], self.intercepts_[:-1], strict=True):
+            values = _ACTIVATIONS[self.activation](values @ coefs + intercepts)
+        return _softmax(values @ self.coefs_[-1] + self.intercepts_[-1])
+
+    def predict(self, images: Any) -> NDArray[Any]:
+        """The likeliest class of each image, shape (images,)."""
+        return np.asarray(self.classes_[self.predict_proba(images).argmax(axis=1)])
+
+
+class OnnxNetwork:
+    """A network in ONNX's format with one input of images and one output of a number a class."""
+
+    def __init__(self, session: Any, classes: Any, name: str) -> None:
+        self._session, self._name = session, name
+        inputs, outputs = session.get_inputs(), session.get_outputs()
+        if len(inputs) != 1 or not outputs:
+            raise ValueError(f"{name} has {len(inputs)} inputs; expected one, the images")
+        self._input = inputs[0].name
+        self._outputs = [output.name for output in outputs]
+        # The first dimension is the number of images; sizes that a model leaves open are not numbers.
+        self._shape = tuple(inputs[0].shape[1:])
+        if not self._shape or not all(isinstance(size, int) for size in self._shape):
+            raise ValueError(f"the input of {name} has the shape {inputs[0].shape}; expected sizes after the first")
+        self.n_features_in_ = int(np.prod(self._shape))
+        self.classes_ = None if classes is None else np.asarray(classes)
+
+    def predict_proba(self, images: Any) -> Numbers:
+        """How likely each class is, shape (images, classes); scores that are no shares go through softmax."""
+        rows = _rows(images, self.n_features_in_, self._name).astype(np.float32)
+        output = self._session.run(self._outputs, {self._input: rows.reshape(-1, *self._shape)})[-1]
+        scores = np.asarray(output, np.float64)
+        if scores.ndim != 2 or len(scores) != len(rows):
+            raise ValueError(f"{self._name} gave numbers of shape {scores.shape}; expected one row of classes an image")
+        shares = scores.min() >= 0 and np.allclose(scores.sum(axis=1), 1, atol=1e-3)
+        return scores if shares else _softmax(scores)
+
+    def predict(self, images: Any) -> NDArray[Any]:
+        """The likeliest class of each image: its number, or its name if ``classes`` were given."""
+        best = self.predict_proba(images).argmax(axis=1)
+        return best if self.classes_ is None else np.asarray(self.classes_[best])
+
+
+def load_weights(file: str | os.PathLike[str]) -> WeightsNetwork:
+    """The network in a ``.npz`` file with ``coefs_0``, ``intercepts_0``, ``coefs_1`` ..., ``activation``, ``classes``.
+
+    ``coefs_i`` has shape (inputs, outputs) of layer i, ``intercepts_i`` shape (outputs,); ``activation`` is relu, tanh,
+    logistic or identity, between layers; ``classes`` has one entry for each output of the last layer.
+    Raises ValueError with a sentence for any other file, and never unpickles.
+    """
+    name = Path(file).name
+    arrays = _arrays(file, name)
+    for wanted in ("coefs_0", "intercepts_0", "activation", "classes"):
+        if wanted not in arrays:
+            raise ValueError(f"{name} has no array called {wanted}; expected coefs_0, intercepts_0, coefs_1, ..., "
+                             "activation and classes")  # fmt: skip
+    layers = sum(key.startswith("coefs_") for key in arrays)
+    coefs = [_layer(arrays, f"coefs_{number}", name) for number in range(layers)]
+    intercepts = [_layer(arrays, f"intercepts_{number}", name) for number in range(layers)]
+    _check_chain(coefs, intercepts, name)
+    activation = str(arrays["activation"])
+    if activation not in _ACTIVATIONS:
+        raise ValueError(f"{name} has the activation {activation[:40]!r}; expected one of {', '.join(_ACTIVATIONS)}")
+    classes = arrays["classes"].ravel()
+    if len(classes) != coefs[-1].shape[1]:
+        raise ValueError(f"{name} has {len(classes)} classes and {coefs[-1].shape[1]} outputs; expected as many")
+    return WeightsNetwork(coefs, intercepts, activation, classes, name)
+
+
+def save_weights(network: Any, file: str | os.PathLike[str]) -> None:
+    """Write a trained MLPClassifier as a ``.npz`` file that ``load_weights`` reads."""
+    arrays: dict[str, Any] = {"activation": network.activation, "classes": network.classes_}
+    for number, (coefs, intercepts) in enumerate(zip(network.coefs_, network.intercepts_, strict=True)):
+        arrays |= {f"coefs_{number}": coefs, f"intercepts_{number}": intercepts}
+    np.savez_compressed(file, **arrays)
+
+
+def load_onnx(file: str | os.PathLike[str], classes: Any = None) -> OnnxNetwork:
+    """The network in an ``.onnx`` file; ``classes`` are the names of its outputs, numbers from 0 if not given.
+
+    Raises ValueError with a sentence when the file is no such network, ImportError when onnxruntime is missing.
+    """
+    name = Path(file).name
+    try:
+        import onnxruntime
+    except ImportError:
+        raise ImportError(
+            f"{name} cannot be loaded: this Robomark has no onnxruntime (pip install robomark[onnx]); "
+            "use a scikit-learn network or plain weights (.npz)"
+        ) from None
+    data = Path(file).read_bytes()
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    try:
+        session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise ValueError(f"{name} cannot be read as a network in ONNX's format: {str(error)[:200]}") from None
+    return OnnxNetwork(session, classes, name)
+
+
+def check_classifier(network: Any, inputs: int) -> None:
+    """Raises TypeError for a network that gives no class, ValueError for one of images of another size."""
+    kind = type(network).__name__
+    if _is_regressor(network):
+        raise TypeError(
+            f"this model is a regressor ({kind}): it answers with a number, not with a class; "
+            "train a classifier, such as MLPClassifier"
+        )
+    if not callable(getattr(network, "predict", None)):
+        raise TypeError(f"this model is a {kind}, which has no predict; expected a trained classifier")
+    wanted = getattr(network, "n_features_in_", None)
+    if isinstance(wanted, int | np.integer) and wanted != inputs:
+        raise ValueError(_other_size(int(wanted), inputs, "this model"))
+
+
+def _is_regressor(network: Any) -> bool:
+    from sklearn.base import is_regressor
+
+    if not hasattr(network, "__sklearn_tags__"):
+        return False
+    try:
+        return bool(is_regressor(network))
+    except Exception:
+        return False
+
+
+def _arrays(file: str | os.PathLike[str], name: str) -> dict[str, NDArray[Any]]:
+    try:
+        with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as packed:
+            return {key: packed[key] for key in packed.files}
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, AttributeError, EOFError, KeyError, zipfile.BadZipFile):
+        raise ValueError(f"{name} is no file of plain weights; expected arrays written by numpy.savez") from None
+
+
+def _layer(arrays: dict[str, NDArray[Any]], key: str, name: str) -> Numbers:
+    if key not in arrays:
+        raise ValueError(f"{name} has no array called {key}; expected layers numbered from 0, each with its intercepts")
+    if arrays[key].dtype.kind not in "fiu":
+        raise ValueError(f"{key} in {name} does not hold numbers; expected an array of floats")
+    return np.asarray(arrays[key], np.float64)
+
+
+def _check_chain(coefs: list[Numbers], intercepts: list[Numbers], name: str) -> None:
+    for number, (weights, offsets) in enumerate(zip(coefs, intercepts, strict=True)):
+        if weights.ndim != 2 or offsets.shape != weights.shape[1:]:
+            raise ValueError(
+                f"coefs_{number} and intercepts_{number} in {name} have the shapes {weights.shape} and "
+                f"{offsets.shape}; expected (inputs, outputs) and (outputs,)"
+            )
+        if number and weights.shape[0] != coefs[number - 1].shape[1]:
+            raise ValueError(
+                f"coefs_{number} in {name} takes {weights.shape[0]} numbers, but the layer before gives "
+                f"{coefs[number - 1].shape[1]}"
+            )
+
+
+def _rows(images: Any, inputs: int, name: str) -> Numbers:
+    values = np.asarray(images, np.float64)
+    if values.ndim == 0:
+        raise ValueError(f"{name} was shown a number; expected a list of images, one row of numbers each")
+    rows = values.reshape(1, -1) if values.ndim == 1 else values.reshape(len(values), -1)
+    if rows.shape[1] != inputs:
+        raise ValueError(_other_size(inputs, rows.shape[1], name))
+    return np.asarray(rows)
+
+
+def _other_size(wanted: int, given: int, name: str) -> str:
+    return (
+        f"{name} is for images of {_size(wanted)}, but was shown one of {_size(given)}: resize the image, or train anew"
+    )
+
+
+def _size(numbers: int) -> str:
+    side = round(numbers**0.5)
+    return f"{side} x {side} pixels ({numbers} numbers)" if side * side == numbers else f"{numbers} numbers"
+
+
+def _softmax(scores: Numbers) -> Numbers:
+    powers = np.exp(scores - scores.max(axis=1, keepdims=True))
+    return np.asarray(powers / powers.sum(axis=1, keepdims=True))

@@ -1,0 +1,95 @@
+"""What stands in a Python file, found in its syntax tree: runs inside the walls, because a parser can be made to crash.
+
+It imports nothing of ours, runs nothing of what it reads, and judges nothing.
+"""
+
+import ast
+
+_CONSTRUCTS = {
+    ast.For: "for",
+    ast.AsyncFor: "for",
+    ast.While: "while",
+    ast.If: "if",
+    ast.IfExp: "if",
+    ast.Break: "break",
+    ast.Continue: "continue",
+    ast.FunctionDef: "def",
+    ast.AsyncFunctionDef: "def",
+    ast.Return: "return",
+    ast.ClassDef: "class",
+    ast.Lambda: "lambda",
+    ast.Try: "try",
+    ast.With: "with",
+    ast.Global: "global",
+    ast.List: "list",
+    ast.Dict: "dict",
+    ast.ListComp: "comprehension",
+    ast.SetComp: "comprehension",
+    ast.DictComp: "comprehension",
+    ast.GeneratorExp: "comprehension",
+}
+_LOOPS = (ast.For, ast.AsyncFor, ast.While, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+_LONGEST_TEXT = 300_000
+_MOST = 400
+_LONGEST = 60
+
+
+def facts(text):
+    """Constructs, calls, names, functions and imports, each with the first line it stands in; or the error."""
+    if len(text) > _LONGEST_TEXT:
+        return {"error": {"text": f"it has more than {_LONGEST_TEXT} characters", "line": None}}
+    try:
+        tree = ast.parse(text)
+    except SyntaxError as error:
+        return {"error": {"text": str(error.msg)[:200], "line": error.lineno}}
+    except ValueError:
+        return {"error": {"text": "it has characters that no Python file has", "line": None}}
+    except (RecursionError, MemoryError):
+        return {"error": {"text": "it is nested too deeply", "line": None}}
+    found = {"constructs": {}, "calls": {}, "looped": {}, "names": {}, "functions": {}, "imports": {}}
+    waiting = [(tree, False)]
+    while waiting:
+        node, in_loop = waiting.pop()
+        _note(node, in_loop, found)
+        below = in_loop or isinstance(node, _LOOPS)
+        waiting.extend((child, below) for child in reversed(list(ast.iter_child_nodes(node))))
+    return {"error": None, **{kind: sorted(lines.items(), key=lambda item: item[1]) for kind, lines in found.items()}}
+
+
+def _note(node, in_loop, found):
+    line = getattr(node, "lineno", 0)
+    kind = _CONSTRUCTS.get(type(node))
+    if kind:
+        _add(found["constructs"], kind, line)
+    if isinstance(node, (ast.If, ast.For, ast.While)) and node.orelse:
+        _add(found["constructs"], "else", line)
+    if isinstance(node, ast.Call):
+        name = _dotted(node.func)
+        _add(found["calls"], name, line)
+        if in_loop:
+            _add(found["looped"], name, line)
+    elif isinstance(node, (ast.Name, ast.Attribute)):
+        _add(found["names"], _dotted(node), line)
+    elif isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+        _add(found["functions"], node.name, line)
+    elif isinstance(node, ast.Import):
+        for alias in node.names:
+            _add(found["imports"], alias.name, line)
+    elif isinstance(node, ast.ImportFrom):
+        _add(found["imports"], node.module or "", line)
+
+
+def _add(lines, name, line):
+    if name and (name in lines or len(lines) < _MOST):
+        lines[name[:_LONGEST]] = min(line, lines.get(name[:_LONGEST], line))
+
+
+def _dotted(node):
+    """``tank_drive.on`` for a chain of names; the names behind the last call or index of any other chain."""
+    parts = []
+    while isinstance(node, ast.Attribute) and len(parts) < 10:
+        parts.append(node.attr)
+        node = node.value
+    if isinstance(node, ast.Name):
+        parts.append(node.id)
+    return ".".join(reversed(parts))

@@ -1,0 +1,250 @@
+"""Plays a notebook from top to bottom: each magic that starts a robot is a run of its own, with its own recording.
+
+What a magic comes to (floor, pose, noise, and which run is the marked one) is told by the caller's ``Stage``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from responders import wire
+from responders.bridge import Bridge, TrialOrder
+from responders.notebook_process import NotebookOrder, NotebookProcess
+from responders.sandbox.manager import Sandboxes
+from responders.trial import MOST_NOTES, read_log, recording_of
+from sim.arena import Arena
+from sim.camera import LightCamera
+from sim.motion import Rectangle
+from sim.recording import SECOND, Fault, Recording, Verdict
+from sim.world import Chain, World
+
+_MOST_RUNS = 300
+_LONGEST_LINE = 2000
+#: What all unmarked runs of a play may compute together, as a multiple of what one may.
+_UNMARKED_CPU = 4
+#: And how long they may take together, in simulated seconds, or in the longest that one may take.
+_UNMARKED_SECONDS, _UNMARKED_RUNS = 600, 20
+
+
+@dataclass(frozen=True, slots=True)
+class MagicCall:
+    """A ``%sim_magic...`` that a cell has called, with its place; nothing in it is trusted."""
+
+    cell: int
+    line: int | None
+    name: str
+    arguments: str
+    body: str | None  # the robot program, for ``%%sim_magic...``
+
+
+@dataclass(frozen=True, slots=True)
+class Staged:
+    """What a magic comes to: a run or none, and sentences about it."""
+
+    order: TrialOrder | None = None
+    obstacles: tuple[Rectangle, ...] = ()
+    program_cell: int | None = None  # where the program is that is run
+    marked: bool = False
+    needs_responder: bool = False  # the lack of one is a fault then
+    notes: tuple[str, ...] = ()
+
+
+class Stage(Protocol):
+    """Decides what magics come to."""
+
+    def call(self, call: MagicCall) -> Staged: ...
+
+    def ran(self, recording: Recording) -> None:
+        """A run that was staged has ended."""
+
+    def last(self) -> Staged:
+        """What is run when all cells have been played, if anything."""
+
+
+Ground = Callable[[TrialOrder, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run of a robot; ``cell`` is the cell that started it, None after the last."""
+
+    cell: int | None
+    marked: bool
+    recording: Recording
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What came of a play. ``raised`` are the faults of single cells, ``stopped`` what ended the process."""
+
+    runs: tuple[Run, ...]
+    output: str
+    log: str
+    notes: tuple[str, ...]
+    walls: str
+    raised: tuple[Fault, ...]
+    stopped: Fault | None
+
+    @property
+    def marked(self) -> Run | None:
+        return next((run for run in self.runs if run.marked), None)
+
+    def told(self, recording: Recording) -> Recording:
+        """A run's recording with what the whole notebook told: output, log and notes."""
+        return replace(
+            recording,
+            responder_output=self.output,
+            responder_log=self.log,
+            notes=(*recording.notes, *self.notes)[:MOST_NOTES],
+        )
+
+
+def play_notebook(
+    order: NotebookOrder, stage: Stage, ground: Ground, sandboxes: Sandboxes, pulse: Callable[[], None]
+) -> Played:
+    """Play the notebook in a fresh process and folder.
+
+    ``pulse`` is called several times a second of real time and may raise to stop the play.
+    Raises HostError when the machine, not the student, fails.
+    """
+    with sandboxes.private_folder() as folder:
+        process = NotebookProcess(order, sandboxes, folder, pulse)
+        try:
+            play = _Play(process, stage, ground, sandboxes, pulse)
+            process.play(play.perform)
+            play.finish()
+        finally:
+            process.close()
+        log = read_log(folder)
+    return Played(
+        tuple(play.runs),
+        "\n".join(process.output),
+        log,
+        tuple(process.notes),
+        process.walls,
+        tuple(process.raised),
+        process.stopped,
+    )
+
+
+def never_ran(order: TrialOrder, arena: Arena, camera: LightCamera, fault: Fault, walls: str) -> Recording:
+    """The recording of a run that did not come about: the robot stands where it would have started."""
+    chain = Chain()
+    world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, chain)
+    return Recording(
+        background=order.floor.name,
+        start=order.pose,
+        end=order.pose,
+        end_t=0.0,
+        ticks=world.ticks(),
+        verdict=fault.verdict,
+        sha256=chain.hexdigest(),
+        faults=(fault,),
+        obstacles=world.obstacles,
+        patches=order.floor.patches,
+        sheet=order.floor.sheet,
+        robot=order.robot.name,
+        walls=walls,
+    )
+
+
+class _Play:
+    """The runs of one play."""
+
+    def __init__(
+        self,
+        process: NotebookProcess,
+        stage: Stage,
+        ground: Ground,
+        sandboxes: Sandboxes,
+        pulse: Callable[[], None],
+    ) -> None:
+        self._process = process
+        self._stage = stage
+        self._ground = ground
+        self._sandboxes = sandboxes
+        self._pulse = pulse
+        self._unmarked_cpu = self._unmarked_seconds = 0.0
+        self.runs: list[Run] = []
+
+    def perform(self, frame: wire.Frame) -> dict[str, Any]:
+        """Do what a magic asks; the frame that lets the notebook go on."""
+        cell, line = self._process.place(frame["line"])
+        call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
+        staged = self._stage.call(call)
+        for note in staged.notes:
+            self._process.note(frame["line"], note)
+        if staged.order is None:
+            return _done()
+        refusal = self._refusal(staged, staged.order)
+        if refusal:
+            self._process.note(frame["line"], refusal)
+            return _done()
+        bridge = self._run(cell, staged, staged.order)
+        logged = bridge.collected()
+        return _done(bridge.now, logged.data, logged.images, bridge.robot_state())
+
+    def finish(self) -> None:
+        """Run what the stage has for the end."""
+        staged = self._stage.last()
+        if staged.order is not None:
+            self._run(None, staged, staged.order)
+
+    def _refusal(self, staged: Staged, order: TrialOrder) -> str:
+        if staged.marked:
+            return ""
+        if len(self.runs) >= _MOST_RUNS:
+            return f"the robot was not started: a notebook may start it {_MOST_RUNS} times"
+        too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * order.seconds)
+        if too_long or self._unmarked_cpu > _UNMARKED_CPU * order.program.limits.cpu_seconds:
+            return "the robot was not started: the runs before have used up the time for runs that are not marked"
+        return ""
+
+    def _run(self, cell: int | None, staged: Staged, order: TrialOrder) -> Bridge:
+        process = self._process
+        answers = order.collaborative and (process.missing is None or staged.needs_responder)
+        first_call = len(process.calls)
+        arena, camera = self._ground(order, staged.obstacles)
+        program = self._sandboxes.spawn("robot", order.program.limits)
+        try:
+            bridge = Bridge(order, arena, camera, program, process if answers else None, self._pulse)
+            fault = bridge.run()
+            if not staged.marked:
+                self._unmarked_cpu += program.cpu_seconds()
+                self._unmarked_seconds += bridge.now / SECOND
+        finally:
+            program.close()
+        bridge.conversation.finish()
+        faults = [*bridge.conversation.faults, *([fault] if fault else [])]
+        if staged.needs_responder and process.missing is not None and not bridge.conversation.faults:
+            faults.append(Fault(0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._why_missing()))
+        faults = [self._placed(each, staged.program_cell) for each in faults]
+        faults.sort(key=lambda each: each.t)
+        recording = recording_of(order, bridge, tuple(faults), program.walls)
+        recording = replace(recording, calls=tuple(process.calls[first_call:]))
+        self.runs.append(Run(cell, staged.marked, recording))
+        self._stage.ran(recording)
+        return bridge
+
+    def _placed(self, fault: Fault, program_cell: int | None) -> Fault:
+        if fault.who == "program" and fault.line is not None:
+            return replace(fault, cell=program_cell)
+        return self._process.placed(fault)
+
+    def _why_missing(self) -> str:
+        """The first cell that failed may be why there is no responder."""
+        if not self._process.raised:
+            return ""
+        first = self._process.raised[0]
+        return f"In {first.place}: {first.message}"
+
+
+def _done(
+    now: int = 0,
+    data: tuple[tuple[str, float, float | None, float], ...] = (),
+    images: tuple[str, ...] = (),
+    state: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    return {"do": "done", "t": now, "seconds": now / SECOND, "data": data, "images": images, "state": state}

@@ -1,0 +1,143 @@
+"""The process of a notebook: its cells are played in it, and it answers the robots that they start.
+
+It keeps what the cells print and what becomes of them; the robots are ``notebook_play.py``'s.
+"""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from responders import wire
+from responders.conversation import Code, Responder, ResponderOrder, error_fault
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import ChildLimits, ChildStopped
+from sim.chance import Stream
+from sim.recording import Fault, Verdict
+
+#: How often a notebook may call a magic that sets up or starts the robot.
+_MOST_MAGICS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class NotebookOrder:
+    """A notebook's cells from the top, and the files in its folder."""
+
+    name: str
+    cells: tuple[str, ...]
+    files: Mapping[str, bytes]
+    limits: ChildLimits
+    output_bytes: int
+    seed: int
+
+
+class NotebookProcess(Responder):
+    """A notebook's process during one play. Cells and their lines are counted from 1."""
+
+    _schema = wire.NOTEBOOK
+
+    def __init__(self, order: NotebookOrder, sandboxes: Sandboxes, folder: Path, pulse: Callable[[], None]) -> None:
+        parts = ResponderOrder(Code(order.name, ""), order.files, order.limits, order.output_bytes)
+        super().__init__(parts, sandboxes, folder, order.seed, pulse)
+        self._notebook = order
+        self._first_lines = [1]
+        for source in order.cells:
+            self._first_lines.append(self._first_lines[-1] + source.count("\n") + 1)
+        self._cell = 1
+        self._printed_in = 0
+        self._magics = 0
+        #: Why nothing would answer the robot, if so; as of the last time that the cells told.
+        self.missing: str | None = None
+        #: What ended single cells, in their order, and what ended the process before its time.
+        self.raised: list[Fault] = []
+        self.stopped: Fault | None = None
+
+    def play(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
+        """Play all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
+        assert self._child is not None
+        try:
+            self._child.send(
+                {
+                    "name": self._notebook.name,
+                    "cells": self._notebook.cells,
+                    "seed": Stream(self._seed, "responder").integer(0),
+                    "function": None,
+                }
+            )
+            while True:
+                frame = self._child.receive(self._schema, self._pulse)
+                if frame["do"] == "played":
+                    self.missing = frame["missing"]
+                    return
+                self._take_cell(frame, perform)
+                if self._child is None:
+                    return
+        except ChildStopped as stop:
+            self._stopped(stop, 0)
+
+    def placed(self, fault: Fault) -> Fault:
+        """A fault of the process with the cell, and the line in it, where that is known."""
+        if fault.who != "responder" or fault.line is None or fault.cell is not None:
+            return fault
+        cell, line = self.place(fault.line)
+        return replace(fault, cell=cell, line=line)
+
+    def place(self, line: int | None) -> tuple[int, int | None]:
+        """The cell, and the line in it, of a line of the whole notebook; the cell being played if there is none."""
+        if line is None or not 1 <= line < self._first_lines[-1]:
+            return self._cell, None
+        cell = bisect.bisect_right(self._first_lines, line)
+        return cell, line - self._first_lines[cell - 1] + 1
+
+    def note(self, line: int | None, sentence: str) -> None:
+        """Keep a sentence for the report, with the place that it is about."""
+        cell, number = self.place(line)
+        where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
+        self._note(f"{where}: {sentence}")
+
+    def _take_cell(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
+        # Each costs output, so that a process cannot send these for ever.
+        self._spend("", "sent")
+        match frame["do"]:
+            case "cell":
+                self._cell = min(frame["place"] + 1, len(self._notebook.cells))
+            case "raised":
+                fault = self.placed(error_fault(frame["error"], 0, "responder"))
+                fault = replace(fault, message=fault.message.replace("the responder asked", "it asked", 1))
+                self.raised.append(replace(fault, cell=fault.cell or self._cell))
+                self._note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
+            case "note":
+                self.note(frame["line"], frame["text"][:400])
+            case "magic":
+                self._magics += 1
+                if self._magics > _MOST_MAGICS:
+                    sentence = f"the notebook called %sim_magic more than {_MOST_MAGICS} times"
+                    raise ChildStopped(Verdict.OUTPUT_LIMIT, sentence)
+                self.missing = None if frame["missing"] is None else frame["missing"][:400]
+                reply = perform(frame)
+                if self._child is not None:
+                    self._child.send(reply)
+            case _:
+                self._take(frame, -1, [])
+
+    def _take(self, frame: wire.Frame, message: int, slept: list[int]) -> None:
+        if frame["do"] == "refused":
+            self.note(frame["line"], frame["what"][:200])
+        else:
+            super()._take(frame, message, slept)
+
+    def _print(self, text: str) -> None:
+        if self._cell != self._printed_in:
+            self._printed_in = self._cell
+            self.output.append(f"--- cell {self._cell} ---")
+        super()._print(text)
+
+    def _stopped(self, stop: ChildStopped, t: int) -> Fault:
+        fault = super()._stopped(stop, t)
+        self.stopped = self.placed(replace(fault, message=fault.message.replace("the responder", "the notebook")))
+        if self.stopped.cell is None:
+            self.stopped = replace(self.stopped, cell=self._cell)
+        return self.stopped

@@ -1,0 +1,109 @@
+"""Where in a notebook robot programs are started, and which of these places is the one that is marked.
+
+Found by looking at the lines, never by running; ``[parts] cell`` of the assignment says which is meant.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sim.errors import UsageError
+from submissions.magics import is_program_magic, magic_place
+from submissions.submission import Cell, Notebook
+
+LAST = "last"
+TAG = "tag:"
+
+_LINE = re.compile(
+    r"""(?:%sim_magic[ \t]+|\.run_line_magic\([ \t]*['"]sim_magic['"][ \t]*,[ \t]*f?['"])(?P<flags>.*)"""
+)
+_AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
+_CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A line of a cell (both counted from 1) from which a robot program is loaded or started."""
+
+    cell: int
+    line: int
+
+
+def sites(notebook: Notebook) -> tuple[Site, ...]:
+    """Every such place, from the top: cells that begin with ``%%sim_magic...``, and lines that start it again."""
+    return tuple(site for cell in notebook.cells for site in _sites(cell))
+
+
+def programs(notebook: Notebook) -> tuple[Site, ...]:
+    """The cells that hold a robot program."""
+    return tuple(site for cell in notebook.cells if (site := _program(cell)) is not None)
+
+
+def marked_site(notebook: Notebook, which: str) -> Site:
+    """The place that ``which`` means: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
+
+    Raises UsageError with what the notebook has instead where there is no such place.
+    """
+    found = sites(notebook)
+    if not found:
+        raise UsageError(
+            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded."
+        )
+    if which.isdecimal():
+        number, cells = int(which), programs(notebook)
+        if number > len(cells):
+            raise UsageError(
+                f"{notebook.name}: has {_count(len(cells))}, expected at least {number}: number {number} is marked."
+            )
+        return cells[number - 1]
+    if which == LAST:
+        return found[-1]
+    return _tagged(notebook, which.removeprefix(TAG))
+
+
+def program_of(notebook: Notebook, site: Site) -> Cell | None:
+    """The cell with the program that is run at ``site``: itself, or the last one loaded before it."""
+    before = [each for each in programs(notebook) if (each.cell, each.line) <= (site.cell, site.line)]
+    return next((cell for cell in notebook.cells if before and cell.number == before[-1].cell), None)
+
+
+def _tagged(notebook: Notebook, tag: str) -> Site:
+    tagged = [cell for cell in notebook.cells if tag in cell.tags]
+    if not tagged:
+        raise UsageError(
+            f'{notebook.name}: has no cell with the tag "{tag}", expected it on the cell with the robot program; '
+            "it is lost when a notebook is saved as .py."
+        )
+    found = [site for cell in tagged for site in _sites(cell)]
+    if not found:
+        raise UsageError(
+            f'{notebook.name}: cell {tagged[-1].number} has the tag "{tag}" but runs no robot, expected '
+            "%%sim_magic_preloaded as its first line."
+        )
+    return found[-1]
+
+
+def _count(number: int) -> str:
+    return f"{number} robot program" if number == 1 else f"{number} robot programs"
+
+
+def _sites(cell: Cell) -> Iterator[Site]:
+    program = _program(cell)
+    if program is not None:
+        yield program
+        return
+    if cell.source.lstrip().startswith("%%"):
+        return
+    for number, line in enumerate(cell.source.split("\n"), 1):
+        again = _LINE.search(line)
+        if _CALL.search(line) or (again and _AUTORUN.search(again["flags"])):
+            yield Site(cell.number, number)
+
+
+def _program(cell: Cell) -> Site | None:
+    place = magic_place(cell.source)
+    if place is None or not is_program_magic(cell.source.split("\n")[place]):
+        return None
+    return Site(cell.number, place + 1)

@@ -1,0 +1,226 @@
+"""Jupyter notebooks as hand-ins: the code cells of an .ipynb, or of the .py file that nbconvert makes of one.
+
+Only read here, never run; which cell is marked is decided in ``marked_cell.py``.
+"""
+
+from __future__ import annotations
+
+import ast
+import codecs
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sim.errors import UsageError
+from submissions.source_text import MAX_SOURCE_BYTES
+from submissions.submission import Cell, Notebook
+
+MAX_CELLS = 5000
+#: What a notebook may hold in lists and tables; each becomes an object in memory.
+_MAX_VALUES = 3_000_000
+_MAX_NOTES = 10
+
+_SCRIPT = re.compile(r"^[ \t]*get_ipython\(\)\.run_(?:cell|line)_magic\([ \t]*['\"]sim_magic", re.MULTILINE)
+_MARKER = re.compile(r"^#[ \t]*In[ \t]*\[[ \t\d*]*\]:?[ \t]*$")
+_CELL_MAGIC_CALL = re.compile(r"^get_ipython\(\)\.run_cell_magic\(")
+
+
+@dataclass(frozen=True, slots=True)
+class ReadNotebook:
+    """The notebook, and sentences on what of it was left out or mended."""
+
+    notebook: Notebook
+    notes: tuple[str, ...] = ()
+
+
+def read_notebook(data: bytes, name: str) -> ReadNotebook:
+    """The code cells of an .ipynb file, of any version of the format that has cells.
+
+    Raises UsageError, one sentence, for bytes that are no notebook, or one without code, too large or not Python.
+    """
+    text, note = _decoded(data, name)
+    notes = [note] if note else []
+    document = _parsed(text, name)
+    _check_language(document, name)
+    cells: list[Cell] = []
+    for place, raw in enumerate(_raw_cells(document, name), 1):
+        problem = _cell_problem(raw)
+        if problem:
+            if len(notes) < _MAX_NOTES:
+                notes.append(f"{name}: cell {place} from the top was left out: {problem}.")
+            continue
+        source = _source(raw)
+        if raw["cell_type"] == "code" and source.strip():
+            cells.append(Cell(len(cells) + 1, source, _tags(raw)))
+    return ReadNotebook(_checked(Notebook(name, tuple(cells))), tuple(notes))
+
+
+def is_script(text: str) -> bool:
+    """Whether a Python file is what nbconvert makes of a notebook with robot programs."""
+    return _SCRIPT.search(text) is not None
+
+
+def read_script(text: str, name: str) -> Notebook:
+    """The notebook that nbconvert has made the file ``text`` of. Raises UsageError where it is too large."""
+    chunks: list[list[str]] = [[]]
+    for line in text.replace("\r\n", "\n").split("\n"):
+        magic = _cell_magic(line)
+        if magic is not None:
+            chunks += [[magic], []]
+        elif _MARKER.match(line):
+            chunks.append([])
+        else:
+            chunks[-1].append(line)
+    sources = ["\n".join(chunk).strip("\n") for chunk in chunks]
+    code = [source for source in sources if any(map(_is_code, source.split("\n")))]
+    return _checked(Notebook(name, tuple(Cell(number, source) for number, source in enumerate(code, 1))))
+
+
+def pack_notebook(notebook: Notebook) -> bytes:
+    """The notebook as an .ipynb file without outputs; ``read_notebook`` gives the same cells again."""
+    cells: list[dict[str, Any]] = [
+        {
+            "cell_type": "code",
+            "execution_count": None,
+            "metadata": {"tags": list(cell.tags)} if cell.tags else {},
+            "outputs": [],
+            "source": cell.source,
+        }
+        for cell in notebook.cells
+    ]
+    document = {"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 4}
+    return json.dumps(document, indent=1).encode("ascii")
+
+
+def _decoded(data: bytes, name: str) -> tuple[str, str]:
+    """The text, and a note on how it was read where that was not UTF-8."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        try:
+            return data.decode("utf-16"), f"{name} was read as UTF-16; Jupyter saves UTF-8."
+        except UnicodeDecodeError:
+            raise UsageError(f"{name}: is damaged UTF-16 text, expected a notebook as Jupyter saves it.") from None
+    try:
+        return data.decode("utf-8-sig"), ""
+    except UnicodeDecodeError:
+        return data.decode("latin-1"), f"{name} is not UTF-8 and was read as Latin-1; save it with Jupyter."
+
+
+def _parsed(text: str, name: str) -> Mapping[str, Any]:
+    if not text.strip():
+        raise UsageError(f"{name}: is an empty file, expected a notebook.")
+    if text.count(",") + text.count("[") + text.count("{") > _MAX_VALUES:
+        raise UsageError(
+            f"{name}: has too much output in it, expected a notebook whose outputs were cleared before it was saved."
+        )
+    try:
+        document = json.loads(text, strict=False)
+    except RecursionError:
+        raise UsageError(f"{name}: is nested too deeply, expected a notebook as Jupyter saves it.") from None
+    except ValueError as error:
+        where = f" (line {error.lineno})" if isinstance(error, json.JSONDecodeError) else ""
+        raise UsageError(
+            f"{name}: is not a notebook: its JSON is broken{where}, expected one saved by Jupyter."
+        ) from None
+    if not isinstance(document, dict):
+        raise UsageError(f"{name}: is JSON, but not a notebook, expected one saved by Jupyter.")
+    return document
+
+
+def _check_language(document: Mapping[str, Any], name: str) -> None:
+    metadata = _table(document, "metadata")
+    for table, key in (("language_info", "name"), ("kernelspec", "language")):
+        language = _table(metadata, table).get(key)
+        if isinstance(language, str) and language and not language.lower().startswith(("python", "ipython")):
+            raise UsageError(f"{name}: is a notebook for {language[:40]!r}, expected one for Python.")
+
+
+def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    value = table.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _raw_cells(document: Mapping[str, Any], name: str) -> list[Any]:
+    """The cells of nbformat 4, or those of all worksheets of the formats before."""
+    if isinstance(document.get("cells"), list):
+        return list(document["cells"])
+    sheets = document.get("worksheets")
+    if isinstance(sheets, list):
+        return [cell for sheet in sheets if isinstance(sheet, dict) for cell in _list(sheet.get("cells"))]
+    raise UsageError(f"{name}: has no list of cells, expected a notebook as Jupyter saves it.")
+
+
+def _list(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _cell_problem(raw: object) -> str:
+    if not isinstance(raw, dict):
+        return "it is no cell"
+    if not isinstance(raw.get("cell_type"), str):
+        return "it does not say what kind of cell it is"
+    lines = _lines(raw)
+    if raw["cell_type"] != "code" or isinstance(lines, str):
+        return ""
+    if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
+        return "its code is no text"
+    return ""
+
+
+def _lines(raw: Mapping[str, Any]) -> object:
+    return raw["source"] if "source" in raw else raw.get("input")
+
+
+def _source(raw: Mapping[str, Any]) -> str:
+    lines = _lines(raw)
+    text = lines if isinstance(lines, str) else "".join(map(str, _list(lines)))
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _tags(raw: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(tag for tag in _list(_table(raw, "metadata").get("tags")) if isinstance(tag, str))
+
+
+def _checked(notebook: Notebook) -> Notebook:
+    name, cells = notebook.name, notebook.cells
+    if not cells:
+        raise UsageError(f"{name}: has no code cells, expected a notebook with Python code.")
+    if len(cells) > MAX_CELLS:
+        raise UsageError(f"{name}: has {len(cells)} code cells, expected at most {MAX_CELLS}.")
+    if sum(len(cell.source) for cell in cells) > MAX_SOURCE_BYTES:
+        raise UsageError(f"{name}: has too much code, expected at most 1 MB.")
+    for cell in cells:
+        if "\0" in cell.source:
+            raise UsageError(
+                f"{name}: has a NUL character in cell {cell.number}, expected Python source as plain text."
+            )
+    return notebook
+
+
+def _is_code(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _cell_magic(line: str) -> str | None:
+    """The cell that ``get_ipython().run_cell_magic('name', 'flags', 'body')`` on a line of its own was."""
+    if not _CELL_MAGIC_CALL.match(line):
+        return None
+    words = list(_constants(line))
+    if len(words) != 3:
+        return None
+    name, arguments, body = words
+    return f"%%{name} {arguments}".rstrip() + f"\n{body}".rstrip("\n")
+
+
+def _constants(line: str) -> Iterator[str]:
+    """The arguments of a call of texts; none if it is something else."""
+    try:
+        tree = ast.parse(line, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return
+    if isinstance(tree, ast.Call) and not tree.keywords:
+        for argument in tree.args:
+            if not isinstance(argument, ast.Constant) or not isinstance(argument.value, str):
+                return
+            yield argument.value

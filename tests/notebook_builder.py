@@ -1,0 +1,38 @@
+"""Notebooks made of the sources of their cells, for tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+NOTEBOOKS = Path(__file__).parent / "notebooks"
+#: The course's notebook on messaging, its magics included, and what nbconvert makes of it.
+MESSAGING = NOTEBOOKS / "messaging.ipynb"
+MESSAGING_SCRIPT = NOTEBOOKS / "messaging.nbconvert.txt"
+
+
+def document(cells: Sequence[str], tags: Mapping[int, Sequence[str]] | None = None) -> dict[str, Any]:
+    """The JSON of a notebook; ``tags`` by the number of the cell, from 1."""
+    return {
+        "cells": [
+            {
+                "cell_type": "code",
+                "execution_count": None,
+                "metadata": {"tags": list((tags or {}).get(number, ()))},
+                "outputs": [],
+                "source": source.splitlines(keepends=True),
+            }
+            for number, source in enumerate(cells, 1)
+        ],
+        "metadata": {},
+        "nbformat": 4,
+        "nbformat_minor": 4,
+    }
+
+
+def notebook(path: Path, cells: Sequence[str], tags: Mapping[int, Sequence[str]] | None = None) -> Path:
+    """A notebook on disk."""
+    path.write_text(json.dumps(document(cells, tags)))
+    return path
