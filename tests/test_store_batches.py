@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from sqlalchemy import func, select, text
+from sqlalchemy import func, select
 
 from builders import echo, hand_in
 from service.store import batch_control, batches, jobs
@@ -137,17 +137,3 @@ def test_the_dead_are_tried_again_with_all_their_attempts_but_not_the_outdated(s
         job = session.get_one(Job, claim.job_id)
         assert (job.attempt, job.error, job.finished_at) == (1, None, None)
         assert job.id in dead or job.batch_id == other
-
-
-def test_what_a_former_release_superseded_is_cancelled(store: Store) -> None:
-    from alembic import command
-
-    from service.store.migrate import configuration
-
-    job_id = accept_batch(store, "class", [hand_in("ada")], [], max_attempts=2).jobs[0].job_id
-    with store.engine.begin() as connection:
-        connection.execute(text("UPDATE job SET state = 'superseded'"))
-        connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
-        command.upgrade(configuration(connection), "head")
-    with store.reading() as session:
-        assert session.get_one(Job, job_id).state is JobState.CANCELLED

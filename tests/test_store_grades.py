@@ -40,6 +40,7 @@ def _stored(store: Store, grade: Grade) -> str:
     [
         report_builders.line_follower_grade,
         report_builders.shape_grade,
+        report_builders.swept_grade,
         report_builders.faulty_grade,
         report_builders.hidden_grade,
     ],

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import multiprocessing
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
 
 import pytest
 from alembic import command
-from sqlalchemy import inspect, text
+from sqlalchemy import func, inspect, select, text
 
+import report_builders
+from builders import accept_one
+from first_release import lay_first_release
 from service.settings import Settings
+from service.store import artifacts, batches, grades, intake, jobs
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration, current_revision, newest_revision
-from service.store.models import Base
+from service.store.models import Artifact, Base, Batch, CriterionRow, Job, JobState, Standing, TrialRow
 from sim.errors import HostError
 
 
@@ -46,6 +53,55 @@ def test_a_newer_database_is_refused(service_settings: Settings) -> None:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
     with pytest.raises(HostError, match=r"newer Robomark .*no way down"):
         open_store(service_settings)
+
+
+def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_settings: Settings, tmp_path: Path) -> None:
+    lay_first_release(service_settings.database, tmp_path).dispose()
+    with open_store(service_settings) as store:
+        with store.reading() as session:
+            states = dict(session.execute(select(Job.state, func.count()).group_by(Job.state)).all())
+            assert states == {JobState.DONE: 2, JobState.DEAD: 1, JobState.CANCELLED: 1, JobState.QUEUED: 1}
+            counts = [session.scalar(select(func.count()).select_from(t)) for t in (TrialRow, CriterionRow, Artifact)]
+            assert counts == [2, 10, 3]
+            (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
+            ada, bob = sorted(batches.job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
+            graded = grades.load(session, ada.id)
+            assert (graded.student, graded.marks, ada.standing) == ("ada", Decimal("1.00"), Standing.STANDS)
+            assert len(graded.trials[0].recording.ticks) > 10
+            assert bob.student == "Bob 🤖"
+            assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
+            assert intake.load_hand_in(session, ada.id).submission.program is not None
+        with store.engine.begin() as connection:
+            command.check(configuration(connection))
+        # What waited is graded by the new release, and what comes in is numbered on.
+        waiting = jobs.claim(store, "worker", 60)
+        assert waiting is not None
+        jobs.finish(store, waiting, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        assert accept_one(store, "ada").attempt == 3
+
+
+def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: Settings, tmp_path: Path) -> None:
+    engine = lay_first_release(service_settings.database, tmp_path)
+    with engine.begin() as connection:
+        connection.execute(text("UPDATE job SET state = 'superseded' WHERE state = 'cancelled'"))
+        connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+    engine.dispose()
+    with open_store(service_settings) as store, store.reading() as session:
+        reasons = session.scalars(select(Job.error).where(Job.state == JobState.CANCELLED)).all()
+    assert reasons == ["superseded by a newer hand-in"]
+
+
+@pytest.mark.parametrize("revision", ["0002", "0001", "base"])
+def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None:
+    with open_store(service_settings) as store:
+        with (
+            pytest.raises(HostError, match=r"cannot be taken back .* restore the backup"),
+            store.engine.begin() as down,
+        ):
+            command.downgrade(configuration(down), revision)
+        assert current_revision(store.engine) == newest_revision()
+        with store.engine.begin() as connection:
+            command.check(configuration(connection))
 
 
 def test_a_database_that_is_away_is_named_without_its_password(service_settings: Settings) -> None:

@@ -12,8 +12,8 @@ import pytest
 
 import report_builders
 from service.grading.grade import Grade
-from service.store.intake import assignment_from_bytes, assignment_to_bytes
 from service.store.recordings import RecordingError, from_bytes, keep, to_bytes
+from service.store.versions import assignment_from_bytes, assignment_to_bytes
 from sim.recording import Line, Message, Recording, Ticks
 from submissions.assignment_file import catalogue, find_assignment
 

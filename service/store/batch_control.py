@@ -10,9 +10,13 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
+from service.store import audit
 from service.store.engine import Store, now
 from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, Submission
 from sim.errors import UsageError
+
+#: Who it is said to be where nobody was named.
+_NOBODY = "unknown"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +36,17 @@ class Retried:
     outdated: int
 
 
-def pause(store: Store, batch_id: str) -> Controlled:
+def pause(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
     """Begin no more of the batch; what runs goes on. Raises UsageError for a batch that was cancelled."""
-    return _set(store, batch_id, BatchState.PAUSED)
+    return _set(store, batch_id, BatchState.PAUSED, "pause", actor)
 
 
-def resume(store: Store, batch_id: str) -> Controlled:
+def resume(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
     """Let a paused batch go on. Raises UsageError for a batch that was cancelled."""
-    return _set(store, batch_id, BatchState.OPEN)
+    return _set(store, batch_id, BatchState.OPEN, "resume", actor)
 
 
-def cancel(store: Store, batch_id: str) -> Controlled:
+def cancel(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
     """End all jobs of the batch that have not ended; a worker that runs one is told at its next heartbeat.
 
     A batch with nothing left to end stays as it is.
@@ -59,10 +63,11 @@ def cancel(store: Store, batch_id: str) -> Controlled:
             ended | {"error": "the batch was cancelled"},
         )
         session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
+        audit.note(session, actor, "cancel", "batch", batch_id, not_begun=waiting, stopped=running)
         return Controlled(True, waiting, running)
 
 
-def retry(store: Store, batch_id: str | None) -> Retried:
+def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retried:
     """Queue the dead jobs of a batch again, with all their attempts; None for every dead job there is.
 
     Raises UsageError for a batch that was cancelled; with None their jobs are passed over.
@@ -80,6 +85,7 @@ def retry(store: Store, batch_id: str | None) -> Retried:
             newer.enrolment_id == Submission.enrolment_id,
             newer.assignment == Submission.assignment,
             newer.attempt > Submission.attempt,
+            newer.staff_only.is_(None),
         )
         of_newest = select(Submission.id).where(~outdated)
         before = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
@@ -88,16 +94,20 @@ def retry(store: Store, batch_id: str | None) -> Retried:
         values |= {"due_at": at, "nudged_at": None, "finished_at": None}
         _change_jobs(session, (*dead, Job.submission_id.in_(of_newest)), values)
         left = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
+        if before > left:
+            audit.note(session, actor, "retry", "batch", batch_id or "all", queued=before - left)
         return Retried(before - left, left)
 
 
-def _set(store: Store, batch_id: str, state: BatchState) -> Controlled:
+def _set(store: Store, batch_id: str, state: BatchState, action: str, actor: str) -> Controlled:
     with store.transaction() as session:
         before = _state(session, batch_id)
         _refuse_cancelled(before, batch_id)
         session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
         # So that what goes on is nudged for at once.
         _change_jobs(session, (Job.batch_id == batch_id, Job.state == JobState.QUEUED), {"nudged_at": None})
+        if before is not state:
+            audit.note(session, actor, action, "batch", batch_id)
         return Controlled(before is not state, *_unfinished(session, batch_id))
 
 

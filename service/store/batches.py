@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
 
-from sqlalchemy import Row, Select, func, select
+from sqlalchemy import ColumnElement, Row, Select, func, select
 from sqlalchemy.orm import Session
 
 from service.store import models
@@ -20,6 +20,7 @@ from service.store.models import (
     Job,
     JobState,
     PlotState,
+    Standing,
 )
 from sim.errors import UsageError
 
@@ -44,6 +45,12 @@ class JobLine:
     worker: str | None
     queued_at: datetime
     finished_at: datetime | None
+    standing: Standing
+    copied_from: str | None  # the identical grade that was run
+    suspect: str | None  # why the grade is not to be trusted
+    staff_only: str | None  # the limit that the hand-in was over
+    days_late: int
+    published_at: datetime | None
 
     @property
     def ended(self) -> bool:
@@ -61,6 +68,7 @@ class BatchLine:
     problems: tuple[tuple[str, str], ...]  # the rows that were refused: name, sentence
     jobs: int
     states: dict[JobState, int]
+    regrade_of: str | None  # the batch whose hand-ins these are
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,15 +102,24 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     row = session.get(Batch, batch_id)
     if row is None:
         raise UsageError(f"there is no batch {batch_id}")
-    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
-    states = dict(session.execute(counted).all())
+    # What a worker in quarantine graded is in the batch a second time.
+    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
+    states = dict(session.execute(counted.group_by(Job.state)).all())
     problems = tuple((name, sentence) for name, sentence in row.problems)
-    return BatchLine(row.id, row.name, row.state, row.created_at, problems, sum(states.values()), states)
+    return BatchLine(
+        row.id, row.name, row.state, row.created_at, problems, sum(states.values()), states, row.regrade_of
+    )
 
 
 def job_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """Every job of a batch, by student."""
-    query = _job_lines().where(Job.batch_id == batch_id).order_by(Enrolment.student, Job.id)
+    """The job that stands for each hand-in of a batch, by student; of a batch of regrades its own jobs."""
+    which: tuple[ColumnElement[bool], ...]
+    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+        which = (Job.batch_id == batch_id, Job.suspect.is_(None))
+    else:
+        ids = select(models.Submission.id).where(models.Submission.batch_id == batch_id)
+        which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+    query = _job_lines().where(*which).order_by(Enrolment.student, Job.id)
     return [_line(row) for row in session.execute(query)]
 
 
@@ -137,7 +154,7 @@ def _find(session: Session, query: Select[str], start: str, what: str) -> str:
     return found[0]
 
 
-def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None]:
+def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, str | None, int]:
     accuracy = (
         select(CriterionRow.accuracy)
         .where(CriterionRow.job_id == Job.id, CriterionRow.accuracy.is_not(None))
@@ -153,6 +170,8 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None]:
             AssignmentVersion,
             models.Submission.attempt,
             accuracy,
+            models.Submission.staff_only,
+            models.Submission.days_late,
         )
         .join(models.Submission, Job.submission_id == models.Submission.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -160,8 +179,8 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None]:
     )
 
 
-def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None]) -> JobLine:
-    job, student, source, version, attempt, accuracy = row
+def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int]) -> JobLine:
+    job, student, source, version, attempt, accuracy, staff_only, days_late = row
     return JobLine(
         id=job.id,
         student=student,
@@ -179,4 +198,10 @@ def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None]) -> JobL
         worker=job.worker,
         queued_at=job.queued_at,
         finished_at=job.finished_at,
+        standing=job.standing,
+        copied_from=job.copied_from,
+        suspect=job.suspect,
+        staff_only=staff_only,
+        days_late=days_late,
+        published_at=job.published_at,
     )

@@ -12,7 +12,17 @@ from typing import Any, cast
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade, Sight, TrialResult
+from service.grading.grade import (
+    Accuracy,
+    AccuracyCurve,
+    Confidence,
+    Counts,
+    CriterionResult,
+    Evidence,
+    Grade,
+    Sight,
+    TrialResult,
+)
 from service.store import artifacts, recordings
 from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job, Submission, TrialRow
 from service.store.plain import from_plain, to_plain
@@ -103,6 +113,7 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         verdict=trial.verdict.value,
         sha256=trial.recording.sha256,
         end_t=trial.recording.end_t,
+        sweep=to_plain(trial.sweep),
     )
 
 
@@ -124,6 +135,9 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         accuracy_n=accuracy and accuracy.n,
         labels=accuracy and to_plain(accuracy.labels),
         confusion=accuracy and to_plain(accuracy.confusion),
+        counts=accuracy and to_plain(accuracy.counts),
+        confidence=accuracy and to_plain(accuracy.confidence),
+        curves=to_plain(result.curves),
         sights=sights,
     )
 
@@ -152,6 +166,7 @@ def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
             motor_noise=row.motor_noise,
             visibility=row.visibility,
             recording=_recording(files, job_id, row.position),
+            sweep=from_plain(tuple[tuple[str, float], ...], row.sweep),
         )
         for row in rows
     )
@@ -175,6 +190,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         evidence=from_plain(tuple[Evidence, ...], row.evidence),
         accuracy=_accuracy(row),
         sights=tuple(_sight(plain, trials) for plain in row.sights),
+        curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
     )
 
 
@@ -188,6 +204,8 @@ def _accuracy(row: CriterionRow) -> Accuracy | None:
         n=row.accuracy_n,
         labels=tuple(row.labels or ()),
         confusion=from_plain(tuple[tuple[str, str | None, int], ...], row.confusion or []),
+        counts=None if row.counts is None else from_plain(Counts, row.counts),
+        confidence=None if row.confidence is None else from_plain(Confidence, row.confidence),
     )
 
 

@@ -5,18 +5,14 @@ Publishes nothing: the row is the job, and the queue's nudge comes after the com
 
 from __future__ import annotations
 
-import hashlib
-import json
-import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
-from sqlalchemy import func, select, update
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import Select, func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store import models
+from service.store import copies, models
 from service.store.engine import Store, now
 from service.store.models import (
     AssignmentVersion,
@@ -29,9 +25,12 @@ from service.store.models import (
     Lane,
     Person,
     Role,
+    Standing,
     new_id,
 )
-from service.store.plain import from_plain, to_plain
+from service.store.policies import Ruling, rule
+from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
+from service.version import grader_sha256
 from sim.errors import HostError, UsageError
 from submissions.assignment import Assignment
 from submissions.bundle import pack_submission, unpack_submission
@@ -47,6 +46,7 @@ class HandIn:
     submission: Submission
     assignment: Assignment
     source: str
+    handed_in_at: datetime | None = None  # by the student, where anybody said
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +56,8 @@ class Accepted:
     job_id: str
     student: str
     attempt: int
+    copied_from: str | None = None  # the identical grade that it has already
+    staff_only: str = ""  # the limit that it is over
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +74,7 @@ class Known:
     batch_id: str | None
     student: str
     state: JobState
+    other_grader: bool = False  # graded by another version than this
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +88,11 @@ class AcceptedNew:
 def accept(
     store: Store, hand_in: HandIn, *, course: str = DEFAULT_COURSE, max_attempts: int, lane: Lane = Lane.INTERACTIVE
 ) -> Accepted:
-    """Take in one hand-in that a person waits for."""
+    """Take in one hand-in that a person waits for; where an identical one has a grade, it has that grade at once."""
     (packed,) = _pack([hand_in])
     with store.transaction() as session:
         at = now(session)
-        course_id = _course(session, course, at)
-        return _accept(session, packed, course_id, None, lane, max_attempts, at)
+        return _accept(session, packed, _Terms(course_of(session, course, at), lane, max_attempts, at))
 
 
 def accept_batch(
@@ -102,15 +104,15 @@ def accept_batch(
     course: str = DEFAULT_COURSE,
     max_attempts: int,
 ) -> AcceptedBatch:
-    """Take in a whole batch or nothing of it, each hand-in as a new one whatever was handed in before.
+    """Take in a whole batch or nothing of it, each hand-in to be graded anew whatever was handed in before.
 
     ``problems`` are the rows that were refused: name, sentence.
     """
     packed = _pack(hand_ins)
     with store.transaction() as session:
         at = now(session)
-        course_id = _course(session, course, at)
-        return _accept_batch(session, packed, course_id, name, problems, max_attempts, at)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, anew=True)
+        return _accept_batch(session, packed, name, problems, terms)
 
 
 def accept_new(
@@ -125,15 +127,16 @@ def accept_new(
     """Take in what is new of a batch, so that handing in the same batch twice changes nothing.
 
     Not new is what has the bytes of the student's newest hand-in and is marked against the same version of the
-    assignment; but for what was cancelled, which comes in again.
+    assignment; but for what was cancelled, which comes in again. What is new and identical to a hand-in with a grade
+    has that grade at once.
     """
     packed = _pack(hand_ins)
     with store.transaction() as session:
         at = now(session)
-        course_id = _course(session, course, at)
-        found = [_known(session, item, course_id) for item in packed]
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at)
+        found = [_known(session, item, terms.course_id) for item in packed]
         new = [item for item, known in zip(packed, found, strict=True) if known is None]
-        batch = _accept_batch(session, new, course_id, name, problems, max_attempts, at) if new else None
+        batch = _accept_batch(session, new, name, problems, terms) if new else None
         return AcceptedNew(batch, tuple(known for known in found if known is not None))
 
 
@@ -158,118 +161,111 @@ def load_hand_in(session: Session, job_id: str) -> HandIn:
         raise HostError(f"The hand-in of {job_id} cannot be read back: {error}") from error
 
 
-def assignment_to_bytes(assignment: Assignment) -> bytes:
-    """All of an assignment, pictures and given files and secret included."""
-    text = json.dumps(to_plain(assignment), sort_keys=True, separators=(",", ":"))
-    return zlib.compress(text.encode("ascii"), 6)
-
-
-def assignment_from_bytes(content: bytes) -> Assignment:
-    """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
-    try:
-        return from_plain(Assignment, json.loads(zlib.decompress(content)))
-    except zlib.error as error:
-        raise ValueError(f"not an assignment: {error}") from error
-
-
 @dataclass(frozen=True, slots=True)
 class _Packed:
     hand_in: HandIn
     data: bytes
-    content: bytes  # of the assignment
-    content_sha256: str
+    frozen: Frozen
+
+
+@dataclass(frozen=True, slots=True)
+class _Terms:
+    """How hand-ins are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
+
+    course_id: int
+    lane: Lane
+    max_attempts: int
+    at: datetime
+    batch_id: str | None = None
+    anew: bool = False
 
 
 def _pack(hand_ins: Sequence[HandIn]) -> list[_Packed]:
     """What is stored of each hand-in; done before the transaction, and once for each assignment."""
-    contents: dict[int, tuple[bytes, str]] = {}
+    frozen: dict[int, Frozen] = {}
     packed = []
     for hand_in in hand_ins:
         key = id(hand_in.assignment)
-        if key not in contents:
-            content = assignment_to_bytes(hand_in.assignment)
-            contents[key] = content, hashlib.sha256(zlib.decompress(content)).hexdigest()
-        packed.append(_Packed(hand_in, pack_submission(hand_in.submission), *contents[key]))
+        if key not in frozen:
+            frozen[key] = freeze(hand_in.assignment)
+        packed.append(_Packed(hand_in, pack_submission(hand_in.submission), frozen[key]))
     return packed
 
 
 def _known(session: Session, packed: _Packed, course_id: int) -> Known | None:
-    submission, assignment = packed.hand_in.submission, packed.hand_in.assignment
-    query = (
-        select(models.Submission.sha256, AssignmentVersion.sha256, Job.id, Job.state, Job.batch_id, Batch.state)
+    hand_in = packed.hand_in
+    newest = session.scalar(
+        select(models.Submission)
         .join(Enrolment, models.Submission.enrolment_id == Enrolment.id)
-        .join(Job, Job.submission_id == models.Submission.id)
+        .where(
+            Enrolment.course_id == course_id,
+            Enrolment.student == hand_in.submission.student,
+            models.Submission.assignment == hand_in.assignment.id,
+        )
+        .order_by(models.Submission.attempt.desc())
+        .limit(1)
+    )
+    if newest is None or newest.sha256 != hand_in.submission.sha256:
+        return None
+    query = (
+        select(Job)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
         .where(
-            Enrolment.course_id == course_id,
-            Enrolment.student == submission.student,
-            models.Submission.assignment == assignment.id,
+            Job.submission_id == newest.id,
+            AssignmentVersion.sha256 == packed.frozen.sha256,
+            Job.state != JobState.CANCELLED,
+            # A dead job of a cancelled batch cannot be retried, so it too comes in again.
+            or_(Job.state != JobState.DEAD, Job.batch_id.is_(None), Batch.state != BatchState.CANCELLED),
         )
-        .order_by(models.Submission.attempt.desc(), Job.queued_at.desc(), Job.id)
+        # A regrade that waits to be published comes after the grade that stands.
+        .order_by(Job.standing == Standing.KEPT, Job.standing == Standing.PROPOSED, Job.queued_at.desc(), Job.id)
         .limit(1)
     )
-    newest = session.execute(query).one_or_none()
-    if newest is None:
+    job = session.scalar(query)
+    if job is None:
         return None
-    sha256, version, job_id, state, batch_id, batch_state = newest
-    # A dead job of a cancelled batch cannot be retried, so it too comes in again.
-    cancelled = state is JobState.CANCELLED or (state is JobState.DEAD and batch_state is BatchState.CANCELLED)
-    if cancelled or (sha256, version) != (submission.sha256, packed.content_sha256):
-        return None
-    return Known(job_id, batch_id, submission.student, state)
+    other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
+    return Known(job.id, job.batch_id, hand_in.submission.student, job.state, other_grader)
 
 
 def _accept_batch(
-    session: Session,
-    packed: Sequence[_Packed],
-    course_id: int,
-    name: str,
-    problems: Sequence[tuple[str, str]],
-    max_attempts: int,
-    at: datetime,
+    session: Session, packed: Sequence[_Packed], name: str, problems: Sequence[tuple[str, str]], terms: _Terms
 ) -> AcceptedBatch:
-    batch = Batch(course_id=course_id, name=name, problems=[list(row) for row in problems], created_at=at)
+    rows = [list(row) for row in problems]
+    batch = Batch(course_id=terms.course_id, name=name, problems=rows, created_at=terms.at)
     session.add(batch)
     session.flush()
-    jobs = tuple(_accept(session, item, course_id, batch.id, Lane.BATCH, max_attempts, at) for item in packed)
-    return AcceptedBatch(batch.id, jobs)
+    terms = replace(terms, batch_id=batch.id)
+    return AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in packed))
 
 
-def _accept(
-    session: Session,
-    packed: _Packed,
-    course_id: int,
-    batch_id: str | None,
-    lane: Lane,
-    max_attempts: int,
-    at: datetime,
-) -> Accepted:
-    submission, assignment = packed.hand_in.submission, packed.hand_in.assignment
-    enrolment_id = _enrolment(session, course_id, submission.student, at)
-    version_id = _assignment_version(session, packed, at)
-    of_student = (
-        models.Submission.enrolment_id == enrolment_id,
-        models.Submission.assignment == assignment.id,
-    )
+def _accept(session: Session, packed: _Packed, terms: _Terms) -> Accepted:
+    hand_in, at = packed.hand_in, terms.at
+    submission, assignment = hand_in.submission, hand_in.assignment
+    enrolment_id = enrolment(session, terms.course_id, submission.student, at)
+    version_id = keep(session, packed.frozen, at)
+    of_student = (models.Submission.enrolment_id == enrolment_id, models.Submission.assignment == assignment.id)
     earlier = session.scalar(select(func.max(models.Submission.attempt)).where(*of_student)) or 0
-    waiting = (
-        Job.state == JobState.QUEUED,
-        Job.submission_id.in_(select(models.Submission.id).where(*of_student)),
-    )
+    ruling = Ruling()
+    if not terms.anew:
+        ruling = rule(session, enrolment_id, assignment.id, submission.sha256, hand_in.handed_in_at)
     job_id = new_id()
-    superseded = {"state": JobState.CANCELLED, "error": f"superseded by {job_id}", "finished_at": at}
-    session.execute(update(Job).where(*waiting).values(**superseded))
+    if not ruling.over:
+        _supersede(session, select(models.Submission.id).where(*of_student), job_id, at)
     row = models.Submission(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
-        batch_id=batch_id,
+        batch_id=terms.batch_id,
         attempt=earlier + 1,
         sha256=submission.sha256,
-        source=packed.hand_in.source,
+        source=hand_in.source,
         size=len(packed.data),
         packed=packed.data,
         created_at=at,
+        handed_in_at=hand_in.handed_in_at,
+        days_late=ruling.days_late,
+        staff_only=ruling.over or None,
     )
     session.add(row)
     session.flush()
@@ -278,56 +274,44 @@ def _accept(
         submission_id=row.id,
         assignment_version_id=version_id,
         enrolment_id=enrolment_id,
-        batch_id=batch_id,
-        lane=lane,
-        max_attempts=max_attempts,
+        batch_id=terms.batch_id,
+        # Nobody waits for what only staff will see.
+        lane=Lane.BATCH if ruling.over else terms.lane,
+        max_attempts=terms.max_attempts,
         due_at=at,
         queued_at=at,
+        fresh=terms.anew,
     )
     session.add(job)
     session.flush()
-    return Accepted(job.id, submission.student, row.attempt)
+    source = None if terms.anew else copies.find(session, copies.cache_key(session, job_id, grader_sha256()))
+    if source is not None:
+        session.execute(update(Job).where(Job.id == job_id).values(**copies.copy(session, source, job_id, at)))
+    return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
 
 
-def _course(session: Session, name: str, at: datetime) -> int:
+def _supersede(session: Session, submissions: Select[int], job_id: str, at: datetime) -> None:
+    """Cancel what waits of these submissions; but a regrade of what was graded once goes on."""
+    waiting = (Job.state == JobState.QUEUED, Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
+    superseded = {"state": JobState.CANCELLED, "error": f"superseded by {job_id}", "finished_at": at}
+    session.execute(update(Job).where(*waiting).values(**superseded))
+
+
+def course_of(session: Session, name: str, at: datetime) -> int:
     """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
-    _insert_if_new(session, Course, name=name, created_at=at)
+    insert_if_new(session, Course, name=name, created_at=at)
     return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()
 
 
-def _enrolment(session: Session, course_id: int, student: str, at: datetime) -> int:
+def enrolment(session: Session, course_id: int, student: str, at: datetime) -> int:
+    """The student of this name in the course; made if there is none."""
     found = session.scalar(select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.student == student))
     if found is not None:
         return found
     person = Person(name=student, created_at=at)
     session.add(person)
     session.flush()
-    enrolment = Enrolment(course_id=course_id, person_id=person.id, student=student, role=Role.STUDENT)
-    session.add(enrolment)
+    row = Enrolment(course_id=course_id, person_id=person.id, student=student, role=Role.STUDENT)
+    session.add(row)
     session.flush()
-    return enrolment.id
-
-
-def _assignment_version(session: Session, packed: _Packed, at: datetime) -> int:
-    of_version = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == packed.content_sha256)
-    found = session.scalar(of_version)
-    if found is not None:
-        return found
-    assignment = packed.hand_in.assignment
-    _insert_if_new(
-        session,
-        AssignmentVersion,
-        assignment=assignment.id,
-        sha256=packed.content_sha256,
-        version=assignment.version,
-        title=assignment.title,
-        max_marks=assignment.max_marks,
-        content=packed.content,
-        created_at=at,
-    )
-    return session.scalars(of_version).one()
-
-
-def _insert_if_new(session: Session, table: type[models.Base], **values: object) -> None:
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    session.execute(insert(table).values(**values).on_conflict_do_nothing())
+    return row.id

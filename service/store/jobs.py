@@ -6,6 +6,7 @@ Which job is due first stands in ``turns.py``; finding lost ones in ``sweep.py``
 
 from __future__ import annotations
 
+import os
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,10 +16,11 @@ from typing import Any, cast
 from sqlalchemy import CursorResult, Update, select, update
 from sqlalchemy.orm import Session
 
-from service.store import artifacts, grades
+from service.store import artifacts, canaries, copies, grades, phases
 from service.store.engine import Store, now
 from service.store.models import UNFINISHED, Job, JobState, PlotState
 from service.store.turns import next_job
+from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
 
 PLOT_ATTEMPTS = 3
@@ -35,6 +37,8 @@ class Claim:
 
     job_id: str
     lease: str
+    attempt: int  # 1 is the first
+    at: datetime  # the database's clock when it was claimed
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +56,11 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Take the job whose turn it is; None when none is due."""
     with store.transaction() as session:
         at = now(session)
-        job_id = next_job(session, at)
+        job_id = None if canaries.is_in_quarantine(session, worker) else next_job(session, at, worker)
         if job_id is None:
             return None
-        claimed = Claim(job_id, secrets.token_hex(16))
+        begun = session.scalars(select(Job.attempt).where(Job.id == job_id)).one()
+        claimed = Claim(job_id, secrets.token_hex(16), begun + 1, at)
         taken = _change(
             session,
             update(Job)
@@ -68,6 +73,7 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
                 heartbeat_at=at,
                 started_at=at,
                 worker=worker,
+                process=os.getpid(),
                 progress=0.0,
             ),
         )
@@ -86,15 +92,31 @@ def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float)
         _guarded(session, claim, values)
 
 
-def finish(store: Store, claim: Claim, prepared: grades.Prepared, graded_at: datetime) -> None:
+def finish(
+    store: Store,
+    claim: Claim,
+    prepared: grades.Prepared,
+    graded_at: datetime,
+    trials_at: datetime | None = None,
+) -> None:
     """Store the grade with all its rows and end the job, in one transaction.
 
-    Raises Fenced, and stores nothing, when the job is no longer this worker's.
+    ``trials_at`` and ``graded_at`` are when the last trial had been run and when all was marked. Raises Fenced, and
+    stores nothing, when the job is no longer this worker's.
     """
     grade = prepared.grade
     with store.transaction() as session:
         at = now(session)
+        queued_at = session.scalar(select(Job.queued_at).where(Job.id == claim.job_id))
+        moments = {
+            phases.QUEUED: queued_at,
+            phases.CLAIMED: claim.at,
+            phases.TRIALS: trials_at,
+            phases.JUDGED: graded_at,
+            phases.COMMITTED: at,
+        }
         values = {
+            "phases": phases.written(moments),
             "state": JobState.DONE,
             "lease": None,
             "lease_until": None,
@@ -106,13 +128,33 @@ def finish(store: Store, claim: Claim, prepared: grades.Prepared, graded_at: dat
             "marks": grade.marks,
             "max_marks": grade.max_marks,
             "grader_version": grade.grader_version,
+            "grader_sha256": grader_sha256(),
+            "cache_key": copies.cache_key(session, claim.job_id, grader_sha256()),
             "walls": grade.walls,
             "notes": list(grade.notes),
             "plots": PlotState.DUE,
             "plots_due_at": at,
         }
+        _refuse_quarantined(session, claim)
         _guarded(session, claim, values)
         grades.insert(session, claim.job_id, prepared, at)
+
+
+def finish_with_copy(store: Store, claim: Claim) -> bool:
+    """End the job with the grade of an identical one, where there is one and nobody asked for it to be run anew.
+
+    Raises Fenced when the job is no longer this worker's.
+    """
+    with store.transaction() as session:
+        if session.scalar(select(Job.fresh).where(Job.id == claim.job_id)):
+            return False
+        source = copies.find(session, copies.cache_key(session, claim.job_id, grader_sha256()))
+        if source is None:
+            return False
+        at = now(session)
+        _guarded(session, claim, {"heartbeat_at": at})
+        _guarded(session, claim, copies.copy(session, source, claim.job_id, at))
+        return True
 
 
 def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
@@ -179,7 +221,9 @@ def finish_plots(store: Store, job_id: str, files: list[artifacts.File]) -> None
     with store.transaction() as session:
         at = now(session)
         artifacts.put(session, job_id, files, at)
-        done = {"plots": PlotState.DONE, "plots_due_at": None, "plotted_at": at}
+        before = session.scalars(select(Job.phases).where(Job.id == job_id)).one()
+        reached = {**before, **phases.written({phases.PLOTTED: at})}
+        done = {"plots": PlotState.DONE, "plots_due_at": None, "plotted_at": at, "phases": reached}
         session.execute(update(Job).where(Job.id == job_id).values(**done))
 
 
@@ -203,6 +247,12 @@ def _given_back(at: datetime) -> dict[str, Any]:
 
 def _held(claim: Claim) -> tuple[Any, ...]:
     return Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING
+
+
+def _refuse_quarantined(session: Session, claim: Claim) -> None:
+    worker = session.scalar(select(Job.worker).where(*_held(claim)))
+    if worker is not None and canaries.is_in_quarantine(session, worker, lock=True):
+        raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")
 
 
 def _guarded(session: Session, claim: Claim, values: dict[str, Any]) -> None:

@@ -43,6 +43,11 @@ def current_revision(engine: Engine) -> str | None:
         return MigrationContext.configure(connection).get_current_revision()
 
 
+def refuse_downgrade() -> None:
+    """What every revision does when asked to be taken back: raise HostError."""
+    raise HostError("A database cannot be taken back to an older Robomark; restore the backup made before the upgrade.")
+
+
 def upgrade(engine: Engine) -> None:
     """Apply what is missing, in one transaction under a lock.
 

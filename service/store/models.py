@@ -65,6 +65,14 @@ class BatchState(StrEnum):
     CANCELLED = "cancelled"
 
 
+class Standing(StrEnum):
+    """What a job's grade is to its hand-in. Of one hand-in at most one grade stands."""
+
+    STANDS = "stands"  # the one that reports and exports show
+    PROPOSED = "proposed"  # of a regrade, until it is published
+    KEPT = "kept"  # another took its place
+
+
 def _enum(kind: type[StrEnum]) -> Enum:
     return Enum(
         kind,
@@ -95,6 +103,7 @@ class Base(DeclarativeBase):
         JobState: _enum(JobState),
         PlotState: _enum(PlotState),
         BatchState: _enum(BatchState),
+        Standing: _enum(Standing),
     }
 
 
@@ -151,6 +160,7 @@ class Batch(Base):
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
     problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that preflight refused
+    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose hand-ins these are
     created_at: Mapped[datetime]
 
 
@@ -173,6 +183,9 @@ class Submission(Base):
     size: Mapped[int]
     packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
     created_at: Mapped[datetime]
+    handed_in_at: Mapped[datetime | None]  # by the student; None where nobody said
+    days_late: Mapped[int] = mapped_column(default=0)
+    staff_only: Mapped[str | None]  # the limit that this hand-in is over: it is marked, and shown to staff alone
 
 
 class Job(Base):
@@ -184,6 +197,7 @@ class Job(Base):
         Index(None, "state", "lease_until"),
         Index(None, "started_at"),
         Index(None, "plots", "plots_due_at"),
+        Index(None, "worker", "finished_at"),
         CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
     )
 
@@ -203,6 +217,7 @@ class Job(Base):
     lease_until: Mapped[datetime | None]
     heartbeat_at: Mapped[datetime | None]
     worker: Mapped[str | None]  # who holds it or held it last
+    process: Mapped[int | None]  # which of that worker's
     progress: Mapped[float] = mapped_column(default=0.0)  # 0 to 1
     error: Mapped[str | None]  # a sentence, of the last fault of ours or the reason of death
 
@@ -218,6 +233,18 @@ class Job(Base):
     grader_version: Mapped[str | None]
     walls: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
+
+    #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.
+    phases: Mapped[Any] = mapped_column(default=dict)
+    grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all that decides over marks
+    cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # alike only where grades must be
+    fresh: Mapped[bool] = mapped_column(default=False)  # to be run even where an identical grade is there
+    copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that was run
+    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that stood before
+    standing: Mapped[Standing] = mapped_column(default=Standing.STANDS)
+    suspect: Mapped[str | None]  # why its grade is not to be trusted
+    published_at: Mapped[datetime | None]
+    published_by: Mapped[str | None]
 
     plots: Mapped[PlotState] = mapped_column(default=PlotState.NONE)
     plots_due_at: Mapped[datetime | None]
@@ -243,6 +270,7 @@ class TrialRow(Base):
     verdict: Mapped[str] = mapped_column(String(32))
     sha256: Mapped[str] = mapped_column(String(64))
     end_t: Mapped[float]
+    sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: what is swept, and its level here
 
 
 class CriterionRow(Base):
@@ -267,6 +295,9 @@ class CriterionRow(Base):
     accuracy_n: Mapped[int | None]
     labels: Mapped[Any | None]  # ["square", ...]
     confusion: Mapped[Any | None]  # [[truth, answer or null, count], ...]
+    counts: Mapped[Any | None]  # {"sent": 6, "answered": 5, "late": 0, "malformed": 0, "unanswered": 1, ...}
+    confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
+    curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
     sights: Mapped[Any]
 
 
@@ -284,6 +315,74 @@ class Artifact(Base):
     size: Mapped[int]  # bytes before compression
     compressed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)  # zlib
     created_at: Mapped[datetime]
+
+
+class Policy(Base):
+    """When and how often a course's students may hand in; an empty ``assignment`` is for all that have none."""
+
+    __tablename__ = "policy"
+    __table_args__ = (Index(None, "course_id", "assignment", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
+    assignment: Mapped[str] = mapped_column(default="")
+    due_at: Mapped[datetime | None]
+    late_days: Mapped[int] = mapped_column(default=0)
+    attempts: Mapped[int | None]
+    cool_down_seconds: Mapped[float] = mapped_column(default=0.0)
+
+
+class Extension(Base):
+    """What one student is allowed beyond the policy."""
+
+    __tablename__ = "extension"
+    __table_args__ = (Index(None, "enrolment_id", "assignment", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"))
+    assignment: Mapped[str] = mapped_column(default="")  # empty: all
+    due_at: Mapped[datetime | None]
+    more_attempts: Mapped[int] = mapped_column(default=0)
+
+
+class Worker(Base):
+    """A worker that has graded a known answer. One that got it wrong is in quarantine and claims nothing."""
+
+    __tablename__ = "worker"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    grader_version: Mapped[str]
+    grader_sha256: Mapped[str] = mapped_column(String(64))
+    first_at: Mapped[datetime]
+    canary_at: Mapped[datetime]  # of the last known answer, right or wrong
+    quarantined_at: Mapped[datetime | None]
+    reason: Mapped[str | None]
+
+
+class Canary(Base):
+    """When a process of a worker last graded the known answer rightly; what it graded since is not vouched for."""
+
+    __tablename__ = "canary"
+    __table_args__ = (Index(None, "worker", "process", unique=True),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    worker: Mapped[str]
+    process: Mapped[int]
+    right_at: Mapped[datetime]
+
+
+class Presence(Base):
+    """A worker that lives, or lived until lately: it says so every few seconds, and takes its row away at its end."""
+
+    __tablename__ = "presence"
+
+    worker: Mapped[str] = mapped_column(primary_key=True)
+    host: Mapped[str]
+    concurrency: Mapped[int]  # gradings at a time
+    grader_version: Mapped[str]
+    walls: Mapped[str]  # what stands round student code there
+    started_at: Mapped[datetime]
+    seen_at: Mapped[datetime] = mapped_column(index=True)
 
 
 class Audit(Base):

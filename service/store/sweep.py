@@ -11,6 +11,7 @@ from datetime import timedelta
 
 from sqlalchemy import func, or_, select, update
 
+from service.store.clock import mend
 from service.store.engine import Store, now
 from service.store.jobs import Retry, after_fault
 from service.store.models import Job, JobState, Lane, PlotState
@@ -29,6 +30,7 @@ def take_back_lost(store: Store, retry: Retry) -> int:
     """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
     with store.transaction() as session:
         at = now(session)
+        mend(session, at, retry.wait)
         lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
         query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
         rows = session.execute(query.with_for_update(skip_locked=True)).all()

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, Subquery, case, func, or_, select
+from sqlalchemy import ColumnElement, Subquery, and_, case, func, not_, or_, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store.models import Batch, BatchState, Job, JobState, Lane
+from service.store.presence import another_lives
 
 #: Shares are counted over the jobs begun in this time, so that nobody who was served long ago waits for it.
 SHARE_WINDOW = timedelta(seconds=60)
 #: Of so many jobs begun, one is a batch's even while people wait.
 BATCH_EVERY = 5
+#: For so long a job that failed on one worker is left to the others, where there are any.
+ELSEWHERE = timedelta(seconds=20)
 
 
 def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
@@ -28,8 +31,8 @@ def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
     )
 
 
-def next_job(session: Session, at: datetime) -> str | None:
-    """The id of the job to take next; None when none is due.
+def next_job(session: Session, at: datetime, worker: str) -> str | None:
+    """The id of the job that ``worker`` should take next; None when none is due.
 
     The lane first: people before batches, but for one job in five. In a lane, the batch and then the student of
     whom fewest jobs were begun in the last minute; then the oldest job.
@@ -45,7 +48,7 @@ def next_job(session: Session, at: datetime) -> str | None:
         select(Job.id)
         .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
         .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
-        .where(*claimable(at))
+        .where(*claimable(at), not_(_better_elsewhere(worker, at)))
         .order_by(
             case((Job.lane == first, 0), else_=1),
             func.coalesce(of_batch.c.begun, 0),
@@ -57,6 +60,13 @@ def next_job(session: Session, at: datetime) -> str | None:
         .with_for_update(of=Job, skip_locked=True)
     )
     return session.scalar(query)
+
+
+def _better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
+    """Whether a job failed on this very worker, through a fault of ours, and another worker could try it."""
+    # A worker that ended gives back what it held without a fault; then no error is written.
+    failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
+    return and_(failed_here, Job.due_at > at - ELSEWHERE, another_lives(worker, at))
 
 
 def _begun(share: InstrumentedAttribute[str | None] | InstrumentedAttribute[int], at: datetime) -> Subquery:

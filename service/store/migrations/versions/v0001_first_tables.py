@@ -6,6 +6,7 @@ import sqlalchemy as sa
 from alembic import op
 
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
+from service.store.migrate import refuse_downgrade
 
 revision = "0001"
 down_revision = None
@@ -250,3 +251,6 @@ def upgrade() -> None:
     )
     with op.batch_alter_table("trial") as batch_op:
         batch_op.create_index(batch_op.f("ix_trial_job_id_position"), ["job_id", "position"], unique=True)
+
+
+downgrade = refuse_downgrade

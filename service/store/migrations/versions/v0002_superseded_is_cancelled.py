@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from alembic import op
 
+from service.store.migrate import refuse_downgrade
+
 revision = "0002"
 down_revision = "0001"
 branch_labels = None
@@ -12,3 +14,6 @@ depends_on = None
 
 def upgrade() -> None:
     op.execute("UPDATE job SET state = 'cancelled', error = 'superseded by a newer hand-in' WHERE state = 'superseded'")
+
+
+downgrade = refuse_downgrade

@@ -1,0 +1,47 @@
+"""Who did what to which row, and when: written beside the change it tells of, in the same transaction."""
+
+from __future__ import annotations
+
+import getpass
+import socket
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.engine import now
+from service.store.models import Audit
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One thing that somebody did."""
+
+    at: datetime
+    actor: str
+    action: str
+    detail: dict[str, Any]
+
+
+def this_user() -> str:
+    """Who runs a command here: the account and the machine."""
+    try:
+        account = getpass.getuser()
+    except (KeyError, OSError):
+        account = "unknown"
+    return f"{account}@{socket.gethostname()}"
+
+
+def note(session: Session, actor: str, action: str, subject: str, subject_id: str, **detail: object) -> None:
+    """Write down that ``actor`` did ``action`` to the row ``subject_id`` of the table ``subject``."""
+    session.add(
+        Audit(at=now(session), actor=actor, action=action, subject=subject, subject_id=subject_id, detail=detail)
+    )
+
+
+def entries(session: Session, subject: str, subject_id: str) -> list[Entry]:
+    """All that was done to a row, in order."""
+    query = select(Audit).where(Audit.subject == subject, Audit.subject_id == subject_id).order_by(Audit.id)
+    return [Entry(row.at, row.actor, row.action, dict(row.detail)) for row in session.scalars(query)]

@@ -1,0 +1,102 @@
+"""Grades that need not be run again: the same hand-in, assignment, seeds and grader give the same marks.
+
+A copy has rows of its own and names the grade that was run. What may be copied is decided here, when is not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import exists, insert, literal, select
+from sqlalchemy.orm import Session
+
+from service.store import phases
+from service.store.models import (
+    Artifact,
+    AssignmentVersion,
+    Base,
+    CriterionRow,
+    Job,
+    JobState,
+    PlotState,
+    Submission,
+    TrialRow,
+    Worker,
+)
+from sim.recording import Verdict
+
+#: How far such a trial came depends on the machine and its load, so another run may differ.
+_NOT_REPEATABLE = (Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR)
+
+
+def cache_key(session: Session, job_id: str, grader_sha256: str) -> str:
+    """Alike for two jobs only where their grades must be: the seeds follow from the assignment."""
+    query = (
+        select(Submission.sha256, AssignmentVersion.sha256)
+        .join(Job, Job.submission_id == Submission.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.id == job_id)
+    )
+    submission, assignment = session.execute(query).one()
+    return hashlib.sha256(f"{submission}\n{assignment}\n{grader_sha256}".encode()).hexdigest()
+
+
+def find(session: Session, key: str) -> str | None:
+    """The newest grade that may be copied for this key; None where it has to be run.
+
+    Never one without walls, of a worker in quarantine, or cut by a limit of the machine.
+    """
+    distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
+    cut = exists().where(
+        TrialRow.job_id == Job.id, TrialRow.verdict.in_([verdict.value for verdict in _NOT_REPEATABLE])
+    )
+    query = (
+        select(Job.id)
+        .where(
+            Job.cache_key == key,
+            Job.state == JobState.DONE,
+            Job.suspect.is_(None),
+            Job.copied_from.is_(None),
+            # The key fixes the walls' policy; these say that both layers stood.
+            Job.walls.contains("Landlock"),
+            Job.walls.contains("seccomp"),
+            ~distrusted,
+            ~cut,
+        )
+        .order_by(Job.finished_at.desc(), Job.id)
+        .limit(1)
+    )
+    return session.scalar(query)
+
+
+def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
+    """Copy the rows of a grade to another job, which has none; the columns that the job itself then has."""
+    for table in (TrialRow, CriterionRow, Artifact):
+        _copy_rows(session, table, source_id, job_id)
+    source = session.scalars(select(Job).where(Job.id == source_id)).one()
+    queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
+    names = ("verdict", "marks", "max_marks", "grader_version", "grader_sha256", "walls", "notes", "cache_key")
+    drawn = source.plots is PlotState.DONE
+    return {name: getattr(source, name) for name in names} | {
+        "state": JobState.DONE,
+        "copied_from": source_id,
+        "lease": None,
+        "lease_until": None,
+        "progress": 1.0,
+        "error": None,
+        "graded_at": at,
+        "finished_at": at,
+        "phases": phases.written({phases.QUEUED: queued_at, phases.COMMITTED: at}),
+        "plots": PlotState.DONE if drawn else PlotState.DUE,
+        "plots_due_at": None if drawn else at,
+        "plotted_at": at if drawn else None,
+    }
+
+
+def _copy_rows(session: Session, table: type[Base], source_id: str, job_id: str) -> None:
+    columns = table.__table__.columns
+    kept = [column for column in columns if column.name not in ("id", "job_id")]
+    rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
+    session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))

@@ -1,0 +1,172 @@
+"""When and how often students may hand in: a course's policy, a student's extensions, and what follows from them.
+
+What is over a limit is kept and marked all the same, but shown to staff alone; nothing here refuses a hand-in.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+
+from sqlalchemy import func, or_, select
+from sqlalchemy.orm import Session
+
+from service.store import models
+from service.store.engine import now
+from service.store.models import Enrolment, Extension, Job, JobState, Policy
+from sim.recording import Verdict
+
+_ALWAYS = frozenset({"visible"})
+_NOT_THE_STUDENTS = (Verdict.ASSIGNMENT_ERROR.value, Verdict.HOST_ERROR.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one student may do. ``attempts`` counts different hand-ins; None is no limit, and no due date."""
+
+    due_at: datetime | None = None
+    late_days: int = 0
+    attempts: int | None = None
+    cool_down_seconds: float = 0.0
+
+    @property
+    def closed_at(self) -> datetime | None:
+        """After this moment a hand-in is over the limit."""
+        return None if self.due_at is None else self.due_at + timedelta(days=self.late_days)
+
+
+@dataclass(frozen=True, slots=True)
+class Ruling:
+    """How many days late a hand-in is, and the limit that it is over, as a sentence; empty if it is over none."""
+
+    days_late: int = 0
+    over: str = ""
+
+
+def limits(session: Session, enrolment_id: int, assignment: str) -> Limits:
+    """The policy for the assignment, else the course's, with what this student is allowed beyond it."""
+    course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
+    policy = _policy(session, course_id, assignment)
+    extension = _extension(session, enrolment_id, assignment)
+    if extension is None:
+        return policy
+    due_at = policy.due_at
+    if due_at is not None and extension.due_at is not None:
+        due_at = max(due_at, extension.due_at)
+    attempts = None if policy.attempts is None else policy.attempts + extension.more_attempts
+    return replace(policy, due_at=due_at, attempts=attempts)
+
+
+def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, handed_in_at: datetime | None) -> Ruling:
+    """What the policy says of a hand-in that comes in now; a moment of handing in that nobody knows is in time."""
+    allowed = limits(session, enrolment_id, assignment)
+    earlier = _counted(session, enrolment_id, assignment, sha256)
+    if allowed.attempts is not None and len(earlier) >= allowed.attempts:
+        return Ruling(over=f"attempt {len(earlier) + 1}, where {allowed.attempts} are allowed")
+    if handed_in_at is None:
+        return Ruling()
+    days_late = 0
+    if allowed.due_at is not None and handed_in_at > allowed.due_at:
+        days_late = math.ceil((handed_in_at - allowed.due_at) / timedelta(days=1))
+        if days_late > allowed.late_days:
+            return Ruling(days_late, f"{days_late} days late, where {allowed.late_days} are allowed")
+    since = [handed_in_at - when for when in earlier if when <= handed_in_at]
+    if since and min(since).total_seconds() < allowed.cool_down_seconds:
+        minutes = math.floor(min(since).total_seconds() / 60)
+        asked = math.ceil(allowed.cool_down_seconds / 60)
+        return Ruling(days_late, f"handed in {minutes} minutes after the one before, where {asked} are asked for")
+    return Ruling(days_late)
+
+
+def released(session: Session, job_id: str) -> frozenset[str]:
+    """Which visibilities a student may see of a grade now.
+
+    ``after_due_date`` opens when nobody of the course may hand in any more, extensions and late days included; all
+    but ``hidden`` opens when the grade is published.
+    """
+    job = session.get_one(Job, job_id)
+    seen = set(_ALWAYS)
+    if job.published_at is not None:
+        seen |= {"after_published", "after_due_date"}
+    assignment = session.get_one(models.Submission, job.submission_id).assignment
+    closed_at = _closed_for_all(session, job.enrolment_id, assignment)
+    if closed_at is not None and now(session) > closed_at:
+        seen.add("after_due_date")
+    return frozenset(seen)
+
+
+def set_policy(session: Session, course_id: int, assignment: str, allowed: Limits) -> None:
+    """Make ``allowed`` the policy of a course for an assignment, or with an empty one for all that have none."""
+    row = session.scalar(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment))
+    if row is None:
+        row = Policy(course_id=course_id, assignment=assignment)
+        session.add(row)
+    row.due_at, row.late_days = allowed.due_at, allowed.late_days
+    row.attempts, row.cool_down_seconds = allowed.attempts, allowed.cool_down_seconds
+
+
+def policies(session: Session, course_id: int) -> dict[str, Limits]:
+    """The policies of a course, by assignment."""
+    rows = session.scalars(select(Policy).where(Policy.course_id == course_id).order_by(Policy.assignment))
+    return {row.assignment: _limits(row) for row in rows}
+
+
+def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int) -> None:
+    """Allow one student so much beyond the policy; what was allowed before for the same assignment is replaced."""
+    row = session.scalar(
+        select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
+    )
+    if row is None:
+        row = Extension(enrolment_id=enrolment_id, assignment=assignment)
+        session.add(row)
+    row.due_at, row.more_attempts = due_at, more_attempts
+
+
+def _policy(session: Session, course_id: int | None, assignment: str) -> Limits:
+    """The policy of the assignment itself, else the course's."""
+    query = select(Policy).where(Policy.course_id == course_id, Policy.assignment.in_(("", assignment)))
+    row = session.scalar(query.order_by(func.length(Policy.assignment).desc()).limit(1))
+    return Limits() if row is None else _limits(row)
+
+
+def _limits(row: Policy) -> Limits:
+    return Limits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds)
+
+
+def _extension(session: Session, enrolment_id: int, assignment: str) -> Extension | None:
+    query = select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", assignment)))
+    return session.scalar(query.order_by(func.length(Extension.assignment).desc()).limit(1))
+
+
+def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> datetime | None:
+    course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
+    policy = _policy(session, course_id, assignment)
+    if policy.due_at is None:
+        return None
+    latest = session.scalar(
+        select(func.max(Extension.due_at))
+        .join(Enrolment, Extension.enrolment_id == Enrolment.id)
+        .where(Enrolment.course_id == course_id, Extension.assignment.in_(("", assignment)))
+    )
+    due_at = policy.due_at if latest is None else max(policy.due_at, latest)
+    return due_at + timedelta(days=policy.late_days)
+
+
+def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:
+    """When the different hand-ins came that count as attempts: begun, and not ended by a fault of ours."""
+    submission = models.Submission
+    counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
+    query = (
+        select(func.coalesce(submission.handed_in_at, submission.created_at), submission.sha256)
+        .join(Job, Job.submission_id == submission.id)
+        .where(
+            submission.enrolment_id == enrolment_id,
+            submission.assignment == assignment,
+            submission.sha256 != sha256,
+            submission.staff_only.is_(None),
+            counts,
+        )
+        .order_by(submission.attempt)
+    )
+    return list({sha: when for when, sha in session.execute(query)}.values())

@@ -1,0 +1,291 @@
+"""Batches graded again after an assignment or the grader changed: what changes and why, and publishing it.
+
+The old grades stay and stand until somebody publishes the new ones. Nothing is graded here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, aliased
+
+from service.store import audit
+from service.store.engine import Store, now
+from service.store.models import (
+    UNFINISHED,
+    AssignmentVersion,
+    Batch,
+    CriterionRow,
+    Enrolment,
+    Job,
+    JobState,
+    Lane,
+    Standing,
+    Submission,
+    TrialRow,
+    new_id,
+)
+from service.store.versions import freeze, keep
+from sim.errors import UsageError
+from submissions.assignment import Assignment
+
+
+@dataclass(frozen=True, slots=True)
+class Regraded:
+    """A batch of regrades, and how many hand-ins were left out: for another assignment, or not graded yet."""
+
+    batch_id: str
+    jobs: int
+    other_assignment: int
+    unfinished: int
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionChange:
+    """One criterion whose marks differ, as (marks, the most there are); None where the assignment did not have it."""
+
+    title: str
+    before: tuple[Decimal, Decimal] | None
+    after: tuple[Decimal, Decimal] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A regrade beside the grade that it may replace. Marks are None where there is no grade (yet)."""
+
+    student: str
+    job_id: str
+    before_id: str
+    state: JobState
+    standing: Standing
+    before: Decimal | None
+    after: Decimal | None
+    before_max: Decimal | None
+    after_max: Decimal | None
+    criteria: tuple[CriterionChange, ...]
+    reason: str
+
+    @property
+    def differs(self) -> bool:
+        return self.state is JobState.DONE and (self.before, self.before_max) != (self.after, self.after_max)
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """How many grades are published now that were not, how many took another's place, and what was left out."""
+
+    published: int
+    replaced: int
+    unfinished: int
+    dead: int
+    staff_only: int
+
+
+def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> Regraded:
+    """Queue every hand-in of the batch that has a grade, or could not be given one, to be graded again.
+
+    Against ``assignment``, or without it the version that each was graded against. The grades that stand are not
+    touched. Raises UsageError when there is nothing to grade again.
+    """
+    frozen = None if assignment is None else freeze(assignment)
+    with store.transaction() as session:
+        at = now(session)
+        original = session.get(Batch, batch_id)
+        if original is None:
+            raise UsageError(f"there is no batch {batch_id}")
+        standing = _standing(session, batch_id)
+        ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
+        wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
+        unfinished = sum(job.state in UNFINISHED for job, _ in standing)
+        if not wanted:
+            raise UsageError(_nothing(batch_id, assignment, {name for _, name in standing}, unfinished))
+        version_id = None if frozen is None else keep(session, frozen, at)
+        batch = Batch(
+            course_id=original.course_id,
+            name=f"regrade of {original.name}",
+            problems=[],
+            regrade_of=original.id,
+            created_at=at,
+        )
+        session.add(batch)
+        session.flush()
+        session.add_all(_proposal(job, version_id, batch.id, max_attempts, at) for job in wanted)
+        audit.note(session, actor, "regrade", "batch", batch_id, as_batch=batch.id, grades=len(wanted))
+        return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+
+
+def changes(session: Session, batch_id: str) -> list[Change]:
+    """What a batch of regrades changes, by student."""
+    before = aliased(Job)
+    query = (
+        select(Job, before, Enrolment.student)
+        .join(before, Job.regrade_of == before.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .where(Job.batch_id == batch_id)
+        .order_by(Enrolment.student, Job.id)
+    )
+    return [_change(session, after, earlier, student) for after, earlier, student in session.execute(query)]
+
+
+def publish(store: Store, batch_id: str, *, actor: str) -> Published:
+    """Let the newest regrade of each hand-in of the batch stand, and publish every grade that then stands.
+
+    A grade that is suspect, or of a hand-in over a limit, is not published. Raises UsageError for an unknown batch.
+    """
+    with store.transaction() as session:
+        at = now(session)
+        if session.get(Batch, batch_id) is None:
+            raise UsageError(f"there is no batch {batch_id}")
+        ids = select(Job.submission_id).where(Job.batch_id == batch_id)
+        query = select(Job).where(Job.submission_id.in_(ids), Job.standing != Standing.KEPT)
+        of_submission: dict[int, list[Job]] = {}
+        for job in session.scalars(query.order_by(Job.queued_at, Job.id).with_for_update()):
+            of_submission.setdefault(job.submission_id, []).append(job)
+        hidden = set(
+            session.scalars(select(Submission.id).where(Submission.id.in_(ids), Submission.staff_only.is_not(None)))
+        )
+        published = replaced = 0
+        for submission_id, jobs in of_submission.items():
+            stands, another = _let_stand(jobs)
+            replaced += another
+            if stands is not None and stands.published_at is None and submission_id not in hidden:
+                stands.published_at, stands.published_by = at, actor
+                published += 1
+        jobs = [job for listed in of_submission.values() for job in listed if job.standing is not Standing.KEPT]
+        result = Published(
+            published,
+            replaced,
+            sum(job.state in UNFINISHED for job in jobs),
+            sum(job.state is JobState.DEAD for job in jobs),
+            len(hidden),
+        )
+        audit.note(session, actor, "publish", "batch", batch_id, published=published, replaced=replaced)
+        return result
+
+
+def unpublished_regrades(session: Session, batch_id: str) -> int:
+    """How many hand-ins of a batch have a regrade that is done and does not stand yet."""
+    ids = select(Job.submission_id).where(Job.batch_id == batch_id)
+    proposed = (Job.standing == Standing.PROPOSED, Job.state == JobState.DONE, Job.suspect.is_(None))
+    query = select(Job.submission_id).where(Job.submission_id.in_(ids), *proposed).distinct()
+    return len(session.scalars(query).all())
+
+
+def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
+    """The jobs that stand for the hand-ins of a batch, with their assignment."""
+    ids = select(Job.submission_id).where(Job.batch_id == batch_id)
+    query = (
+        select(Job, AssignmentVersion.assignment)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+        .order_by(Job.queued_at, Job.id)
+    )
+    return [(job, name) for job, name in session.execute(query)]
+
+
+def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfinished: int) -> str:
+    if assignment is not None and found and assignment.id not in found:
+        return f"batch {batch_id} has no hand-in for {assignment.id}, only for {', '.join(sorted(found))}"
+    waits = f": {unfinished} of its hand-ins are not graded yet" if unfinished else ""
+    return f"batch {batch_id} has nothing to grade again{waits}"
+
+
+def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int, at: datetime) -> Job:
+    return Job(
+        id=new_id(),
+        submission_id=job.submission_id,
+        assignment_version_id=version_id or job.assignment_version_id,
+        enrolment_id=job.enrolment_id,
+        batch_id=batch_id,
+        lane=Lane.BATCH,
+        max_attempts=max_attempts,
+        due_at=at,
+        queued_at=at,
+        fresh=True,
+        regrade_of=job.id,
+        standing=Standing.PROPOSED,
+    )
+
+
+def _let_stand(jobs: Sequence[Job]) -> tuple[Job | None, bool]:
+    """The grade of one hand-in that stands from now on, and whether it took another's place.
+
+    What is older than the newest regrade gives way to it; one that is not graded yet stays a proposal.
+    """
+    done = [job for job in jobs if job.state is JobState.DONE and job.suspect is None]
+    proposed = [job for job in done if job.standing is Standing.PROPOSED]
+    if not proposed:
+        return next((job for job in done if job.standing is Standing.STANDS), None), False
+    newest = proposed[-1]
+    for job in jobs:
+        if job is not newest and job.queued_at <= newest.queued_at:
+            job.standing = Standing.KEPT
+    newest.standing = Standing.STANDS
+    return newest, True
+
+
+def _change(session: Session, after: Job, before: Job, student: str) -> Change:
+    return Change(
+        student=student,
+        job_id=after.id,
+        before_id=before.id,
+        state=after.state,
+        standing=after.standing,
+        before=before.marks,
+        after=after.marks,
+        before_max=before.max_marks,
+        after_max=after.max_marks,
+        criteria=_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
+        reason=_reason(session, before, after),
+    )
+
+
+def _criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
+    before, after = _marks(session, before_id), _marks(session, after_id)
+    differing = [key for key in {**after, **before} if _worth(before.get(key)) != _worth(after.get(key))]
+    return tuple(
+        CriterionChange((after.get(key) or before[key])[0], _worth(before.get(key)), _worth(after.get(key)))
+        for key in differing
+    )
+
+
+_Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
+
+
+def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
+    query = select(CriterionRow).where(CriterionRow.job_id == job_id).order_by(CriterionRow.position)
+    return {row.criterion: (row.title, row.marks, row.max_marks) for row in session.scalars(query)}
+
+
+def _worth(marked: _Marked | None) -> tuple[Decimal, Decimal] | None:
+    return None if marked is None else marked[1:]
+
+
+def _reason(session: Session, before: Job, after: Job) -> str:
+    """Why the grades may differ: everything that differs between the two gradings."""
+    if after.state is not JobState.DONE:
+        return after.error or after.state.value
+    reasons = []
+    versions = [session.get_one(AssignmentVersion, job.assignment_version_id) for job in (before, after)]
+    if versions[0].id != versions[1].id and versions[0].version != versions[1].version:
+        reasons.append("assignment changed")
+    if before.state is not JobState.DONE:
+        reasons.append("had no grade")
+    elif before.grader_sha256 is None or before.grader_sha256 != after.grader_sha256:
+        versions_differ = before.grader_version != after.grader_version
+        told = f" ({before.grader_version} to {after.grader_version})" if versions_differ else ""
+        reasons.append(f"grader changed{told}")
+    if before.suspect is not None:
+        reasons.append("the earlier worker was found to grade wrongly")
+    if not reasons and _chains(session, before.id) != _chains(session, after.id):
+        # The same grader and assignment owe the same recordings: somebody has to look.
+        return "unexplained: other recordings from the same assignment and grader; robomark verify both"
+    return ", ".join(reasons) or "nothing changed"
+
+
+def _chains(session: Session, job_id: str) -> list[str]:
+    return list(session.scalars(select(TrialRow.sha256).where(TrialRow.job_id == job_id).order_by(TrialRow.position)))

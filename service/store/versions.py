@@ -1,0 +1,77 @@
+"""Assignments as they are kept: frozen by their content, once each, with all that a worker elsewhere needs.
+
+Reading one from its folder is ``submissions.assignment_file``'s.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import Session
+
+from service.store import models
+from service.store.models import AssignmentVersion
+from service.store.plain import from_plain, to_plain
+from submissions.assignment import Assignment
+
+
+@dataclass(frozen=True, slots=True)
+class Frozen:
+    """An assignment and what is kept of it; made before a transaction, so that compressing keeps no lock waiting."""
+
+    assignment: Assignment
+    content: bytes
+    sha256: str
+
+
+def freeze(assignment: Assignment) -> Frozen:
+    """What is kept of the assignment."""
+    content = assignment_to_bytes(assignment)
+    return Frozen(assignment, content, hashlib.sha256(zlib.decompress(content)).hexdigest())
+
+
+def keep(session: Session, frozen: Frozen, at: datetime) -> int:
+    """The id of the row with exactly this content; made if there is none."""
+    of_version = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == frozen.sha256)
+    found = session.scalar(of_version)
+    if found is not None:
+        return found
+    assignment = frozen.assignment
+    insert_if_new(
+        session,
+        AssignmentVersion,
+        assignment=assignment.id,
+        sha256=frozen.sha256,
+        version=assignment.version,
+        title=assignment.title,
+        max_marks=assignment.max_marks,
+        content=frozen.content,
+        created_at=at,
+    )
+    return session.scalars(of_version).one()
+
+
+def assignment_to_bytes(assignment: Assignment) -> bytes:
+    """All of an assignment, pictures and given files and secret included."""
+    text = json.dumps(to_plain(assignment), sort_keys=True, separators=(",", ":"))
+    return zlib.compress(text.encode("ascii"), 6)
+
+
+def assignment_from_bytes(content: bytes) -> Assignment:
+    """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
+    try:
+        return from_plain(Assignment, json.loads(zlib.decompress(content)))
+    except zlib.error as error:
+        raise ValueError(f"not an assignment: {error}") from error
+
+
+def insert_if_new(session: Session, table: type[models.Base], **values: object) -> None:
+    """Insert a row, unless one with the same unique values is there."""
+    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
+    session.execute(insert(table).values(**values).on_conflict_do_nothing())

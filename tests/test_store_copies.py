@@ -1,0 +1,128 @@
+"""An identical hand-in is not run again: it has the earlier grade, marked as a copy, where that can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+from sqlalchemy import update
+
+import report_builders
+from builders import comparable, echo, hand_in
+from service.grading.grade import Grade
+from service.store import artifacts, batches, canaries, grades, jobs
+from service.store.engine import Store
+from service.store.intake import Accepted, HandIn, accept, accept_batch
+from service.store.models import Job, JobState, PlotState, Standing
+from sim.recording import Verdict
+
+WALLS = "Landlock 7, seccomp, process limits, policy 0"
+GRADE = replace(report_builders.shape_grade(), walls=WALLS)
+
+
+def _accept(store: Store, student: str = "ada", like: HandIn | None = None) -> Accepted:
+    taken = like or hand_in()
+    submission = replace(taken.submission, student=student)
+    return accept(store, replace(taken, submission=submission), max_attempts=3)
+
+
+def _grade_next(store: Store, grade: Grade = GRADE, worker: str = "worker") -> str:
+    claim = jobs.claim(store, worker, 60)
+    assert claim is not None
+    jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+    return claim.job_id
+
+
+def _job(store: Store, job_id: str) -> Job:
+    with store.reading() as session:
+        return session.get_one(Job, job_id)
+
+
+def test_an_identical_hand_in_has_the_grade_at_once_and_says_whose(store: Store) -> None:
+    _accept(store, "ada")
+    first = _grade_next(store)
+    jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"picture")])
+    second = _accept(store, "bob")
+    assert second.copied_from == first
+    job = _job(store, second.job_id)
+    assert (job.state, job.copied_from, job.plots, job.attempt) == (JobState.DONE, first, PlotState.DONE, 0)
+    assert jobs.claim(store, "worker", 60) is None
+    with store.reading() as session:
+        original, copy = grades.load(session, first), grades.load(session, second.job_id)
+        assert comparable(replace(copy, student=original.student)) == comparable(original)
+        assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"picture"
+        assert batches.job_line(session, second.job_id).copied_from == first
+    # A copy is not copied: what is named is always the grade that was run.
+    assert _accept(store, "eve").copied_from == first
+
+
+def test_what_waits_is_copied_when_its_turn_comes(store: Store) -> None:
+    ids = [_accept(store, student).job_id for student in ("ada", "bob")]
+    first = _grade_next(store)
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    assert jobs.finish_with_copy(store, claim)
+    assert {first, claim.job_id} == set(ids)
+    assert (_job(store, claim.job_id).copied_from, _job(store, claim.job_id).plots) == (first, PlotState.DUE)
+    with pytest.raises(jobs.Fenced):
+        jobs.finish_with_copy(store, claim)
+
+
+def test_what_is_asked_for_anew_is_run(store: Store) -> None:
+    _accept(store, "ada")
+    _grade_next(store)
+    accept_batch(store, "again", [hand_in("ada")], [], max_attempts=3)
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    assert not jobs.finish_with_copy(store, claim)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [hand_in("bob", "print('other')\n"), hand_in("bob", assignment=replace(echo(), title="Another"))],
+    ids=["other bytes", "other assignment"],
+)
+def test_only_the_identical_is_copied(store: Store, other: HandIn) -> None:
+    _accept(store, "ada")
+    _grade_next(store)
+    assert _accept(store, "bob", other).copied_from is None
+
+
+def _cut(verdict: Verdict) -> Grade:
+    (trial, *rest) = GRADE.trials
+    return replace(GRADE, trials=(replace(trial, recording=replace(trial.recording, verdict=verdict)), *rest))
+
+
+@pytest.mark.parametrize(
+    "grade",
+    [replace(GRADE, walls="process limits only"), _cut(Verdict.CPU_LIMIT), _cut(Verdict.STALLED)],
+    ids=["without walls", "cut by the machine", "stalled"],
+)
+def test_what_cannot_be_relied_on_is_run_again(store: Store, grade: Grade) -> None:
+    _accept(store, "ada")
+    _grade_next(store, grade)
+    assert _accept(store, "bob").copied_from is None
+
+
+def test_another_grader_runs_it_again(store: Store) -> None:
+    _accept(store, "ada")
+    first = _grade_next(store)
+    with store.transaction() as session:
+        session.execute(update(Job).where(Job.id == first).values(cache_key="0" * 64))
+    assert _accept(store, "bob").copied_from is None
+
+
+def test_copies_of_a_suspect_grade_are_suspect_and_run_again(store: Store) -> None:
+    _accept(store, "ada")
+    first = _grade_next(store, worker="wrong")
+    second = _accept(store, "bob").job_id
+    done = canaries.quarantine(store, "wrong", "it adds wrongly")
+    assert (set(done.suspect), len(done.again)) == ({first, second}, 2)
+    assert _job(store, second).standing is Standing.KEPT
+    assert _accept(store, "eve").copied_from is None
+    again = _grade_next(store, worker="right")
+    claim = jobs.claim(store, "right", 60)
+    assert claim is not None
+    assert jobs.finish_with_copy(store, claim)
+    assert _job(store, claim.job_id).copied_from == again

@@ -1,0 +1,210 @@
+"""Batches graded again: old grades stay and stand until the new ones are published, and the changes are explained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+
+import pytest
+from sqlalchemy import select, update
+
+import report_builders
+from builders import echo, hand_in
+from service.grading.grade import Grade
+from service.store import audit, batch_control, batches, grades, jobs, regrades
+from service.store.engine import Store
+from service.store.intake import accept_batch, accept_new
+from service.store.models import Batch, Job, JobState, Standing
+from sim.errors import UsageError
+
+GRADE = report_builders.faulty_grade()
+CHANGED = replace(echo(), title="Changed", version="changed")
+
+
+def _better(grade: Grade) -> Grade:
+    first = grade.criteria[0]
+    return replace(grade, criteria=(replace(first, marks=first.max_marks), *grade.criteria[1:]))
+
+
+def _other_run(grade: Grade) -> Grade:
+    (trial, *rest) = grade.trials
+    return replace(grade, trials=(replace(trial, recording=replace(trial.recording, sha256="0" * 64)), *rest))
+
+
+def _batch(store: Store, *students: str) -> str:
+    return accept_batch(store, "class", [hand_in(name) for name in students], [], max_attempts=3).id
+
+
+def _grade_all(store: Store, grade: Grade = GRADE) -> None:
+    while (claim := jobs.claim(store, "worker", 60)) is not None:
+        jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+
+
+def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = False) -> str:
+    made = regrades.regrade(store, batch, CHANGED if changed else None, max_attempts=3, actor="staff")
+    _grade_all(store, grade)
+    return made.batch_id
+
+
+def _standing(store: Store, batch: str) -> dict[str, str]:
+    """The grade that stands, by student."""
+    with store.reading() as session:
+        return {line.student: line.id for line in batches.job_lines(session, batch)}
+
+
+def _changes(store: Store, batch: str) -> list[regrades.Change]:
+    with store.reading() as session:
+        return regrades.changes(session, batch)
+
+
+def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None:
+    batch = _batch(store, "ada", "bob")
+    _grade_all(store)
+    before = _standing(store, batch)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 0, 0, 0, 0)
+    again = _regrade(store, batch, _better(GRADE), changed=True)
+    assert _standing(store, batch) == before
+    with store.reading() as session:
+        assert regrades.unpublished_regrades(session, batch) == 2
+        assert batches.batch(session, again).regrade_of == batch
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 2, 0, 0, 0)
+    after = _standing(store, batch)
+    assert set(after.values()).isdisjoint(before.values())
+    with store.reading() as session:
+        for student, job_id in before.items():
+            old, new = session.get_one(Job, job_id), session.get_one(Job, after[student])
+            assert (old.standing, old.marks, old.published_by) == (Standing.KEPT, GRADE.marks, "staff")
+            assert (new.standing, new.batch_id, new.published_at is not None) == (Standing.STANDS, again, True)
+            assert grades.load(session, job_id).marks == GRADE.marks
+        actions = [entry.action for entry in audit.entries(session, "batch", batch)]
+    assert actions == ["publish", "regrade", "publish"]
+    assert regrades.publish(store, batch, actor="staff").published == 0
+
+
+def test_a_regrade_can_be_published_by_its_own_batch_too(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    again = _regrade(store, batch)
+    regrades.publish(store, again, actor="staff")
+    (line,) = _standing(store, batch).values()
+    with store.reading() as session:
+        assert session.get_one(Job, line).batch_id == again
+    assert len(_changes(store, again)) == 1
+
+
+def test_of_several_regrades_the_newest_stands(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    _regrade(store, batch)
+    newest = _regrade(store, batch, _better(GRADE))
+    regrades.publish(store, batch, actor="staff")
+    with store.reading() as session:
+        standing = session.execute(select(Job.batch_id, Job.standing).order_by(Job.queued_at)).all()
+    assert [state for _, state in standing] == [Standing.KEPT, Standing.KEPT, Standing.STANDS]
+    assert standing[-1][0] == newest
+
+
+@pytest.mark.parametrize(
+    ("changed", "grade", "other_grader", "reason", "criteria"),
+    [
+        (True, _better, False, "assignment changed", 1),
+        (False, _better, True, "grader changed", 1),
+        (True, _better, True, "assignment changed, grader changed", 1),
+        (False, lambda grade: grade, False, "nothing changed", 0),
+        (False, _other_run, False, "unexplained", 0),
+    ],
+)
+def test_what_changes_is_explained(
+    store: Store, changed: bool, grade: Callable[[Grade], Grade], other_grader: bool, reason: str, criteria: int
+) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    if other_grader:
+        with store.transaction() as session:
+            session.execute(update(Job).values(grader_sha256="f" * 64))
+    (change,) = _changes(store, _regrade(store, batch, grade(GRADE), changed=changed))
+    assert change.reason.startswith(reason)
+    assert (change.student, change.before) == ("ada", GRADE.marks)
+    assert len(change.criteria) == criteria
+    if criteria:
+        first = GRADE.criteria[0]
+        assert change.criteria[0].before == (first.marks, first.max_marks)
+        assert change.criteria[0].after == (first.max_marks, first.max_marks)
+        assert change.differs
+
+
+def test_criteria_that_come_and_go_are_told(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    (first, *rest) = GRADE.criteria
+    other = replace(GRADE, criteria=(replace(first, id="new", title="A new one", marks=Decimal(1)), *rest))
+    (change,) = _changes(store, _regrade(store, batch, other, changed=True))
+    told = {criterion.title: (criterion.before is None, criterion.after is None) for criterion in change.criteria}
+    assert told == {"A new one": (True, False), first.title: (False, True)}
+
+
+def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> None:
+    batch = _batch(store, "ada", "bob", "cid")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    with pytest.raises(UsageError, match="nothing to grade again: 3 of its hand-ins are not graded yet"):
+        regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    jobs.bury(store, claim, "no program")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, grades.prepare(GRADE), datetime.now(UTC))
+    other = replace(echo(), id="other")
+    with pytest.raises(UsageError, match="has no hand-in for other, only for echo-responder"):
+        regrades.regrade(store, batch, other, max_attempts=3, actor="staff")
+    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    assert (made.jobs, made.other_assignment, made.unfinished) == (2, 0, 1)
+    with pytest.raises(UsageError, match="there is no batch"):
+        regrades.publish(store, "nowhere", actor="staff")
+
+
+def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
+    batch = _batch(store, "ada")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.bury(store, claim, "no program")
+    (change,) = _changes(store, _regrade(store, batch, changed=True))
+    assert (change.before, change.after) == (None, GRADE.marks)
+    assert "had no grade" in change.reason
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0)
+
+
+def test_a_newer_hand_in_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    accept_new(store, "late", [hand_in("ada", "print('other')\n")], [], max_attempts=3)
+    with store.reading() as session:
+        assert session.scalars(select(Job.state).where(Job.batch_id == made.batch_id)).all() == [JobState.QUEUED]
+
+
+def test_the_same_batch_again_after_a_regrade_changes_nothing_and_points_at_a_changed_grader(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    _regrade(store, batch, changed=True)
+    for assignment in (echo(), CHANGED):
+        again = accept_new(store, "class", [hand_in("ada", assignment=assignment)], [], max_attempts=3)
+        assert (again.batch, again.known[0].other_grader) == (None, False)
+    with store.transaction() as session:
+        session.execute(update(Job).values(grader_sha256="f" * 64))
+    assert accept_new(store, "class", [hand_in("ada")], [], max_attempts=3).known[0].other_grader
+
+
+def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    before = _standing(store, batch)
+    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    batch_control.cancel(store, made.batch_id, actor="staff")
+    assert regrades.publish(store, batch, actor="staff").replaced == 0
+    assert _standing(store, batch) == before
+    with store.reading() as session:
+        names = session.scalars(select(Batch.name).order_by(Batch.created_at)).all()
+        assert [entry.actor for entry in audit.entries(session, "batch", made.batch_id)] == ["staff"]
+    assert names == ["class", "regrade of class"]
