@@ -9,24 +9,32 @@ import os
 import platform
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from importlib import metadata
 
 import redis
-from redis.backoff import NoBackoff
-from redis.retry import Retry
 from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox.manager import Sandboxes
-from service.queue.embedded import broker_answers, socket_path
+from service.grading.rig import Rig
+from service.queue import canaries as known_answers
+from service.queue.broker import broker_answers, broker_client, socket_path
 from service.queue.worker import worker_lives
 from service.settings import Settings
-from service.store.engine import open_engine
+from service.store import canaries, presence
+from service.store.engine import Store, now, open_engine
+from service.store.figures import look
 from service.store.migrate import current_revision, newest_revision
+from service.store.models import JobState
 from sim.errors import RobomarkError
 
 _FREE_BYTES = 1_000_000_000
+_OLDEST_BROKER = (6, 2)
+_APART_SECONDS = 5.0
+_LONG_SECONDS = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +55,10 @@ def examine(settings: Settings) -> list[Finding]:
         ("home", _home),
         ("database", _database),
         ("broker", _broker),
-        ("worker", _worker),
+        ("clock", _clock),
+        ("workers", _workers),
+        ("queue", _queue),
+        ("known answer", _known_answer),
     ]
     return [_finding(what, check, settings) for what, check in checks]
 
@@ -106,17 +117,87 @@ def _broker(settings: Settings) -> tuple[bool, str]:
     if not settings.broker_url:
         running = "runs" if broker_answers(settings) else "is started when needed"
         return True, f"the bundled Valkey, which {running}, on {socket_path(settings)}"
-    url = settings.broker_url.replace("redis+socket://", "unix://").partition("?")[0]
-    never_again = Retry(NoBackoff(), 0)
-    client = redis.Redis.from_url(url, socket_connect_timeout=3, socket_timeout=3, retry=never_again)
+    client = broker_client(settings.broker_url, 3.0)
     try:
-        version = client.info("server").get("redis_version", "?")
+        version = str(client.info("server").get("redis_version", "0"))
+        policy = str(client.info("memory").get("maxmemory_policy", ""))
     finally:
         client.close()
-    return True, f"{client.connection_pool.connection_kwargs.get('host', url)} answers, version {version}"
+    where = client.connection_pool.connection_kwargs.get("host", settings.broker_url)
+    if tuple(int(part) for part in version.split(".")[:2] if part.isdigit()) < _OLDEST_BROKER:
+        return False, f"{where} answers, version {version}; {'.'.join(map(str, _OLDEST_BROKER))} or later is needed"
+    if policy not in ("", "noeviction"):
+        return False, f"{where} throws keys away when its memory is full: set maxmemory-policy to noeviction"
+    return True, f"{where} answers, version {version}"
 
 
-def _worker(settings: Settings) -> tuple[bool, str]:
-    if worker_lives(settings):
-        return True, "one runs on this machine"
-    return True, "none runs on this machine now: robomark worker"
+def _known_answer(settings: Settings) -> tuple[bool, str]:
+    """Whether this machine grades the known answer rightly, and every worker did lately."""
+    with Rig() as rig:
+        actual = known_answers.ask(rig)
+    wrong = "" if actual is None else known_answers.difference(known_answers.known(), actual)
+    if wrong:
+        return False, f"this machine grades wrongly: {wrong}"
+    here = "cut by a limit of this machine" if actual is None else "right on this machine"
+    with _opened(settings) as store:
+        if store is None:
+            return True, here
+        with store.reading() as session:
+            lately = now(session) - timedelta(days=1)
+            shut_out = [found for found in canaries.in_quarantine(session) if found.since > lately]
+    if not shut_out:
+        return True, here
+    told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)
+    return False, f"{here}; in quarantine: {told}"
+
+
+def _clock(settings: Settings) -> tuple[bool, str]:
+    """Leases go by the database's clock, so that a wrong one here only spoils the logs."""
+    with _opened(settings) as store:
+        if store is None:
+            return True, "nothing to compare it with yet"
+        with store.reading() as session:
+            apart = abs((now(session) - datetime.now(UTC)).total_seconds())
+    if apart > _APART_SECONDS:
+        return False, f"{apart:.0f} s apart from the database's: the times in this machine's logs are wrong"
+    return True, "as the database's"
+
+
+def _workers(settings: Settings) -> tuple[bool, str]:
+    here = "one runs on this machine" if worker_lives(settings) else "none runs on this machine now: robomark up"
+    with _opened(settings) as store:
+        if store is None:
+            return True, here
+        with store.reading() as session:
+            lately = [seen.worker for seen in presence.workers(session) if seen.lately]
+    if not lately:
+        return True, here
+    slots = sum(worker.concurrency for worker in lately)
+    hosts = len({worker.host for worker in lately})
+    return True, f"{here}; heard of lately: {len(lately)} on {hosts} machines, {slots} gradings at a time"
+
+
+def _queue(settings: Settings) -> tuple[bool, str]:
+    with _opened(settings) as store:
+        if store is None:
+            return True, "empty"
+        with store.reading() as session:
+            figures = look(session)
+    waiting = sum(figures.claimable.values())
+    oldest = max(figures.oldest_seconds.values(), default=0.0)
+    dead = sum(count for (_, state), count in figures.jobs.items() if state is JobState.DEAD)
+    told = f"{waiting} waiting" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
+    told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
+    if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in figures.workers):
+        return False, f"{told}; no worker was heard of lately"
+    return True, told
+
+
+@contextmanager
+def _opened(settings: Settings) -> Iterator[Store | None]:
+    """The database as it is; None where it has no tables of this release."""
+    engine = open_engine(settings.database)
+    try:
+        yield Store(engine) if current_revision(engine) == newest_revision() else None
+    finally:
+        engine.dispose()

@@ -14,7 +14,8 @@ from rich.table import Table
 from rich.text import Text
 
 from service.doctor import examine
-from service.queue.embedded import EmbeddedBroker
+from service.grade_command import warn_of_no_walls
+from service.queue.broker import EmbeddedBroker
 from service.queue.plotting import PREFIX
 from service.queue.worker import run_worker
 from service.report_files import write_reports
@@ -30,14 +31,20 @@ from sim.errors import HostError, UsageError
 database_app = typer.Typer(help="Look after the database.", no_args_is_help=True)
 
 
-def worker() -> None:
+def worker(
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Let hand-ins do anything on this machine; for development.")
+    ] = False,
+) -> None:
     """Grade what is queued until told to stop; starts the bundled broker if no other is named and none runs."""
     settings = load_settings()
+    if unsafe:
+        warn_of_no_walls()
     if settings.broker_url:
-        status = run_worker(settings)
+        status = run_worker(settings, unsafe=unsafe)
     else:
         with EmbeddedBroker(settings) as broker:
-            status = run_worker(broker.settings)
+            status = run_worker(broker.settings, unsafe=unsafe)
     if status:
         raise HostError(f"the worker ended with status {status}; its log says why")
 

@@ -48,6 +48,8 @@ class Settings(BaseSettings):
     backoff_seconds: float = Field(default=5.0, ge=0, le=3600)
     #: How long one whole job may take in real time: the backstop behind all other limits.
     job_seconds: float = Field(default=900.0, ge=1, le=86_400)
+    #: How often each process of a worker grades the known answer.
+    canary_seconds: float = Field(default=300.0, ge=1, le=86_400)
     #: A queued job whose nudge is older than this may be nudged again.
     nudge_seconds: float = Field(default=10.0, ge=0.1, le=3600)
     log_level: str = "WARNING"

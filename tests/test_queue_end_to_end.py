@@ -20,9 +20,9 @@ from databases import fresh_database
 from service.grading.grader import grade
 from service.grading.rig import Rig
 from service.preflight import preflight
+from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
 from service.queue.nudges import Nudger
 from service.queue.worker import worker_lives
 from service.settings import Settings

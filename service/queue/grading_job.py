@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import datetime, timedelta
 from enum import Enum
 from typing import TypeVar
 
@@ -47,7 +47,7 @@ def grade_next(store: Store, settings: Settings, rig: Rig, worker: str) -> Outco
     claim = jobs.claim(store, worker, settings.lease_seconds)
     if claim is None:
         return Outcome.NOTHING_DUE
-    with structlog.contextvars.bound_contextvars(job=claim.job_id, worker=worker):
+    with structlog.contextvars.bound_contextvars(job=claim.job_id, attempt=claim.attempt, worker=worker):
         try:
             _grade(store, settings, rig, claim)
         except Cancelled as error:
@@ -80,18 +80,22 @@ def plot_next(store: Store, settings: Settings) -> str | None:
 
 
 def _grade(store: Store, settings: Settings, rig: Rig, claim: jobs.Claim) -> None:
+    if jobs.finish_with_copy(store, claim):
+        _log.info("job.copied")
+        return
+    watch = _Heartbeat(store, settings, claim)
     with store.reading() as session:
         hand_in = intake.load_hand_in(session, claim.job_id)
-    watch = _Heartbeat(store, settings, claim)
     graded = grade(hand_in.submission, hand_in.assignment, observe=watch, rig=rig)
-    graded_at = datetime.now(UTC)
+    graded_at = watch.now()
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
         faults = broken.recording.faults
         raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
     prepared = grades.prepare(graded)
     # The work is done: a database that is away for a moment must not lose it.
-    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at), settings.lease_seconds)
+    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, watch.trials_at), settings.lease_seconds)
+    _log.info("job.graded", verdict=graded.verdict.value, seconds=round(watch.seconds, 3))
 
 
 class _Heartbeat:
@@ -103,9 +107,21 @@ class _Heartbeat:
         self._claim = claim
         self._begun = time.monotonic()
         self._kept = self._begun
+        self.trials_at: datetime | None = None  # when the last trial had been run
+
+    @property
+    def seconds(self) -> float:
+        """Since the claim."""
+        return time.monotonic() - self._begun
+
+    def now(self) -> datetime:
+        """By the database's clock: this machine's own may be wrong."""
+        return self._claim.at + timedelta(seconds=self.seconds)
 
     def __call__(self, progress: Progress, /) -> None:
         moment = time.monotonic()
+        if progress.trials_done >= progress.trials and self.trials_at is None:
+            self.trials_at = self.now()
         if moment - self._begun > self._settings.job_seconds:
             raise HostError(f"grading took longer than {self._settings.job_seconds:.0f} s")
         if moment - self._kept < min(self._settings.lease_seconds / 3, _PROGRESS_SECONDS):

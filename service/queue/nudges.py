@@ -5,6 +5,7 @@ Nothing here fails when the broker does: the sweeper nudges again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -13,7 +14,7 @@ from celery import Celery
 from kombu.exceptions import OperationalError as BrokerError
 from redis.exceptions import RedisError
 
-from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS
+from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.jobs import Retry
@@ -55,14 +56,21 @@ class Nudger:
         if waiting:
             self.plot(self._lacking(PLOTS, waiting))
 
+    def waiting(self) -> int:
+        """How many nudges lie in the broker; 0 when it is away."""
+        return sum(self._depths(QUEUES) or ())
+
     def _lacking(self, queue: str, due: int) -> int:
+        depths = self._depths([queue])
+        return 0 if depths is None else max(0, due - depths[0])
+
+    def _depths(self, queues: Sequence[str]) -> list[int] | None:
         try:
             with self.app.connection_for_write() as connection, connection.channel() as channel:
-                depth: int = cast(Any, channel).queue_declare(queue=queue).message_count
+                return [cast(Any, channel).queue_declare(queue=queue).message_count for queue in queues]
         except _AWAY as error:
             _log.warning("broker.unreachable", error=str(error))
-            return 0
-        return max(0, due - depth)
+            return None
 
     def _publish(self, task: str, queue: str, count: int) -> bool:
         if count <= 0:

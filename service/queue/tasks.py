@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import structlog
-from celery import Task, shared_task, signals
+from celery import Task, current_app, shared_task, signals
 
+from responders.sandbox.manager import FULL, NONE
 from service.grading.rig import Rig
-from service.queue.celery_app import GRADE_TASK, PLOT_TASK
+from service.queue.canaries import Watch
+from service.queue.celery_app import GRADE_TASK, NO_WALLS, PLOT_TASK
 from service.queue.grading_job import Outcome, grade_next, plot_next
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
@@ -38,8 +40,10 @@ class PoolChild:
     settings: Settings
     store: Store
     rig: Rig
+    watch: Watch
 
     def close(self) -> None:
+        self.watch.end()
         self.rig.close()
         self.store.close()
 
@@ -60,7 +64,10 @@ class _Children:
     @cached_property
     def child(self) -> PoolChild:
         settings = load_settings()
-        return PoolChild(settings, open_store(settings), Rig())
+        store, rig = open_store(settings), Rig(NONE if current_app.conf.get(NO_WALLS) else FULL)
+        watch = Watch(store, rig, worker_name(), settings.canary_seconds)
+        watch.keep_looking()
+        return PoolChild(settings, store, rig, watch)
 
     def drop(self) -> None:
         """Close what there is; the next task makes it afresh."""
@@ -76,7 +83,8 @@ _children = _Children()
 def grade_nudge(task: WarmTask) -> None:
     """Grade the job whose turn it is, then ask for its plots."""
     child = task.child
-    outcome = grade_next(child.store, child.settings, child.rig, worker_name())
+    with child.watch.busy():
+        outcome = grade_next(child.store, child.settings, child.rig, worker_name())
     if outcome is Outcome.GRADED:
         Nudger(task.app, child.store, child.settings).plot()
     elif outcome is Outcome.HOST_FAULT:
@@ -105,6 +113,7 @@ def _begin(**_: object) -> None:
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
         _children.child.rig.check_walls()
+        _children.child.watch.look()
     except Exception:
         _log.exception("pool_child.cold")
 

