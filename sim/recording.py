@@ -159,7 +159,10 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one."""
+    """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one.
+
+    In a notebook the line is that of a cell, both counted from 1.
+    """
 
     t: float
     verdict: Verdict
@@ -167,6 +170,13 @@ class Fault:
     message: str
     line: int | None = None
     hint: str = ""
+    cell: int | None = None
+
+    @property
+    def place(self) -> str:
+        """``line 3`` or ``cell 7, line 3``; empty where neither is known."""
+        cell = [f"cell {self.cell}"] if self.cell is not None else []
+        return ", ".join(cell + ([f"line {self.line}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +200,8 @@ class Recording:
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    patches: bool = True  # whether the floor showed its grey label patches
+    sheet: int = 0  # the seed of the digits on it, for a digit sheet
     robot: str = "Default_Robot"
     pen: tuple[tuple[int, bool], ...] = ()  # (tick, down) whenever the pen changes
     responder_output: str = ""

@@ -52,6 +52,7 @@ class Robot:
         return math.hypot(max(self.front, -self.back), self.half_width)
 
 
+WIDE_EYES = "Default_Robot_Wide_Eyes"
 _DEFAULT = Robot()
 _SMALL = Robot(
     name="Small_Robot",
@@ -69,6 +70,8 @@ _SMALL = Robot(
 ROBOTS: Mapping[str, Robot] = MappingProxyType(
     {
         "Default_Robot": _DEFAULT,
+        # What choosing the background Radial_grey makes of the default robot; no flag of the course's asks for it.
+        WIDE_EYES: replace(_DEFAULT, name=WIDE_EYES, left_light=LightSensor(-60, 30), right_light=LightSensor(60, 30)),
         "Small_Robot": _SMALL,
         "Small_Robot_Wide_Eyes": replace(
             _SMALL,
@@ -92,3 +95,8 @@ def robot(name: str) -> Robot:
         return ROBOTS[name]
     except KeyError:
         raise UsageError(f"there is no robot called {name!r}; expected one of {', '.join(ROBOTS)}") from None
+
+
+def usual_robot(background: str) -> str:
+    """The name of the robot that stands on a background unless another is asked for (robolab section 1.1)."""
+    return WIDE_EYES if background == "Radial_grey" else "Default_Robot"

@@ -6,14 +6,16 @@ Plain data. Reading one from its folder, with every mistake named by file and li
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Literal
 
 from sim.chance import Stream
 from sim.recording import Pose
 from submissions.criteria import Criterion
+from submissions.sweep import NO_SWEEP, Coordinates, Sweep
 
 Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
@@ -27,6 +29,9 @@ class WorldSpec:
     labels: bool = True
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
     robot: str = "Default_Robot"
+    solid: bool = False  # walls and obstacles stop the robot
+    drive: Literal["course", "wheels"] = "course"  # who moves it: the course's equations, or rigid-body wheels
+    sheet: int | None = 0  # the seed of the digits on a digit sheet; None: each trial's own seed
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,7 @@ class Parts:
 
     program: str = "student"
     responder: str = "student"
+    cell: str = "last"  # of a notebook: which robot program is marked; ``last``, ``tag:NAME`` or a number from 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,18 +56,37 @@ class ChannelSpec:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Poses x noise levels x seeds; ``choose = "random"`` draws one pose a trial, by the trial's seed."""
+    """Poses x swept levels x noise levels x seeds.
+
+    ``choose = "random"`` draws one pose a trial, by the trial's seed; ``"shuffled"`` takes each once, in an order
+    that the seed of the scenario decides. ``start_jitter`` moves every start by up to so many mm in x and y and
+    degrees, drawn by the trial's seed.
+    """
 
     id: str
     poses: tuple[Pose, ...]
     title: str = ""
-    choose: Literal["each", "random"] = "each"
+    choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = 1
     seconds: float = 60.0
     light_noise: tuple[float, ...] = (0.0,)
     motor_noise: tuple[float, ...] = (0.0,)
     channel: ChannelSpec = ChannelSpec()
     visibility: Visibility = "visible"
+    start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sweep: Sweep = NO_SWEEP
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """The hand-in trains a model: on the pictures of ``scenarios``, to name those of all others.
+
+    ``function`` is the student's ``train(images, labels)``; ``image`` says what of a picture it is given.
+    """
+
+    scenarios: tuple[str, ...]
+    function: str = "train"
+    image: Literal["focus", "whole"] = "focus"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +102,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run that an assignment asks for."""
+    """One run that an assignment asks for. ``pose`` is where the robot starts, offset and jitter included."""
 
     scenario: Scenario
     index: int  # counts within the scenario
@@ -85,6 +110,9 @@ class Trial:
     light_noise: float
     motor_noise: float
     seed: int
+    place: int  # which of the scenario's poses it starts from
+    channel: ChannelSpec
+    sweep: Coordinates = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +131,7 @@ class Assignment:
     given: Mapping[str, bytes] = field(default_factory=dict)  # files copied into the responder's folder
     given_parts: Mapping[str, str] = field(default_factory=dict)  # name -> source of a given program or responder
     version: str = ""  # SHA-256 of the assignment's folder
+    training: Training | None = None
     secret: str = ""  # keeps the seeds of hidden scenarios from being guessed
 
     @property
@@ -112,20 +141,57 @@ class Assignment:
     def trials(self) -> Iterator[Trial]:
         """Every trial, in an order that never changes."""
         for scenario in self.scenarios:
-            index = 0
-            poses = scenario.poses if scenario.choose == "each" else (None,)
-            for fixed in poses:
-                for light_noise in scenario.light_noise:
-                    for motor_noise in scenario.motor_noise:
-                        for _ in range(scenario.trials):
-                            seed = self.seed(scenario, index)
-                            draw = Stream(seed, "start pose").integer(0) % len(scenario.poses)
-                            pose = fixed or scenario.poses[draw]
-                            yield Trial(scenario, index, pose, light_noise, motor_noise, seed)
-                            index += 1
+            levels = list(
+                itertools.product(
+                    self._places(scenario), scenario.sweep.coordinates(), scenario.light_noise, scenario.motor_noise
+                )
+            )
+            repeated = (level for level in levels for _ in range(scenario.trials))
+            for index, (fixed, sweep, light_noise, motor_noise) in enumerate(repeated):
+                seed = self.seed(scenario, index)
+                place = Stream(seed, "start pose").integer(0) % len(scenario.poses) if fixed is None else fixed
+                varied = dict(sweep)
+                yield Trial(
+                    scenario,
+                    index,
+                    _start(scenario, place, varied, seed),
+                    varied.get("light_noise", light_noise),
+                    varied.get("motor_noise", motor_noise),
+                    seed,
+                    place,
+                    replace(
+                        scenario.channel,
+                        loss=varied.get("loss", scenario.channel.loss),
+                        delay=varied.get("delay", scenario.channel.delay),
+                    ),
+                    sweep,
+                )
+
+    def _places(self, scenario: Scenario) -> Sequence[int | None]:
+        """Numbers of the poses, in the order in which they are run; None where the trial draws one itself."""
+        places = range(len(scenario.poses))
+        match scenario.choose:
+            case "random":
+                return (None,)
+            case "shuffled":
+                chance = Stream(self.seed(scenario, 0), "order of poses")
+                return sorted(places, key=chance.integer)
+            case "each":
+                return places
 
     def seed(self, scenario: Scenario, index: int) -> int:
         """63 bits, the same for every student."""
         secret = "" if scenario.visibility == "visible" else self.secret
         text = f"{self.id}\n{scenario.id}\n{index}\n{secret}"
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 1
+
+
+def _start(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
+    """The pose of that number, moved by the swept offsets and by the jitter of the trial."""
+    pose = scenario.poses[place]
+    offsets = [varied.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
+    if any(scenario.start_jitter):
+        chance = Stream(seed, "start jitter")
+        for axis, most in enumerate(scenario.start_jitter):
+            offsets[axis] += chance.between(-most, most, 0, axis)
+    return Pose(pose.x + offsets[0], pose.y + offsets[1], pose.heading + offsets[2])

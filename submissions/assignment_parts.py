@@ -19,26 +19,31 @@ from pydantic import BaseModel
 from sim.backgrounds import HEIGHT, WIDTH, Floor, floor, floor_from_picture, names
 from sim.errors import UsageError
 from sim.recording import Pose
+from sim.robot import usual_robot
 from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, WorldSpec
 from submissions.assignment_tables import (
     HeadTable,
     LimitsTable,
     PartsTable,
     ScenarioTable,
+    TrainingTable,
     WorldTable,
     did_you_mean,
     listed,
     read_table,
 )
-from submissions.criteria import SCHEMAS, Classification, Criterion, Messages, Replies
+from submissions.code_parts import check_code, check_ranks, check_sources, runs_no_robot
+from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies
 from submissions.problems import Problems
+from submissions.recognition_parts import check_recognition, checked_training, completed
 from submissions.source_text import decode_source
+from submissions.sweep import Sweep
 from submissions.toml_lines import Path as Place
 
 T = TypeVar("T", bound=BaseModel)
 
 _HEAD = tuple(HeadTable.model_fields)
-_TABLES = ("world", "parts", "limits", "scenario", "criterion")
+_TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
 _PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 _LISTS_OF_TEXTS = {"equals", "starts_with", "contains", "in_order", "to", "to_starts_with", "scenarios", "truth"}
@@ -57,10 +62,17 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     parts = _table(PartsTable, document.get("parts", {}), ("parts",), problems)
     limits = _table(LimitsTable, document.get("limits", {}), ("limits",), problems)
     world, ground = _world(world_table, files, problems) if world_table else (None, None)
-    scenarios = _scenarios(document, ground, problems)
+    robotless = runs_no_robot(document)
+    scenarios = [] if robotless else _scenarios(document, ground, problems)
     aliases = head.aliases if head else {}
-    criteria = _criteria(document, scenarios, ground, parts, aliases, problems)
-    given_parts = _given_parts(parts, files, problems) if parts else {}
+    criteria = _criteria(document, scenarios, ground, parts, aliases, files, problems)
+    training = None
+    if "training" in document:
+        training_table = _table(TrainingTable, document["training"], ("training",), problems)
+        training = checked_training(training_table, scenarios, ground, problems) if training_table else None
+    check_ranks(criteria, problems)
+    given_parts = check_sources(criteria, files, problems)
+    given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
@@ -68,7 +80,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         id=head.id,
         title=head.title,
         world=world,
-        parts=Parts(parts.program, parts.responder),
+        parts=Parts(parts.program, parts.responder, str(parts.cell)),
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),
@@ -77,6 +89,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         given=MappingProxyType(given),
         given_parts=MappingProxyType(given_parts),
         version=_version(files, given),
+        training=training,
     )
     if sum(1 for _ in assignment.trials()) > _MAX_TRIALS:
         problems.add(("scenario",), f"the scenarios ask for too many trials, expected at most {_MAX_TRIALS} in all")
@@ -107,7 +120,7 @@ def _world(table: WorldTable, files: Files, problems: Problems) -> tuple[WorldSp
     picture = None
     try:
         if name in names():
-            ground = floor(name)
+            ground = floor(name, labels=table.labels)
         elif name.lower().endswith(_PICTURE_SUFFIXES):
             if name not in files:
                 problems.add(("world", "background"), f'background is "{name}", expected a picture beside this file')
@@ -131,7 +144,25 @@ def _world(table: WorldTable, files: Files, problems: Problems) -> tuple[WorldSp
                 ("world", "obstacles", number),
                 f"obstacles[{number}] is not on the floor, expected [x, y, width, height] within {WIDTH} x {HEIGHT} mm",
             )
-    return WorldSpec(name, picture, table.labels, obstacles, table.robot), ground
+    robot = table.robot if "robot" in table.model_fields_set else usual_robot(name)
+    world = WorldSpec(
+        name,
+        picture,
+        labels=table.labels,
+        obstacles=obstacles,
+        robot=robot,
+        solid=table.solid,
+        drive=table.drive,
+        sheet=_sheet(table),
+    )
+    return world, ground
+
+
+def _sheet(table: WorldTable) -> int | None:
+    """The seed of the digit sheet; None when each trial has one of its own."""
+    if table.sheet == "per-seed":
+        return None
+    return table.sheet if isinstance(table.sheet, int) else 0
 
 
 def _scenarios(document: Mapping[str, object], ground: Floor | None, problems: Problems) -> Sequence[Scenario | None]:
@@ -167,6 +198,8 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         motor_noise=table.motor_noise,
         channel=ChannelSpec(**table.channel.model_dump()),
         visibility=table.visibility,
+        start_jitter=table.start_jitter,
+        sweep=Sweep(**table.sweep.model_dump()),
     )
 
 
@@ -176,6 +209,7 @@ def _criteria(
     ground: Floor | None,
     parts: PartsTable | None,
     aliases: Mapping[str, tuple[str, ...]],
+    files: Files,
     problems: Problems,
 ) -> tuple[Criterion, ...]:
     criteria: list[Criterion] = []
@@ -201,10 +235,11 @@ def _criteria(
         if criterion is None:
             continue
         named = criterion.model_copy(update={"id": criterion.id or _slug(criterion.title)})
-        if isinstance(named, Classification):
-            named = named.model_copy(update={"aliases": {**aliases, **named.aliases}})
+        if isinstance(named, Recognition):
+            named = completed(named, aliases, files, place, problems)
         _no_double({"id": named.id}, seen, place, "criterion", problems)
         _check_criterion(cast(Criterion, named), scenarios, ground, parts, place, problems)
+        check_code(cast(Criterion, named), parts, runs_no_robot(document), files, place, problems)
         criteria.append(cast(Criterion, named))
     return tuple(criteria)
 
@@ -217,33 +252,17 @@ def _check_criterion(
     place: Place,
     problems: Problems,
 ) -> None:
-    """What a criterion asks must be there: a responder, labels on the floor, a truth for every pose."""
-    needs_responder = isinstance(criterion, Classification | Replies) or (
+    """What a criterion asks must be there: a responder, and what recognition needs."""
+    needs_responder = isinstance(criterion, Recognition | Replies) or (
         isinstance(criterion, Messages) and (criterion.json_queue or criterion.queue_grows)
     )
     if needs_responder and parts is not None and parts.responder == "none":
         problems.add((*place, "check"), 'check needs a responder, but parts has responder = "none", expected one')
-    if not isinstance(criterion, Classification):
-        return
-    if criterion.truth == "label":
-        if ground is not None and not ground.labels:
-            problems.add(
-                (*place, "truth"),
-                f'truth is "label", but {ground.name} has no labels, expected a list with one label for each pose',
-            )
-        return
-    for scenario in scenarios:
-        if scenario is None or (criterion.scenarios and scenario.id not in criterion.scenarios):
-            continue
-        if len(criterion.truth) != len(scenario.poses):
-            problems.add(
-                (*place, "truth"),
-                f"truth has {len(criterion.truth)} labels for the {len(scenario.poses)} poses of scenario "
-                f'"{scenario.id}", expected one label for each pose',
-            )
+    if isinstance(criterion, Recognition):
+        check_recognition(criterion, scenarios, ground, place, problems)
 
 
-def _given_parts(parts: PartsTable, files: Files, problems: Problems) -> dict[str, str]:
+def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
     sources = {}
     for part in ("program", "responder"):
         name = getattr(parts, part)
@@ -259,7 +278,7 @@ def _given_parts(parts: PartsTable, files: Files, problems: Problems) -> dict[st
             sources[name] = decode_source(files[name], name).text
         except UsageError as error:
             problems.add(("parts", part), str(error).rstrip("."))
-    if parts.program == "none":
+    if parts.program == "none" and not robotless:
         problems.add(
             ("parts", "program"), 'program is "none", expected "student" or a .py file: a trial runs a program'
         )

@@ -9,16 +9,18 @@ import difflib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import ErrorDetails
 
 from sim.backgrounds import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
+from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
 Rectangle = tuple[float, float, float, float]
+Levels = Annotated[tuple[float, ...], Field(max_length=100)]
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 
 
@@ -45,6 +47,16 @@ class WorldTable(Table):
     labels: bool = True
     obstacles: tuple[Rectangle, ...] = ()
     robot: str = "Default_Robot"
+    solid: bool = False
+    drive: Literal["course", "wheels"] = "course"
+    sheet: int | str = 0
+
+    @field_validator("sheet", mode="before")
+    @classmethod
+    def _which_sheet(cls, value: object) -> object:
+        if value in ("fixed", "per-seed") or (type(value) is int and 0 <= value < 1 << 63):
+            return value
+        raise ValueError('is no digit sheet, expected "fixed", "per-seed" or a whole number from 0')
 
     @field_validator("obstacles", mode="before")
     @classmethod
@@ -67,6 +79,17 @@ class WorldTable(Table):
 class PartsTable(Table):
     program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
+    cell: str | int = "last"
+
+    @field_validator("cell", mode="before")
+    @classmethod
+    def _which_cell(cls, value: object) -> object:
+        tagged = isinstance(value, str) and value.startswith("tag:") and value.removeprefix("tag:").strip()
+        if value == "last" or tagged or (type(value) is int and 1 <= value <= 1000):
+            return value
+        raise ValueError(
+            'is no cell of a notebook, expected "last", "tag:NAME" or the number of a robot program, from 1'
+        )
 
 
 class ChannelTable(Table):
@@ -77,22 +100,49 @@ class ChannelTable(Table):
     reordering: float = Field(default=0.0, ge=0, le=1)
 
 
+class SweepTable(Table):
+    """One list of levels for each condition that is varied."""
+
+    offset_x: Levels = ()
+    offset_y: Levels = ()
+    heading: Levels = ()
+    light_noise: Levels = ()
+    motor_noise: Levels = ()
+    loss: Levels = ()
+    delay: Levels = ()
+
+    @field_validator("*")
+    @classmethod
+    def _within(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        about = CONDITIONS[str(info.field_name)]
+        if len(set(value)) < len(value):
+            raise ValueError("has a level twice, expected each once")
+        return tuple(sorted(_in_range(value, about.most, about.least)))
+
+
 class ScenarioTable(Table):
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[tuple[float, float, float], ...] = Field(default=(), min_length=1)
-    choose: Literal["each", "random"] = "each"
+    choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
     light_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
     motor_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
     channel: ChannelTable = ChannelTable()
+    start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
     @field_validator("light_noise", "motor_noise", mode="before")
     @classmethod
     def _one_or_many(cls, value: object) -> object:
         return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else _as_tuples(value)
+
+    @field_validator("start_jitter")
+    @classmethod
+    def _jitter_range(cls, value: tuple[float, float, float]) -> tuple[float, ...]:
+        return _in_range(value, 100)
 
     @field_validator("light_noise")
     @classmethod
@@ -103,6 +153,12 @@ class ScenarioTable(Table):
     @classmethod
     def _motor_range(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         return _in_range(value, 500)
+
+
+class TrainingTable(Table):
+    scenarios: tuple[str, ...] = Field(min_length=1)
+    function: str = Field(default="train", pattern=r"^[A-Za-z_]\w*$", max_length=80)
+    image: Literal["focus", "whole"] = "focus"
 
 
 class LimitsTable(Table):
@@ -157,10 +213,10 @@ def _as_tuples(value: object) -> object:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _in_range(values: tuple[float, ...], most: float) -> tuple[float, ...]:
+def _in_range(values: tuple[float, ...], most: float, least: float = 0) -> tuple[float, ...]:
     for value in values:
-        if not 0 <= value <= most:
-            raise ValueError(f"has {value:g} in it, expected numbers from 0 to {most:g}")
+        if not least <= value <= most:
+            raise ValueError(f"has {value:g} in it, expected numbers from {least:g} to {most:g}")
     return values
 
 
@@ -189,6 +245,10 @@ _TYPES: Mapping[str, str] = {
     "string_too_short": "a text that is not empty",
     "string_pattern_mismatch": "small letters, digits, - and _, beginning with a letter or digit",
 }
+
+
+_RANGES = ("forward", "sideways", "distance", "turn", "turn_size", "seconds", "left_wheel", "right_wheel", "times",
+           "gyro", "sizes")  # fmt: skip
 
 
 def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
@@ -229,12 +289,20 @@ def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
 
 
 def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
-    if path[:-1] == ("channel",):
-        schema = ChannelTable
+    for part in path[:-1]:
+        if isinstance(part, str) and part in schema.model_fields:
+            schema = _table_in(schema.model_fields[part].annotation) or schema
     known = [field.alias or name for name, field in schema.model_fields.items()]
     name = str(path[-1])
     hint = did_you_mean(name, known)
     return f'"{name[:60]}" is not a key of this table, expected {listed(known)}{hint}'
+
+
+def _table_in(annotation: object) -> type[BaseModel] | None:
+    """The schema of the tables that a key takes, alone or in a list."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
 
 
 def _called(path: tuple[str | int, ...]) -> str:
@@ -247,7 +315,12 @@ def _called(path: tuple[str | int, ...]) -> str:
 
 def _shape(path: tuple[str | int, ...]) -> str:
     shapes = {"poses": "[x, y, heading]", "obstacles": "[x, y, width, height]", "zone": "[left, bottom, right, top]"}
-    shape = shapes.get(str(path[0]))
+    shapes |= {"start_jitter": "[mm in x, mm in y, degrees]", "places": "[x, y, label]", "steps": "[accuracy, marks]"}
+    shapes |= {"rectangle": "[left, bottom, right, top]", "circle": "[x, y, radius]", "polygon": "[x, y]"}
+    shapes |= {"bar": "[x1, y1, x2, y2, radius]", "points": "[x, y]", "start_line": "[x1, y1, x2, y2]"}
+    shapes |= {"ellipse": "[x, y, horizontal radius, vertical radius]", "arc": "[from, to]"}
+    shapes |= dict.fromkeys(_RANGES, "[least, most]")
+    shape = shapes.get(next(part for part in reversed(path) if isinstance(part, str)))
     return f", expected {shape}" if shape else ", expected another number of them"
 
 

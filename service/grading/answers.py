@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 from bisect import bisect_left
+from collections.abc import Sequence
 from typing import Any
 
 from responders.messages import JSON, parsed_answer
 from service.grading.outcome import fault_words
-from sim.recording import Message, Recording
+from sim.recording import Fault, Message, Recording
 
 
 class Nothing:
@@ -84,18 +85,28 @@ class Answers:
     def __init__(self, recording: Recording) -> None:
         self._messages = recording.messages
         self._first: dict[int, Message] = {}
+        self._all: dict[int, list[Message]] = {}
         for message in recording.messages:
-            if message.sender == "responder" and message.note != "duplicated" and message.reply_to is not None:
-                self._first.setdefault(message.reply_to, message)
+            if message.sender == "responder" and message.reply_to is not None:
+                self._all.setdefault(message.reply_to, []).append(message)
+                if message.note != "duplicated":
+                    self._first.setdefault(message.reply_to, message)
         self._faults = sorted((fault for fault in recording.faults if fault.who == "responder"), key=lambda f: f.t)
 
     def to(self, index: int) -> Message | None:
         """The first answer to the message at ``index``, arrived or not; copies that the channel made do not count."""
         return self._first.get(index)
 
+    def all_to(self, index: int) -> Sequence[Message]:
+        """Every answer to the message at ``index``, copies and lost ones too, in the order in which they were given."""
+        return self._all.get(index, ())
+
+    def fault_after(self, index: int) -> Fault | None:
+        """The first fault of the responder's from the moment on at which the message at ``index`` was sent."""
+        place = bisect_left(self._faults, self._messages[index].t - 1e-9, key=lambda fault: fault.t)
+        return self._faults[place] if place < len(self._faults) else None
+
     def silence(self, index: int) -> str:
         """That the message at ``index`` had no answer, and why, where the recording tells."""
-        asked = self._messages[index].t
-        place = bisect_left(self._faults, asked - 1e-9, key=lambda fault: fault.t)
-        fault = self._faults[min(place, len(self._faults) - 1)] if self._faults else None
+        fault = self.fault_after(index) or (self._faults[-1] if self._faults else None)
         return "there was no answer" + (f": {fault_words(fault)}" if fault else "")

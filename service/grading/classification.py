@@ -1,29 +1,30 @@
 """Judging how often the pictures that the robot sent were named rightly: accuracy, confusion, and every picture.
 
-It compares words only; what a picture shows was recorded when it was taken, or is told by the assignment.
+It compares words only; what a picture shows is found in ``truths.py``, what became of it in ``tally.py``.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import fmean
 
+from models.intervals import wilson
 from service.grading.answers import NOTHING, Answers, as_text, at_path, parsed
-from service.grading.grade import Accuracy, Evidence, Sight, TrialResult
+from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Sight, TrialResult
+from service.grading.labels import LabelFinder
 from service.grading.outcome import quoted
-from sim.backgrounds import floor, names
+from service.grading.patterns import by_pattern
+from service.grading.tally import Fate, Reply, reply_to
+from service.grading.truths import NO_PICTURE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
-from submissions.criteria import Classification
+from submissions.criteria.classification import Recognition
 
-#: Stands for the truth of a picture that was never sent, where the assignment does not tell it.
-NO_PICTURE = "(no picture)"
-_Z95 = 1.959963984540054
-_LONGEST_ANSWER = 10_000
+__all__ = ["NO_PICTURE", "Classified", "Naming", "classify", "told", "wilson"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,7 @@ class Naming:
     truth: str
     answer: str | None
     words: str  # what happened, for a sentence
+    confidence: float | None = None
 
     @property
     def right(self) -> bool:
@@ -43,7 +45,7 @@ class Naming:
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """What a classification criterion found in its trials."""
+    """What a recognition criterion found in its trials: each picture or, where it says so, each pattern."""
 
     namings: tuple[Naming, ...]
     accuracy: Accuracy
@@ -51,59 +53,108 @@ class Classified:
     evidence: tuple[Evidence, ...]
 
 
-def classify(
-    criterion: Classification, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
-) -> Classified:
+def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
     """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
-    truths = {index: _truths(criterion, assignment, trial) for index, trial in trials}
-    spoken = [truth for told in truths.values() for _, truth in told]
-    labels = _labels(criterion, assignment, spoken)
-    finder = _Finder(labels, criterion.aliases)
+    shown = shown_in(criterion, assignment, trials)
+    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
+    labels = nameable(criterion, assignment, truths)
+    finder = LabelFinder(labels, criterion.aliases)
+    pictures: list[Naming] = []
     namings: list[Naming] = []
+    fates: Counter[Fate] = Counter()
+    duplicates = 0
     for index, trial in trials:
-        if not truths[index]:
-            truth = _missing_truth(criterion, assignment, trial)
-            namings.append(Naming(index, None, finder.canonical(truth), None, "the robot sent no picture"))
-        answers = Answers(trial.recording)
-        for image, truth in truths[index]:
-            answer, words = _answer(criterion, trial.recording, answers, image, finder)
-            namings.append(Naming(index, image, finder.canonical(truth), answer, words))
+        recording = trial.recording
+        replies = _replies(criterion, recording)
+        fates.update(reply.fate for reply in replies)
+        duplicates += sum(reply.duplicates for reply in replies)
+        own = []
+        for number, truth in shown[index]:
+            answer, words, confidence = _answer(criterion, replies[number], finder)
+            image = recording.images[number]
+            own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
+        pictures += own
+        namings += _that_count(criterion, assignment, index, trial, own, finder)
     by_index = dict(trials)
     sights = tuple(
         Sight(naming.image, naming.truth, naming.answer, by_index[naming.trial].scenario, naming.trial)
-        for naming in namings
+        for naming in pictures
         if naming.image is not None
     )
+    missing = sum(naming.image is None for naming in namings)
+    counts = Counts(
+        sum(fates.values()),
+        fates["answered"],
+        fates["late"],
+        fates["malformed"],
+        fates["unanswered"],
+        duplicates,
+        len(namings) - missing,
+        missing,
+        "pictures" if criterion.each_pattern is None else "patterns",
+    )
     return Classified(
-        tuple(namings), _accuracy(namings, labels), sights, tuple(_evidence(namings, index) for index, _ in trials)
+        tuple(namings),
+        _accuracy(namings, labels, counts),
+        sights,
+        tuple(_evidence(namings, index) for index, _ in trials),
     )
 
 
-def wilson(right: int, count: int) -> tuple[float, float]:
-    """The 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22 (1927) 209); 0 to 1 for no trials at all."""
-    if count == 0:
-        return 0.0, 1.0
-    share = right / count
-    square = _Z95 * _Z95
-    middle = (share + square / (2 * count)) / (1 + square / count)
-    half = _Z95 * math.sqrt(share * (1 - share) / count + square / (4 * count * count)) / (1 + square / count)
-    # At the ends the interval touches them exactly; rounding must not push it past.
-    low = 0.0 if right == 0 else max(middle - half, 0.0)
-    high = 1.0 if right == count else min(middle + half, 1.0)
-    return low, high
+def told(naming: Naming) -> str:
+    """A sentence on one picture."""
+    if naming.image is None:
+        if naming.truth == NO_PICTURE:
+            return f"Expected a picture (IMG_DATA), but {naming.words}."
+        return f"Expected {quoted(naming.truth)}, but {naming.words}."
+    if naming.right:
+        return f"The picture showed {quoted(naming.truth)} and was named so."
+    return f"The picture showed {quoted(naming.truth)}, but {naming.words}."
 
 
-def _accuracy(namings: Sequence[Naming], labels: tuple[str, ...]) -> Accuracy:
+def _that_count(
+    criterion: Recognition,
+    assignment: Assignment,
+    index: int,
+    trial: TrialResult,
+    own: list[Naming],
+    finder: LabelFinder,
+) -> Sequence[Naming]:
+    """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
+    counted: list[Naming] = own
+    if criterion.each_pattern is not None:
+        counted = by_pattern(own, criterion.each_pattern, max(30.0, 2 * criterion.within))
+    if counted and len(counted) >= criterion.patterns:
+        return counted
+    if not counted and criterion.patterns <= 1:
+        truth = missing_truth(criterion, assignment, trial)
+        sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
+        return [Naming(index, None, finder.canonical(truth), None, sent)]
+    words = f"the robot sent pictures of {len(counted)} patterns, and {criterion.patterns} were expected"
+    lacking = Naming(index, None, NO_PICTURE, None, words)
+    return [*counted, *[lacking] * (criterion.patterns - len(counted))]
+
+
+def _accuracy(namings: Sequence[Naming], labels: tuple[str, ...], counts: Counts) -> Accuracy:
     right = sum(naming.right for naming in namings)
     count = len(namings)
     low, high = wilson(right, count)
-    counts = Counter((naming.truth, naming.answer) for naming in namings)
+    cells = Counter((naming.truth, naming.answer) for naming in namings)
     confusion = tuple(
         (truth, answer, number)
-        for (truth, answer), number in sorted(counts.items(), key=lambda item: (item[0][0], item[0][1] or ""))
+        for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
     )
     known = tuple(dict.fromkeys([*labels, *(naming.truth for naming in namings)]))
-    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion)
+    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(namings))
+
+
+def _confidence(namings: Sequence[Naming]) -> Confidence | None:
+    """How sure the answers were that were right, and those that were wrong; None if no answer said."""
+    right = [naming.confidence for naming in namings if naming.right and naming.confidence is not None]
+    wrong = [naming.confidence for naming in namings if not naming.right and naming.confidence is not None]
+    if not right and not wrong:
+        return None
+    return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
 
 
 def _evidence(namings: Sequence[Naming], index: int) -> Evidence:
@@ -120,86 +171,48 @@ def _evidence(namings: Sequence[Naming], index: int) -> Evidence:
     )
 
 
-def told(naming: Naming) -> str:
-    """A sentence on one picture."""
-    if naming.image is None:
-        return (
-            f"Expected {quoted(naming.truth)}, but {naming.words}."
-            if naming.truth != NO_PICTURE
-            else ("Expected a picture (IMG_DATA), but the robot sent none.")
-        )
-    if naming.right:
-        return f"The picture showed {quoted(naming.truth)} and was named so."
-    return f"The picture showed {quoted(naming.truth)}, but {naming.words}."
-
-
-def _truths(criterion: Classification, assignment: Assignment, trial: TrialResult) -> list[tuple[Image, str]]:
-    """The pictures of a trial that count, with what they show; those of unlabelled floor show nothing to name."""
-    images = trial.recording.images
-    if criterion.truth == "label":
-        known = [(image, image.truth) for image in images if image.truth is not None]
-    else:
-        truth = _told_truth(criterion.truth, assignment, trial)
-        known = [(image, truth) for image in images]
-    match criterion.pictures:
-        case "first":
-            return known[:1]
-        case "last":
-            return known[-1:]
-        case "all":
-            return known
-
-
-def _told_truth(truths: tuple[str, ...], assignment: Assignment, trial: TrialResult) -> str:
-    """The label for the pose that the trial started from."""
-    planned = next(
-        planned
-        for planned in assignment.trials()
-        if planned.scenario.id == trial.scenario and planned.index == trial.index
-    )
-    return truths[planned.scenario.poses.index(planned.pose)]
-
-
-def _missing_truth(criterion: Classification, assignment: Assignment, trial: TrialResult) -> str:
-    if criterion.truth == "label":
-        return NO_PICTURE
-    return _told_truth(criterion.truth, assignment, trial)
-
-
-def _labels(criterion: Classification, assignment: Assignment, truths: Iterable[str]) -> tuple[str, ...]:
-    """All that can be named: as the criterion lists it, else what the floor, the aliases and the truths have."""
-    if criterion.labels:
-        return criterion.labels
-    background = assignment.world.background
-    on_floor = [label.label for label in floor(background).labels] if background in names() else []
-    listed = criterion.truth if criterion.truth != "label" else ()
-    return tuple(dict.fromkeys([*on_floor, *listed, *truths, *criterion.aliases]))
-
-
-def _answer(
-    criterion: Classification, recording: Recording, answers: Answers, image: Image, finder: _Finder
-) -> tuple[str | None, str]:
-    """The label that the answer to a picture names, None if it names none or two; and what happened, in words."""
+def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
+    """What came back to every picture of the recording, whether it counts or not."""
     if criterion.answer_from == "reply":
-        reply = answers.to(image.message)
-        if reply is None:
-            return None, answers.silence(image.message)
-        text = reply.text
-        if criterion.answer is not None:
-            value = at_path(parsed(text), criterion.answer)
-            text = text if value is NOTHING else as_text(value)
-    else:
+        answers = Answers(recording)
+        return [reply_to(recording, answers, number) for number in range(len(recording.images))]
+    said = "said" if criterion.answer_from == "speech" else "printed"
+    replies = []
+    for image in recording.images:
         heard = _between(recording, image, criterion.answer_from == "speech")
-        if not heard:
-            said = "said" if criterion.answer_from == "speech" else "printed"
-            return None, f"the robot {said} nothing after it"
         text = " | ".join(line.text for line in heard)
+        silent = Reply("unanswered", None, f"the robot {said} nothing after it")
+        replies.append(Reply("answered", text, "") if heard else silent)
+    return replies
+
+
+def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
+    """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
+    if reply.text is None:
+        return None, reply.words, None
+    if reply.fate == "late" and criterion.late == "wrong":
+        return None, f"the answer came too late: {quoted(reply.text)}", None
+    text, confidence = reply.text, None
+    if criterion.answer_from == "reply":
+        value = parsed(text)
+        if criterion.confidence is not None:
+            confidence = _probability(at_path(value, criterion.confidence))
+        if criterion.answer is not None:
+            picked = at_path(value, criterion.answer)
+            text = text if picked is NOTHING else as_text(picked)
     found = finder.labels_in(text)
     if not found:
-        return None, f"the answer names no label: {quoted(text)}"
+        return None, f"the answer names no label: {quoted(text)}", confidence
     if len(found) > 1:
-        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}"
-    return found[0], f"it was taken for {quoted(found[0])}"
+        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
+    return found[0], f"it was taken for {quoted(found[0])}", confidence
+
+
+def _probability(value: object) -> float | None:
+    """A number from 0 to 1, as JSON has it; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        return None
+    return float(value)
 
 
 def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
@@ -212,34 +225,3 @@ def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]
 
 def _time(line: Line) -> float:
     return line.t
-
-
-class _Finder:
-    """Finds labels and their other names in a text, the longest first, as whole words."""
-
-    def __init__(self, labels: Iterable[str], aliases: Mapping[str, Sequence[str]]) -> None:
-        self._names: dict[str, str] = {}
-        for label in labels:
-            self._names[_words(label)] = label
-        for label, others in aliases.items():
-            for name in (label, *others):
-                self._names.setdefault(_words(name), self.canonical(label))
-        longest_first = sorted((name for name in self._names if name), key=len, reverse=True)
-        alternatives = "|".join(map(re.escape, longest_first))
-        self._pattern = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)") if alternatives else None
-
-    def canonical(self, label: str) -> str:
-        """The label as the criterion spells it."""
-        return self._names.get(_words(label), label)
-
-    def labels_in(self, text: str) -> list[str]:
-        """The different labels that a text names, in the order in which it names them."""
-        if self._pattern is None:
-            return []
-        found = self._pattern.findall(_words(text[:_LONGEST_ANSWER]))
-        return list(dict.fromkeys(self._names[name] for name in found))
-
-
-def _words(text: str) -> str:
-    """Without case, hyphens, underscores and extra spaces."""
-    return " ".join(re.sub(r"[-‐-―_]", " ", text).casefold().split())

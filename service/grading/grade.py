@@ -12,6 +12,35 @@ from sim.recording import Image, Pose, Recording, Verdict
 
 
 @dataclass(frozen=True, slots=True)
+class Counts:
+    """What became of the pictures that were sent: ``sent`` is the sum of the four that follow it.
+
+    ``duplicates`` are answers beyond the one that counts. Accuracy is over ``counted`` pictures (or patterns) and
+    ``missing`` ones, which are wrong.
+    """
+
+    sent: int
+    answered: int
+    late: int
+    malformed: int
+    unanswered: int
+    duplicates: int = 0
+    counted: int = 0
+    missing: int = 0
+    of: str = "pictures"  # what is counted: pictures, or the patterns that several pictures show
+
+
+@dataclass(frozen=True, slots=True)
+class Confidence:
+    """The mean confidence, 0 to 1, of the answers that were right and of those that were wrong, and how many said."""
+
+    right: float | None
+    n_right: int
+    wrong: float | None
+    n_wrong: int
+
+
+@dataclass(frozen=True, slots=True)
 class Accuracy:
     """How often a classifier was right, with the 95 % Wilson interval, and who was taken for whom.
 
@@ -24,6 +53,32 @@ class Accuracy:
     n: int
     labels: tuple[str, ...]
     confusion: tuple[tuple[str, str | None, int], ...]
+    counts: Counts | None = None
+    confidence: Confidence | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """The accuracy at one level of a swept condition, with its 95 % Wilson interval."""
+
+    at: float
+    right: int
+    n: int
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        return self.right / self.n if self.n else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class AccuracyCurve:
+    """The accuracy along one swept condition (a key of ``submissions.sweep.CONDITIONS``), ascending."""
+
+    along: str
+    levels: tuple[Level, ...]
+    asked: float | None = None  # the accuracy that marks are given for, where a criterion says one
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +126,7 @@ class CriterionResult:
     evidence: tuple[Evidence, ...] = ()
     accuracy: Accuracy | None = None
     sights: tuple[Sight, ...] = ()
+    curves: tuple[AccuracyCurve, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +140,7 @@ class TrialResult:
     motor_noise: float
     visibility: str
     recording: Recording
+    sweep: tuple[tuple[str, float], ...] = ()  # the condition that is swept and its level in this trial
 
     @property
     def verdict(self) -> Verdict:

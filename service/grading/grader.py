@@ -5,29 +5,38 @@ A plain function that knows no queue and no database; the command line, the work
 
 from __future__ import annotations
 
+import functools
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
 from responders.sandbox.running_child import ChildLimits
+from service.grading.findings import HandedIn, look_at
 from service.grading.grade import Grade, TrialResult
 from service.grading.judge import judge
+from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
 from service.grading.rig import Rig
+from service.grading.training import with_models_answers
 from service.version import GRADER_VERSION
 from sim.backgrounds import Floor, floor, floor_from_picture
-from sim.errors import UsageError
+from sim.errors import AssignmentError, UsageError
+from sim.motion import Physics
+from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
-from submissions.submission import Source, Submission
+from submissions.marked_cell import marked_site, program_of
+from submissions.plain_cells import python_of
+from submissions.submission import Notebook, Source, Submission
 
 _MEGABYTE = 1 << 20
 _OBSERVE_SECONDS = 1.0
+_IGNORED = "the program's magic line is ignored"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +61,14 @@ def _nobody(progress: Progress) -> None:
 class _Parts:
     """Who plays: the sources to run, and the files in the responder's folder."""
 
-    program: Source
+    program: Source | None  # None where the assignment runs no robot
     flags: Flags
     responder: Source | None
     files: Mapping[str, bytes]
     notes: tuple[str, ...]
+    notebook: Notebook | None = None  # answers the robot, and runs its own program if ``marked_cell`` says which
+    marked_cell: str | None = None
+    program_cell: int | None = None  # of a notebook that is not played: where the program is
 
 
 def grade(
@@ -71,13 +83,12 @@ def grade(
         with Rig() as own:
             return grade(submission, assignment, observe=observe, rig=own)
     parts = _parts(submission, assignment)
-    ground = _floor(assignment.world)
     trials = tuple(assignment.trials())
     results: list[TrialResult] = []
     watch = _Watch(observe or _nobody, len(trials))
     for trial in trials:
-        order = _order(trial, parts, assignment, ground)
-        recording = rig.run(order, assignment.world.obstacles, watch.pulse)
+        order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed))
+        recording = _recording(order, parts, assignment, rig, watch.pulse)
         results.append(
             TrialResult(
                 trial.scenario.id,
@@ -87,26 +98,49 @@ def grade(
                 trial.motor_noise,
                 trial.scenario.visibility,
                 recording,
+                trial.sweep,
             )
         )
         watch.finished_one()
+    if assignment.training is not None and parts.responder is not None:
+        results = with_models_answers(
+            results, assignment, assignment.training, parts.responder, parts.files, rig, watch.pulse
+        )
+    findings = look_at(_handed_in(submission, parts), assignment, results, rig, watch.pulse)
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
         assignment_version=assignment.version,
         submission=submission.sha256,
         student=submission.student,
-        criteria=judge(assignment, tuple(results)),
+        criteria=judge(assignment, tuple(results), findings),
         trials=tuple(results),
-        walls=results[0].recording.walls if results else "no student code was run",
+        walls=results[0].recording.walls if results else findings.walls or "no student code was run",
         grader_version=GRADER_VERSION,
-        notes=(*submission.notes, *parts.notes),
+        notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results)),
     )
+
+
+def _cell_notes(parts: _Parts, results: Sequence[TrialResult]) -> tuple[str, ...]:
+    """What the cells of a notebook could not do is much the same in every trial, and told once.
+
+    Never that of a hidden trial: a cell can put into the words of an error where its robot stood.
+    """
+    visible = (result.recording.notes for result in results if result.visibility == "visible")
+    return next(visible, ()) if parts.notebook is not None else ()
 
 
 def check_parts(submission: Submission, assignment: Assignment) -> None:
     """Raise UsageError, naming it, when a part is missing that the assignment asks for."""
     _parts(submission, assignment)
+
+
+def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
+    """What is looked at without driving; of a notebook what is no robot program stands for the responder."""
+    responder = parts.responder
+    if parts.notebook is not None:
+        responder = Source(parts.notebook.name, python_of(parts.notebook))
+    return HandedIn(parts.program, responder, parts.flags, parts.files)
 
 
 class _Watch:
@@ -132,14 +166,39 @@ class _Watch:
 
 
 def _parts(submission: Submission, assignment: Assignment) -> _Parts:
+    if submission.notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
+        return _notebook_parts(submission, submission.notebook, assignment)
     program = _part("robot program", "robot.py", assignment.parts.program, submission.program, assignment)
-    if program is None:
-        raise UsageError(f"assignment {assignment.id} has no robot program to run")
     responder = _part("responder", "responder.py", assignment.parts.responder, submission.responder, assignment)
-    flags, text, notes = _flags(program.text, assignment)
+    flags, text, notes = _flags(program.text, assignment) if program is not None else (Flags(), "", ())
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment brings its own, or none",)
-    return _Parts(Source(program.name, text), flags, responder, {**assignment.given, **submission.files}, notes)
+    program = Source(program.name, text) if program is not None else None
+    return _Parts(program, flags, responder, {**assignment.given, **submission.files}, notes)
+
+
+def _notebook_parts(submission: Submission, notebook: Notebook, assignment: Assignment) -> _Parts:
+    """A notebook that has to answer the robot is played; of any other only the marked robot program is taken."""
+    files = {**assignment.given, **submission.files}
+    asked = assignment.parts
+    if asked.program == "none":
+        return _Parts(None, Flags(), None, files, (), notebook)
+    if asked.program != "student":
+        given = Source(asked.program, assignment.given_parts[asked.program])
+        flags, text, notes = _flags(given.text, assignment)
+        return _Parts(Source(given.name, text), flags, None, files, notes, notebook)
+    cell = program_of(notebook, marked_site(notebook, asked.cell))
+    flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
+    if asked.responder == "student":
+        # A line that cannot be read is told by the play, which may come to another cell.
+        notes = tuple(note for note in notes if not note.startswith(_IGNORED))
+        return _Parts(Source(notebook.name, text), flags, None, files, notes, notebook, asked.cell)
+    if cell is None:
+        raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
+    program = Source(f"cell {cell.number}", text)
+    responder = _part("responder", "responder.py", asked.responder, None, assignment)
+    notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
+    return _Parts(program, flags, responder, files, notes, program_cell=cell.number)
 
 
 def _part(what: str, usual: str, who: str, handed_in: Source | None, assignment: Assignment) -> Source | None:
@@ -158,7 +217,7 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
         flags, text = split_program(text)
         wanted = setup(flags)
     except UsageError as error:
-        return Flags(), without_magic(text), (f"the program's magic line is ignored: {error}",)
+        return Flags(), without_magic(text), (f"{_IGNORED}: {error}",)
     world = assignment.world
     notes = []
     if "b" in flags.values and wanted.background != world.background:
@@ -170,16 +229,42 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
     return flags, text, tuple(notes)
 
 
-def _floor(world: WorldSpec) -> Floor:
+def _floor(world: WorldSpec, seed: int) -> Floor:
     if world.picture is not None:
-        return floor_from_picture(world.background, world.picture)
-    return floor(world.background, labels=world.labels)
+        return _own_floor(world.background, world.picture)
+    return floor(world.background, labels=world.labels, seed=seed if world.sheet is None else world.sheet)
+
+
+@functools.lru_cache(maxsize=2)
+def _own_floor(name: str, picture: bytes) -> Floor:
+    """Read once for all trials: cameras know a picture again by its identity."""
+    return floor_from_picture(name, picture)
+
+
+def _recording(
+    order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Rig, pulse: Callable[[], None]
+) -> Recording:
+    limits, obstacles = assignment.limits, assignment.world.obstacles
+    if parts.notebook is not None:
+        child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE)
+        hand_in = NotebookHandIn(parts.notebook, parts.files, child_limits, limits.output_bytes)
+        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell), rig, pulse)
+    recording = rig.run(order, obstacles, pulse)
+    if parts.program_cell is None:
+        return recording
+    faults = (
+        replace(fault, cell=parts.program_cell) if fault.who == "program" and fault.line is not None else fault
+        for fault in recording.faults
+    )
+    return replace(recording, faults=tuple(faults))
 
 
 def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -> TrialOrder:
     limits = assignment.limits
+    if parts.program is None:
+        raise AssignmentError(f"Assignment {assignment.id} has scenarios and no robot program to run in them.")
     responder = None
-    if parts.responder is not None:
+    if parts.responder is not None and assignment.training is None:
         responder = ResponderOrder(
             Code(parts.responder.name, parts.responder.text),
             parts.files,
@@ -194,15 +279,16 @@ def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -
             limits.output_bytes,
         ),
         responder=responder,
-        collaborative=responder is not None or "L" in parts.flags.switches,
+        collaborative=responder is not None or parts.notebook is not None or "L" in parts.flags.switches,
         floor=ground,
         robot=robot(assignment.world.robot),
         pose=trial.pose,
         noise=Noise(trial.light_noise, trial.motor_noise),
-        channel=_channel(trial.scenario.channel),
+        channel=_channel(trial.channel),
         seconds=trial.scenario.seconds,
         seed=trial.seed,
         pen_down="p" in parts.flags.switches,
+        physics=Physics(assignment.world.solid, assignment.world.drive),
     )
 
 

@@ -59,3 +59,11 @@ def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over
     if accuracy >= enough:
         return Fraction(1)
     return Fraction(0) if over == "all" else accuracy / enough
+
+
+def share_of_steps(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
+    """What part of ``marks`` the last of the ``steps`` (accuracy, marks) is worth that ``right`` of ``count`` reach."""
+    if not count or not marks:
+        return Fraction(0)
+    reached = [worth for accuracy, worth in steps if Fraction(right, count) >= Fraction(str(accuracy))]
+    return Fraction(str(reached[-1])) / Fraction(marks) if reached else Fraction(0)

@@ -80,5 +80,5 @@ def cut(recording: Recording) -> Fault | None:
 
 def fault_words(fault: Fault) -> str:
     """``NameError: name 'x' is not defined (line 3)``."""
-    where = f" (line {fault.line})" if fault.line is not None else ""
+    where = f" ({fault.place})" if fault.place else ""
     return f"{fault.message.rstrip('.')}{where}"

@@ -6,15 +6,23 @@ A rig holds no result and no state that one trial could leave for the next.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 
 from responders.bridge import TrialOrder
+from responders.conversation import Code
+from responders.function_calls import Called, FunctionCall, call_functions
+from responders.notebook_play import Played, Stage, never_ran, play_notebook
+from responders.notebook_process import NotebookOrder
 from responders.sandbox.manager import FULL, Sandboxes, Walls
-from responders.trial import remove_left_overs, run_trial
-from sim.arena import Arena, Rectangle
-from sim.camera import Cameras
-from sim.recording import Recording
+from responders.sandbox.private_folders import remove_left_overs
+from responders.sandbox.running_child import ChildLimits
+from responders.training import Trained, TrainingOrder, train_and_name
+from responders.trial import run_trial
+from sim.arena import Arena
+from sim.camera import CachedCamera, Cameras
+from sim.motion import Rectangle
+from sim.recording import Fault, Recording
 
 _MOST_ARENAS = 8
 
@@ -35,9 +43,35 @@ class Rig:
         pulse: Callable[[], None] = lambda: None,
     ) -> Recording:
         """One trial. Raises HostError when the machine fails, and whatever ``pulse`` raises."""
-        return run_trial(
-            order, self._arena(obstacles), self._cameras.camera(order.floor.picture), self._sandboxes, pulse
-        )
+        return run_trial(order, *self._ground(order, obstacles), self._sandboxes, pulse)
+
+    def play(self, order: NotebookOrder, stage: Stage, pulse: Callable[[], None] = lambda: None) -> Played:
+        """A notebook from top to bottom, with all its runs. Raises as ``run`` does."""
+        return play_notebook(order, stage, self._ground, self._sandboxes, pulse)
+
+    def never_ran(self, order: TrialOrder, obstacles: tuple[Rectangle, ...], fault: Fault, walls: str) -> Recording:
+        """The recording of a run that did not come about because of ``fault``."""
+        return never_ran(order, *self._ground(order, obstacles), fault, walls)
+
+    def _ground(self, order: TrialOrder, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
+        return self._arena(obstacles), self._cameras.camera(order.floor.picture)
+
+    def train(self, order: TrainingOrder, pulse: Callable[[], None] = lambda: None) -> Trained:
+        """A hand-in's model, trained and asked. Raises as ``run`` does."""
+        return train_and_name(order, self._sandboxes, pulse)
+
+    def call(
+        self,
+        code: Code,
+        files: Mapping[str, bytes],
+        calls: Sequence[FunctionCall],
+        limits: ChildLimits,
+        output_bytes: int,
+        seed: int,
+        pulse: Callable[[], None] = lambda: None,
+    ) -> Called:
+        """Functions of a module, called in a fresh child without a robot. Raises as ``run`` does."""
+        return call_functions(code, files, calls, limits, output_bytes, self._sandboxes, seed, pulse)
 
     def check_walls(self) -> str:
         """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""

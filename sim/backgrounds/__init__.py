@@ -11,7 +11,9 @@ from sim.backgrounds.floors import (
     FloorLabel,
     floor,
     floor_from_picture,
+    label_names,
     names,
+    start_of,
 )
 
 __all__ = [
@@ -24,5 +26,7 @@ __all__ = [
     "FloorLabel",
     "floor",
     "floor_from_picture",
+    "label_names",
     "names",
+    "start_of",
 ]

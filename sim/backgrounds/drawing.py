@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,12 +144,27 @@ def shape_outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...],
     )
 
 
-def simple_shapes(canvas: Canvas) -> None:
-    """Six shapes at picture row 218, and the unlabelled test row at 418."""
-    for code in range(6):
-        draw_shape(canvas, code, 225 + 80 * code, 218)
-    for column, code in enumerate((1, 5, 0, 2)):
+#: The codes of the shapes in the course's upper and lower row, from the left.
+UPPER_ROW, LOWER_ROW = (0, 1, 2, 3, 4, 5), (1, 5, 0, 2)
+
+
+def shape_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, patches: bool) -> None:
+    """Six shapes at picture row 218, and the unlabelled test row at 418.
+
+    With ``patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
+    """
+    for column, code in enumerate(upper):
+        draw_shape(canvas, code, 225 + 80 * column, 218)
+        if patches:
+            left = 221 + 80 * column
+            canvas.rectangle((left, 251, left + 18, 275), grey(LABEL_GREYS[code]))
+    for column, code in enumerate(lower):
         draw_shape(canvas, code, 225 + 80 * column, 418)
+
+
+def simple_shapes(canvas: Canvas) -> None:
+    """The course's shapes, without their patches."""
+    shape_rows(canvas, UPPER_ROW, LOWER_ROW, patches=False)
 
 
 def draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
@@ -161,11 +176,8 @@ def draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
 
 
 def simple_shapes_with_labels(canvas: Canvas) -> None:
-    """The shapes, and under the right light sensor a patch whose grey tells the shape's code."""
-    simple_shapes(canvas)
-    for code, level in enumerate(LABEL_GREYS):
-        left = 221 + 80 * code
-        canvas.rectangle((left, 251, left + 18, 275), grey(level))
+    """The course's shapes with their patches."""
+    shape_rows(canvas, UPPER_ROW, LOWER_ROW, patches=True)
 
 
 def linear_grey() -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import functools
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -19,6 +19,7 @@ from PIL import Image
 
 from sim.backgrounds import digits, drawing, mats, tracks
 from sim.backgrounds.testcard import testcard
+from sim.chance import Stream
 from sim.errors import UsageError
 from sim.recording import Pose
 
@@ -74,6 +75,8 @@ class Floor:
     default_pose: Pose
     labels: tuple[FloorLabel, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
+    patches: bool = True  # whether the picture shows the grey patches that tell the answer, where it has any
+    sheet: int = 0  # the seed of the handwritten digits, on a digit sheet, or of the order of the shapes
 
     def label_at(self, x: float, y: float) -> str | None:
         """What a left light sensor with its centre at (x, y) mm sees, if that has a name."""
@@ -90,6 +93,13 @@ class _Plan:
 
 
 @dataclass(frozen=True, slots=True)
+class _ShapesPlan:
+    """The shapes of Simple_Shapes at their places, in another order for each seed."""
+
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
 class _SheetPlan:
     pose: Pose
     paper: int
@@ -99,14 +109,29 @@ def _painted(painter: drawing.Painter, background: drawing.Colour = drawing.WHIT
     return functools.partial(drawing.paint, painter, background)
 
 
-def _shape_labels() -> tuple[FloorLabel, ...]:
+def _shape_labels(
+    upper: Sequence[int] = drawing.UPPER_ROW, lower: Sequence[int] = drawing.LOWER_ROW
+) -> tuple[FloorLabel, ...]:
     """Within 10 mm of where the course stands the left sensor: the shape is then inside the sensor's view."""
-    rows = ((920.0, SHAPES), (720.0, tuple(SHAPES[code] for code in (1, 5, 0, 2))))
     return tuple(
-        FloorLabel(name, 230.0 + 80 * column - 10, y - 10, 20.0, 20.0)
-        for y, shapes in rows
-        for column, name in enumerate(shapes)
+        FloorLabel(SHAPES[code], 230.0 + 80 * column - 10, y - 10, 20.0, 20.0)
+        for y, codes in ((920.0, upper), (720.0, lower))
+        for column, code in enumerate(codes)
     )
+
+
+@functools.lru_cache(maxsize=8)
+def _shuffled_shapes(name: str, plan: _ShapesPlan, labels: bool, seed: int) -> Floor:
+    """Each shape once in the upper row, in an order that the seed draws, and any four in the lower.
+
+    It is not one of the course's: where the robot stands must not tell what it sees.
+    """
+    chance = Stream(seed, "shapes")
+    upper = sorted(drawing.UPPER_ROW, key=chance.integer)
+    lower = [chance.integer(100 + column) % len(SHAPES) for column in range(len(drawing.LOWER_ROW))]
+    rows = functools.partial(drawing.shape_rows, upper=upper, lower=lower, patches=labels)
+    picture = _read_only(drawing.paint(rows, drawing.WHITE))
+    return Floor(name, picture, plan.pose, _shape_labels(upper, lower), patches=labels, sheet=seed)
 
 
 def _digit_labels(shown: tuple[int, ...]) -> tuple[FloorLabel, ...]:
@@ -123,7 +148,7 @@ _TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
     (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
 )
 
-_PLANS: Mapping[str, _Plan | _SheetPlan] = MappingProxyType(
+_PLANS: Mapping[str, _Plan | _SheetPlan | _ShapesPlan] = MappingProxyType(
     {
         "Empty_Map": _Plan(Pose(100, 800, 0), _painted(drawing.nothing)),
         "Loop": _Plan(Pose(500, 500, 90), _painted(drawing.loop)),
@@ -155,6 +180,7 @@ _PLANS: Mapping[str, _Plan | _SheetPlan] = MappingProxyType(
         "MNIST_Digits": _SheetPlan(Pose(400, 50, 90), paper=255),
         "MNIST_Digits_Black": _SheetPlan(Pose(400, 50, 90), paper=0),
         "Obstacles_Test": _Plan(Pose(121, 125, 90), tracks.obstacles_test, obstacles=_TEST_OBSTACLES),
+        "Shuffled_Shapes": _ShapesPlan(Pose(800, 400, 0)),
     }
 )
 
@@ -167,7 +193,8 @@ def names() -> tuple[str, ...]:
 def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     """The floor called ``name``; with ``labels=False`` drawn without the grey patches that tell the answer.
 
-    Each ``seed`` gives another digit sheet; on the floors without handwritten digits it changes nothing.
+    Each ``seed`` gives another digit sheet, and another order of the shapes on Shuffled_Shapes; on the other floors
+    it changes nothing.
     Raises UsageError for a name that no floor has, and offers the names nearest to it.
     """
     plan = _PLANS.get(name)
@@ -175,19 +202,42 @@ def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
         raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
     if isinstance(plan, _SheetPlan):
         return _digit_sheet(name, plan, labels, seed)
+    if isinstance(plan, _ShapesPlan):
+        return _shuffled_shapes(name, plan, labels, seed)
     return _printed(name, plan, labels)
 
 
-@functools.cache
+@functools.lru_cache(maxsize=12)  # a picture is 8 MB, and flags can ask for every floor there is
 def _printed(name: str, plan: _Plan, labels: bool) -> Floor:
     draw = plan.picture if labels or plan.unlabelled is None else plan.unlabelled
-    return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles)
+    return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles, patches=labels)
 
 
 @functools.lru_cache(maxsize=8)  # a worker sees ever new seeds, and a picture is 8 MB
 def _digit_sheet(name: str, plan: _SheetPlan, labels: bool, seed: int) -> Floor:
     sheet = digits.draw_sheet(seed, plan.paper, patches=labels)
-    return Floor(name, _read_only(sheet.picture), plan.pose, _digit_labels(sheet.digits))
+    return Floor(name, _read_only(sheet.picture), plan.pose, _digit_labels(sheet.digits), patches=labels, sheet=seed)
+
+
+def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
+    """The default pose and the obstacles of the floor called ``name``, without drawing it.
+
+    Raises UsageError for a name that no floor has.
+    """
+    plan = _PLANS.get(name)
+    if plan is None:
+        raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
+    return plan.pose, plan.obstacles if isinstance(plan, _Plan) else ()
+
+
+def label_names(name: str) -> tuple[str, ...]:
+    """Every label that the floor called ``name`` can have, in the course's order; none for an unknown name."""
+    plan = _PLANS.get(name)
+    if isinstance(plan, _SheetPlan):
+        return tuple(map(str, range(10)))
+    if isinstance(plan, _ShapesPlan):
+        return SHAPES
+    return tuple(dict.fromkeys(label.label for label in plan.labels)) if plan is not None else ()
 
 
 def floor_from_picture(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008

@@ -18,26 +18,98 @@ from typing import Annotated
 
 from pydantic import Field
 
-from submissions.criteria.classification import Classification
+from submissions.criteria.classification import Classification, Recognition, Robustness
+from submissions.criteria.code import Functions, PythonCheck, SourceRules
+from submissions.criteria.collecting import Collects
 from submissions.criteria.common import CriterionBase
+from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose, Finishes
+from submissions.criteria.line import Follows, Laps
+from submissions.criteria.logged import Datalog, ImageLog
+from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
+from submissions.criteria.path import Circuits, Closest, KeepsOut, Spread, StaysInside, TouchesNothing, Visits
+from submissions.criteria.reporting import Events, Reports, Sequence
+from submissions.criteria.stopping import StopOn
 from submissions.criteria.texts import LONGEST_MATCHED_TEXT, Messages, Prints, Replies, Says
+from submissions.criteria.timing import Ranking, Timing
 
 __all__ = [
     "LONGEST_MATCHED_TEXT",
     "SCHEMAS",
+    "Circuits",
     "Classification",
+    "Closest",
+    "Collects",
     "Criterion",
+    "Datalog",
+    "Displacement",
+    "Drawing",
+    "Encounters",
     "EndPose",
+    "Events",
+    "Excursions",
     "Finishes",
+    "Follows",
+    "Functions",
+    "ImageLog",
+    "KeepsOut",
+    "Laps",
     "Messages",
+    "Moves",
     "Prints",
+    "PythonCheck",
+    "Ranking",
+    "Recognition",
     "Replies",
+    "Reports",
+    "Robustness",
     "Says",
+    "Sequence",
+    "SourceRules",
+    "Spread",
+    "StaysInside",
+    "StopOn",
+    "Timing",
+    "TouchesNothing",
+    "Visits",
 ]
 
 Criterion = Annotated[
-    Finishes | Prints | Says | Messages | Replies | Classification | EndPose, Field(discriminator="check")
+    Finishes
+    | Prints
+    | Says
+    | Messages
+    | Replies
+    | Classification
+    | Robustness
+    | Collects
+    | EndPose
+    | StopOn
+    | Reports
+    | Sequence
+    | Events
+    | Datalog
+    | ImageLog
+    | SourceRules
+    | Functions
+    | PythonCheck
+    | Timing
+    | Ranking
+    | Displacement
+    | Moves
+    | Excursions
+    | Encounters
+    | Drawing
+    | Visits
+    | StaysInside
+    | KeepsOut
+    | TouchesNothing
+    | Closest
+    | Circuits
+    | Follows
+    | Laps
+    | Spread,
+    Field(discriminator="check"),
 ]
 
 #: The schema for each value of ``check``.
@@ -48,5 +120,32 @@ SCHEMAS: dict[str, type[CriterionBase]] = {
     "messages": Messages,
     "replies": Replies,
     "classification": Classification,
+    "robustness": Robustness,
+    "collects": Collects,
     "pose": EndPose,
+    "stop_on": StopOn,
+    "reports": Reports,
+    "sequence": Sequence,
+    "events": Events,
+    "datalog": Datalog,
+    "image_log": ImageLog,
+    "source": SourceRules,
+    "functions": Functions,
+    "python": PythonCheck,
+    "timing": Timing,
+    "ranking": Ranking,
+    "displacement": Displacement,
+    "moves": Moves,
+    "excursions": Excursions,
+    "encounters": Encounters,
+    "drawing": Drawing,
+    "visits": Visits,
+    "stays_inside": StaysInside,
+    "keeps_out": KeepsOut,
+    "touches_nothing": TouchesNothing,
+    "closest": Closest,
+    "circuits": Circuits,
+    "follows": Follows,
+    "laps": Laps,
+    "spread": Spread,
 }

@@ -10,6 +10,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from submissions.criteria.common import CriterionBase
+from submissions.criteria.places import Area
 
 
 class Finishes(CriterionBase):
@@ -24,10 +25,11 @@ class Finishes(CriterionBase):
 
 
 class EndPose(CriterionBase):
-    """Where the robot is at the end: near a point, at a heading, or in a zone; all that is given must hold.
+    """Where the robot is at the end: near a point, at a heading, in a zone; all that is given must hold.
 
     ``tolerance`` is in mm from (x, y), ``heading_tolerance`` in degrees, full turns ignored; ``zone`` is
-    [left, bottom, right, top] in mm and is about the middle of the axle.
+    [left, bottom, right, top] in mm. ``areas`` are areas of which the robot must be in one. All are about
+    the middle of the axle.
     """
 
     check: Literal["pose"]
@@ -37,13 +39,14 @@ class EndPose(CriterionBase):
     heading: float | None = None
     heading_tolerance: float = Field(default=5.0, ge=0, le=180)
     zone: tuple[float, float, float, float] | None = None
+    areas: tuple[Area, ...] = ()
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if (self.x is None) != (self.y is None):
             raise ValueError("has one of x and y, expected both")
-        if self.x is None and self.heading is None and self.zone is None:
-            raise ValueError("asks for nothing, expected x and y, heading or zone")
+        if self.x is None and self.heading is None and self.zone is None and not self.areas:
+            raise ValueError("asks for nothing, expected x and y, heading, zone or areas")
         if self.zone is not None and not (self.zone[0] < self.zone[2] and self.zone[1] < self.zone[3]):
             raise ValueError("has an empty zone, expected [left, bottom, right, top]")
         return self

@@ -1,0 +1,192 @@
+"""What is found out about a hand-in without driving: facts of its text, values of its functions, a check's answers.
+
+All of it is found inside the walls; what it is worth is decided in the modules of the kinds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any, Protocol
+
+from responders.conversation import Code
+from responders.function_calls import Called, FunctionCall, Returned
+from responders.sandbox.running_child import ChildLimits
+from service.grading.function_checks import calls_of, checked
+from service.grading.grade import TrialResult
+from service.grading.outcome import Outcome, fault_words
+from service.grading.source_rules import SourceFacts
+from sim.recording import Pose, Recording
+from submissions.assignment import Assignment
+from submissions.criteria.code import Functions, PythonCheck, SourceRules
+from submissions.magics import Flags
+from submissions.submission import Source
+
+_MEGABYTE = 1 << 20
+#: Much more than the longest text takes: how fast a machine is must make no difference.
+_READER_LIMITS = ChildLimits(20.0, 256 * _MEGABYTE)
+_READER_OUTPUT = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class HandedIn:
+    """What is looked at: the sources of the parts, the flags of the program's magic line, the responder's files."""
+
+    program: Source | None = None
+    responder: Source | None = None
+    flags: Flags = field(default_factory=Flags)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """``called`` is by the id of a criterion, ``checks`` by that and the place of the trial."""
+
+    facts: Mapping[str, SourceFacts] = field(default_factory=dict)
+    flags: Flags = field(default_factory=Flags)
+    called: Mapping[str, Called] = field(default_factory=dict)
+    checks: Mapping[tuple[str, int], Outcome] = field(default_factory=dict)
+    walls: str = ""
+
+
+class Caller(Protocol):
+    """Calls functions inside the walls; a rig does."""
+
+    def call(
+        self,
+        code: Code,
+        files: Mapping[str, bytes],
+        calls: Sequence[FunctionCall],
+        limits: ChildLimits,
+        output_bytes: int,
+        seed: int,
+        pulse: Callable[[], None],
+    ) -> Called: ...
+
+
+def look_at(
+    handed_in: HandedIn,
+    assignment: Assignment,
+    trials: Sequence[TrialResult],
+    caller: Caller,
+    pulse: Callable[[], None],
+) -> Findings:
+    """Everything that the criteria ask for beside the recordings.
+
+    Raises AssignmentError when a check of the instructor's fails, HostError when the machine does.
+    """
+    sources = {"program": handed_in.program, "responder": handed_in.responder}
+    parts: set[str] = {criterion.part for criterion in assignment.criteria if isinstance(criterion, SourceRules)}
+    facts = {part: _facts(source, caller, pulse) for part in sorted(parts) if (source := sources[part]) is not None}
+    called: dict[str, Called] = {}
+    checks: dict[tuple[str, int], Outcome] = {}
+    for criterion in assignment.criteria:
+        if isinstance(criterion, Functions) and handed_in.responder is not None:
+            called[criterion.id] = _called(criterion, handed_in, assignment, caller, pulse)
+        elif isinstance(criterion, PythonCheck):
+            for place, trial in enumerate(trials):
+                if not criterion.scenarios or trial.scenario in criterion.scenarios:
+                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, pulse)
+    walls = next((each.walls for each in called.values()), "")
+    return Findings(facts, handed_in.flags, called, checks, walls)
+
+
+def plain_trial(trial: TrialResult) -> dict[str, Any]:
+    """What an instructor's check is given: the recording as JSON has it."""
+    recording = trial.recording
+    return {
+        "scenario": trial.scenario,
+        "index": trial.index,
+        "light_noise": trial.light_noise,
+        "motor_noise": trial.motor_noise,
+        "background": recording.background,
+        "start": _pose(recording.start),
+        "end": _pose(recording.end),
+        "end_t": recording.end_t,
+        "verdict": str(recording.verdict),
+        "ticks": _ticks(recording),
+        "printed": [[line.t, line.text] for line in recording.printed],
+        "spoken": [[line.t, line.text] for line in recording.spoken],
+        "messages": [
+            {"t": each.t, "sender": each.sender, "text": each.text, "delivered": each.delivered}
+            for each in recording.messages
+        ],
+        "datalog": [
+            [each.t, each.name, each.value, each.simtime] for each in recording.datalog if math.isfinite(each.value)
+        ],
+        "images": [{"t": each.t, "pose": _pose(each.pose), "truth": each.truth} for each in recording.images],
+        "image_log": [[side, tick / 30] for side, _, tick in recording.image_log],
+        "touches": [[each.t, each.what] for each in recording.touches],
+    }
+
+
+def _facts(source: Source, caller: Caller, pulse: Callable[[], None]) -> SourceFacts:
+    reader = resources.files("responders") / "library" / "source_facts.py"
+    code = Code("source_facts.py", reader.read_text("utf-8"))
+    calls = [FunctionCall("facts", [source.text])]
+    called = caller.call(code, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, pulse)
+    fault = called.fault or called.returned[0].fault
+    if fault is not None:
+        return SourceFacts(error=f"it cannot be taken apart ({fault_words(fault)})")
+    return SourceFacts.read(called.returned[0].value)
+
+
+def _called(
+    criterion: Functions, handed_in: HandedIn, assignment: Assignment, caller: Caller, pulse: Callable[[], None]
+) -> Called:
+    limits, responder = assignment.limits, handed_in.responder
+    assert responder is not None
+    return caller.call(
+        Code(responder.name, responder.text),
+        handed_in.files,
+        calls_of(criterion),
+        ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
+        limits.output_bytes,
+        _seed(assignment, criterion.id),
+        pulse,
+    )
+
+
+def _seed(assignment: Assignment, criterion: str) -> int:
+    """63 bits for the chance that the functions see, the same for every student."""
+    return int.from_bytes(hashlib.sha256(f"{assignment.id}\ncalls\n{criterion}".encode()).digest()[:8], "big") >> 1
+
+
+def _check(
+    criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: Caller, pulse: Callable[[], None]
+) -> Outcome:
+    limits = assignment.limits
+    called = caller.call(
+        Code(criterion.file, assignment.given_parts[criterion.file]),
+        assignment.given,
+        [FunctionCall("check", [plain_trial(trial)])],
+        ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
+        limits.output_bytes,
+        trial.seed,
+        pulse,
+    )
+    return checked(criterion, called.returned[0] if called.returned else Returned(fault=called.fault))
+
+
+def _pose(pose: Pose) -> dict[str, float]:
+    return {"x": pose.x, "y": pose.y, "heading": pose.heading}
+
+
+def _ticks(recording: Recording) -> dict[str, Any]:
+    ticks = recording.ticks
+    columns = {
+        "t": ticks.t,
+        "x": ticks.x,
+        "y": ticks.y,
+        "heading": ticks.heading,
+        "left_position": ticks.left_position,
+        "right_position": ticks.right_position,
+        "left_rgb": ticks.left_rgb,
+        "right_rgb": ticks.right_rgb,
+        "ultrasonic": ticks.ultrasonic,
+        "gyro": ticks.gyro,
+    }
+    return {name: column.tolist() for name, column in columns.items()}

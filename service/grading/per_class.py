@@ -1,0 +1,46 @@
+"""How well each class is recognised: precision and recall, from the counts of who was taken for whom.
+
+Derived from an ``Accuracy`` and never stored beside it, so the two cannot disagree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.grading.grade import Accuracy
+
+
+@dataclass(frozen=True, slots=True)
+class ClassScore:
+    """One class: how many pictures showed it, how often it was answered, and how often both.
+
+    ``precision`` is right / answered and ``recall`` right / shown; None where there is nothing to divide by.
+    """
+
+    label: str
+    shown: int
+    answered: int
+    right: int
+
+    @property
+    def precision(self) -> float | None:
+        return self.right / self.answered if self.answered else None
+
+    @property
+    def recall(self) -> float | None:
+        return self.right / self.shown if self.shown else None
+
+
+def class_scores(accuracy: Accuracy) -> tuple[ClassScore, ...]:
+    """A score for every label, in their order; empty where the counts are withheld."""
+    if not accuracy.confusion:
+        return ()
+    return tuple(
+        ClassScore(
+            label,
+            sum(count for truth, _, count in accuracy.confusion if truth == label),
+            sum(count for _, answer, count in accuracy.confusion if answer == label),
+            sum(count for truth, answer, count in accuracy.confusion if truth == answer == label),
+        )
+        for label in accuracy.labels
+    )

@@ -1,0 +1,115 @@
+"""Marking a hand-in that trains: its model is trained on some trials' pictures and names those of the others.
+
+The robot's runs come first and are recorded like any; here the hand-in's answers are added to the recordings, so
+that they are judged like a responder's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from responders.conversation import Code
+from responders.sandbox.running_child import ChildLimits
+from responders.training import Images, Trained, TrainingOrder
+from service.grading.collecting import Pair, pairs
+from service.grading.grade import TrialResult
+from service.grading.patches import grey_picture
+from service.grading.rig import Rig
+from sim.recording import Fault, Image, Message, Recording, Verdict
+from submissions.assignment import Assignment, Training
+from submissions.submission import Source
+
+_MEGABYTE = 1 << 20
+_SIDE = {"focus": 14, "whole": 20}
+
+
+def with_models_answers(
+    results: Sequence[TrialResult],
+    assignment: Assignment,
+    training: Training,
+    hand_in: Source,
+    files: Mapping[str, bytes],
+    rig: Rig,
+    pulse: Callable[[], None] = lambda: None,
+) -> list[TrialResult]:
+    """The trials, those that are tested on with the answers of the hand-in's model to their pictures.
+
+    What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
+    machine fails, and whatever ``pulse`` raises.
+    """
+    learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
+    known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
+    asked = {
+        index: _collected(result) for index, result in enumerate(results) if result.scenario not in training.scenarios
+    }
+    limits = assignment.limits
+    trained = rig.train(
+        TrainingOrder(
+            Code(hand_in.name, hand_in.text),
+            files,
+            training.function,
+            _arrays([pair for pair, _ in known], training),
+            [truth for _, truth in known],
+            _arrays([pair for own in asked.values() for pair in own], training),
+            ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
+            limits.output_bytes,
+            results[0].seed if results else 0,
+        ),
+        pulse,
+    )
+    names = iter(trained.names)
+    answered = []
+    for index, result in enumerate(results):
+        if index in asked:
+            recording = _answered(result.recording, asked[index], names, trained)
+            result = replace(result, recording=recording)
+        answered.append(result)
+    return answered
+
+
+def _collected(result: TrialResult) -> list[Pair]:
+    """A trial's pictures, logged and sent, in the order in which they were taken."""
+    found = [*pairs(result.recording, "log"), *pairs(result.recording, "sent")]
+    return sorted(found, key=lambda pair: pair.image.tick)
+
+
+def _arrays(found: Sequence[Pair], training: Training) -> Images:
+    side = _SIDE[training.image]
+    pictures = [grey_picture(pair.image, focus=training.image == "focus") for pair in found]
+    return np.stack(pictures) if pictures else np.empty((0, side, side), np.uint8)
+
+
+def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str | None], trained: Trained) -> Recording:
+    """The recording with each picture as a message of the robot's and each name as its answer."""
+    messages: list[Message] = []
+    images: list[Image] = []
+    given: list[str | None] = []
+    for pair in asked:
+        image, name = pair.image, next(names)
+        images.append(replace(image, message=len(messages), truth=pair.truth))
+        messages.append(Message(image.t, "robot", "IMG_DATA", image.t))
+        given.append(name)
+        if name is not None:
+            messages.append(Message(image.t, "responder", name, image.t, len(messages) - 1))
+    faults = recording.faults
+    if trained.fault is not None:
+        faults = tuple(sorted((*faults, replace(trained.fault, t=0.0)), key=_time))
+    proof = f"{recording.sha256}:{json.dumps([given, str(trained.fault)])}"
+    return replace(
+        recording,
+        messages=tuple(messages),
+        images=tuple(images),
+        faults=faults,
+        verdict=faults[0].verdict if faults else Verdict.FINISHED,
+        responder_output=trained.output,
+        sha256=hashlib.sha256(proof.encode()).hexdigest(),
+    )
+
+
+def _time(fault: Fault) -> float:
+    return fault.t

@@ -1,0 +1,88 @@
+"""Texts as words and numbers: what was printed and said, taken apart for comparing.
+
+Case and punctuation do not count, and number words are numbers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from sim.recording import Line
+
+_SMALL = [
+    "zero",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+    "thirteen",
+    "fourteen",
+    "fifteen",
+    "sixteen",
+    "seventeen",
+    "eighteen",
+    "nineteen",
+    "twenty",
+]
+_TENS = ["thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety", "hundred"]
+_NUMBERS = {word: str(number) for number, word in enumerate(_SMALL)} | {
+    word: str(number) for number, word in zip(range(30, 101, 10), _TENS, strict=True)
+}
+#: Longest text of a student's that is taken apart.
+_MOST = 20_000
+_WORD = re.compile(r"[^\W_]+")
+#: A number as Python writes it, or a word.
+_TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]+")
+
+
+def words_of(text: str) -> list[str]:
+    """The words in order, without case and punctuation; "ten" is "10", "one hundred" is "100"."""
+    words = [_NUMBERS.get(word, word) for word in _WORD.findall(text[:_MOST].casefold())]
+    joined = [word for word, after in pairwise([*words, ""]) if not (word in ("1", "a") and after == "100")]
+    return joined
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A word, and its value if it is a number."""
+
+    word: str
+    value: float | None
+
+
+def tokens_of(text: str) -> list[Token]:
+    """The words and numbers in order, numbers as Python writes them."""
+    found = []
+    for match in _TOKEN.finditer(text[:_MOST].casefold()):
+        word = _NUMBERS.get(match[0], match[0])
+        found.append(Token(word, float(word) if match["number"] or word.isdecimal() else None))
+    return found
+
+
+def find_words(words: Sequence[str], wanted: Sequence[str], start: int = 0) -> int | None:
+    """The first place from ``start`` on where ``wanted`` stands word for word."""
+    wanted = list(wanted)
+    for place in range(start, len(words) - len(wanted) + 1):
+        if list(words[place : place + len(wanted)]) == wanted:
+            return place
+    return None
+
+
+def spoken_until(lines: Sequence[Line]) -> list[float]:
+    """When each utterance has been spoken to its end, seconds: they queue up, at 130 words a minute."""
+    ends: list[float] = []
+    for line in lines:
+        begin = max(line.t, ends[-1] if ends else 0.0)
+        ends.append(begin + len(line.text.split()) * 60 / 130)
+    return ends

@@ -1,0 +1,70 @@
+"""What has to fit together in criteria about code: files that are there, parts that are handed in, runs to judge.
+
+What a single criterion may hold is its schema's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from sim.errors import UsageError
+from submissions.assignment_tables import PartsTable
+from submissions.criteria import Criterion
+from submissions.criteria.code import Functions, PythonCheck, SourceRules
+from submissions.criteria.timing import Ranking
+from submissions.problems import Problems
+from submissions.source_text import decode_source
+from submissions.toml_lines import Path as Place
+
+
+def runs_no_robot(document: Mapping[str, object]) -> bool:
+    """Whether the assignment has neither scenarios nor a program: only functions and texts are looked at."""
+    parts = document.get("parts")
+    return isinstance(parts, dict) and parts.get("program") == "none" and "scenario" not in document
+
+
+def check_code(
+    criterion: Criterion,
+    parts: PartsTable | None,
+    robotless: bool,
+    files: Iterable[str],
+    place: Place,
+    problems: Problems,
+) -> None:
+    """Names what a criterion asks for that the assignment does not have."""
+    if isinstance(criterion, PythonCheck) and criterion.file not in files:
+        problems.add((*place, "file"), f'file is "{criterion.file[:60]}", expected a .py file beside this file')
+    if robotless and not isinstance(criterion, SourceRules | Functions):
+        problems.add(
+            (*place, "check"),
+            'check judges a run of the robot, but there is no scenario and parts has program = "none", '
+            'expected "functions" or "source"',
+        )
+    if parts is None:
+        return
+    asked = "program" if isinstance(criterion, SourceRules) and criterion.part == "program" else "responder"
+    if isinstance(criterion, SourceRules | Functions) and getattr(parts, asked) == "none":
+        key = "part" if isinstance(criterion, SourceRules) else "check"
+        problems.add((*place, key), f'{key} looks at the {asked}, but parts has {asked} = "none", expected one')
+
+
+def check_ranks(criteria: Iterable[Criterion], problems: Problems) -> None:
+    """Names ranks of figures that no other criterion measures."""
+    known = {criterion.id for criterion in criteria if not isinstance(criterion, Ranking)}
+    for number, criterion in enumerate(criteria):
+        if isinstance(criterion, Ranking) and criterion.of not in known:
+            problems.add(
+                ("criterion", number, "of"), f'of is "{criterion.of[:60]}", expected the id of another criterion'
+            )
+
+
+def check_sources(criteria: Iterable[Criterion], files: Mapping[str, bytes], problems: Problems) -> dict[str, str]:
+    """The texts of the instructor's checks, by file name."""
+    sources = {}
+    for criterion in criteria:
+        if isinstance(criterion, PythonCheck) and criterion.file in files:
+            try:
+                sources[criterion.file] = decode_source(files[criterion.file], criterion.file).text
+            except UsageError as error:
+                problems.add(("criterion",), str(error).rstrip("."))
+    return sources

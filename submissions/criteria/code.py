@@ -1,0 +1,146 @@
+"""Criteria about the code that was handed in: what its text has, what its functions return, and checks in Python.
+
+Only what is asked; the text is read and the functions are called by the service, inside the walls.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from sim.errors import UsageError
+from submissions.criteria.common import CriterionBase, Texts, one_or_many
+from submissions.criteria.parts import Table
+from submissions.magics import Flags, parse_magic
+
+#: The words that stand for a construct; any other is a name.
+CONSTRUCTS = (
+    "for",
+    "while",
+    "if",
+    "else",
+    "break",
+    "continue",
+    "def",
+    "return",
+    "class",
+    "lambda",
+    "try",
+    "with",
+    "global",
+    "list",
+    "dict",
+    "comprehension",
+)
+
+
+class SourceRules(CriterionBase):
+    """What the text of the program (or of the responder) has and has not; it is read, never run.
+
+    ``uses`` and ``avoids`` list constructs (``for``, ``while``, ``if``, ``break`` ...), calls (``say()``,
+    ``tank_drive.on()``, ``on_for_*()`` with any ending), imports (``import time``) and names (``colorLeft``,
+    ``colorLeft.rgb``). A name without a dot is found behind a dot as well: ``on()`` is also
+    ``tank_drive.on()``. ``in_loop`` lists calls that must stand inside a loop, ``defines`` functions that must
+    be defined. ``flags`` are flags that the magic line must have: ``["-b Simple_Shapes", "-R"]``.
+
+    The score is the part of all this that holds.
+    """
+
+    check: Literal["source"]
+    part: Literal["program", "responder"] = "program"
+    uses: Texts = ()
+    avoids: Texts = ()
+    in_loop: Texts = ()
+    defines: Texts = ()
+    flags: Texts = ()
+
+    @field_validator("uses", "avoids", "in_loop", "defines", "flags", mode="before")
+    @classmethod
+    def _lists(cls, value: object) -> object:
+        return one_or_many(value)
+
+    @field_validator("flags")
+    @classmethod
+    def _known_flags(cls, value: Texts) -> Texts:
+        try:
+            flags_in(value)
+        except UsageError as error:
+            raise ValueError(f"cannot be read: {str(error).removeprefix('line 1: ')}") from None
+        return value
+
+    @field_validator("in_loop")
+    @classmethod
+    def _calls(cls, value: Texts) -> Texts:
+        if not all(text.endswith("()") for text in value):
+            raise ValueError('has what is no call, expected calls like "say()"')
+        return value
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if not (self.uses or self.avoids or self.in_loop or self.defines or self.flags):
+            raise ValueError("asks for nothing, expected uses, avoids, in_loop, defines or flags")
+        if self.flags and self.part != "program":
+            raise ValueError("has flags for the responder, expected them for the program")
+        return self
+
+
+class ExpectedCall(Table):
+    """A call of a function, and what it must return: exactly ``returns``, or one of ``one_of``."""
+
+    function: str = ""  # the criterion's, if not given
+    arguments: tuple[Any, ...] = ()
+    named: dict[str, Any] = Field(default_factory=dict)
+    returns: Any = None
+    one_of: tuple[Any, ...] = ()
+
+
+class Functions(CriterionBase):
+    """Functions of the responder are called, without a robot, and return what they must.
+
+    ``calls`` are tables ``{ arguments = [600], returns = 1227.8 }``, made one after the other in one process;
+    ``function`` is the name for those that give none. Numbers are met within ``tolerance``; texts without
+    regard to runs of spaces, and with ``ignore_case`` to case. ``path`` picks the part of a ``JSON::`` answer
+    that is compared. With ``each`` an expected list is compared entry by entry, and ``at_least`` of the
+    entries must be right: that is how predictions are marked.
+
+    The score is the part of the calls (of the entries) that is right.
+    """
+
+    check: Literal["functions"]
+    function: str = Field(default="responder", min_length=1, max_length=100)
+    calls: tuple[ExpectedCall, ...] = Field(min_length=1)
+    tolerance: float = Field(default=1e-6, ge=0)
+    ignore_case: bool = False
+    path: str | None = Field(default=None, min_length=1)
+    each: bool = False
+    at_least: float = Field(default=1.0, gt=0, le=1)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.each and not all(isinstance(call.returns, list | tuple) and call.returns for call in self.calls):
+            raise ValueError("has each with a call that returns no list, expected a list in every returns")
+        if self.at_least < 1 and not self.each:
+            raise ValueError("has at_least without each, expected each = true beside it")
+        return self
+
+
+class PythonCheck(CriterionBase):
+    """What no other criterion can ask: a Python file beside the assignment judges each trial.
+
+    The file defines ``check(trial)``. ``trial`` is a dict with what was recorded: ``scenario``, ``index``,
+    ``start`` and ``end`` (``x``, ``y``, ``heading``), ``end_t``, ``verdict``, ``ticks`` (lists ``t``, ``x``,
+    ``y``, ``heading``, ``left_rgb``, ``right_rgb``, ``ultrasonic``, ``gyro``), ``printed``, ``spoken`` (lists of
+    [time, text]), ``messages``, ``datalog``, ``images``, ``image_log``. It returns True or False, or a dict with
+    ``passed``, ``message`` (a sentence for the student), ``score`` from 0 to 1 and ``measures`` (name to number).
+
+    It runs inside the walls, like student code. If it fails, nobody is marked: the assignment is wrong.
+    """
+
+    check: Literal["python"]
+    file: str = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
+
+
+def flags_in(texts: Texts) -> Flags:
+    """The flags that these texts are. Raises UsageError for one that does not exist."""
+    return parse_magic("%%sim_magic_preloaded " + " ".join(texts))

@@ -1,0 +1,24 @@
+"""Tables and zones that stand inside a criterion.
+
+A criterion itself is in the module of its family.
+"""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+#: left, bottom, right, top, mm
+Zone = tuple[float, float, float, float]
+
+
+class Table(BaseModel):
+    """A table inside a criterion: no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def zone_with_room(zone: Zone) -> Zone:
+    """Refuses a zone that nothing can be in."""
+    if not (zone[0] < zone[2] and zone[1] < zone[3]):
+        raise ValueError("is empty, expected [left, bottom, right, top]")
+    return zone

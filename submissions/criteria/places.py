@@ -1,0 +1,137 @@
+"""How an assignment says where: areas of the floor, lines on it, and which part of the robot is meant.
+
+Coordinates are mm from the lower left corner of the floor; measuring against them is the service's.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from sim.backgrounds.centrelines import centrelines
+
+#: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.
+Part = Literal["robot", "pen", "left_light", "right_light"]
+
+Point = tuple[float, float]
+#: Least and most; both belong to it.
+Range = tuple[float, float]
+
+
+def ordered(value: Range | None) -> Range | None:
+    """Refuses a range that nothing is in."""
+    if value is not None and value[0] > value[1]:
+        raise ValueError("is a range with nothing in it, expected [least, most]")
+    return value
+
+
+class Area(BaseModel):
+    """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(default="", max_length=80)
+    rectangle: tuple[float, float, float, float] | None = None  # left, bottom, right, top
+    circle: tuple[float, float, float] | None = None  # x, y, radius
+    polygon: tuple[Point, ...] | None = None  # corners
+    bar: tuple[float, float, float, float, float] | None = None  # x and y of both ends, radius
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if sum(shape is not None for shape in (self.rectangle, self.circle, self.polygon, self.bar)) != 1:
+            raise ValueError("is no area, expected one of rectangle, circle, polygon and bar")
+        if self.rectangle is not None:
+            left, bottom, right, top = self.rectangle
+            if not (left < right and bottom < top):
+                raise ValueError("has an empty rectangle, expected [left, bottom, right, top]")
+        if self.circle is not None and not self.circle[2] > 0:
+            raise ValueError("has a circle without a radius, expected [x, y, radius]")
+        if self.bar is not None and not self.bar[4] > 0:
+            raise ValueError("has a bar without a radius, expected [x1, y1, x2, y2, radius]")
+        if self.polygon is not None and len(self.polygon) < 3:
+            raise ValueError("has a polygon of fewer than three corners, expected [[x, y], [x, y], [x, y], ...]")
+        return self
+
+    def __str__(self) -> str:
+        """``the red circle``, or the shape with its figures."""
+        if self.name:
+            return self.name
+        if self.rectangle is not None:
+            left, bottom, right, top = self.rectangle
+            return f"the rectangle with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
+        if self.circle is not None:
+            x, y, radius = self.circle
+            return f"the circle of {radius:g} mm around ({x:g}, {y:g})"
+        if self.bar is not None:
+            x1, y1, x2, y2, _ = self.bar
+            return f"the bar from ({x1:g}, {y1:g}) to ({x2:g}, {y2:g})"
+        first = (self.polygon or ((0.0, 0.0),))[0]
+        return f"the area with a corner at ({first[0]:g}, {first[1]:g})"
+
+
+class Course(BaseModel):
+    """A line to drive along, in the direction in which it is to be driven.
+
+    ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``); ``points`` lists its
+    corners; ``ellipse`` is [x, y, horizontal radius, vertical radius] and ``arc`` the part of it from one
+    angle to another, degrees anticlockwise from the right (the second less than the first: clockwise).
+    ``closed`` joins the end to the beginning; Thruxton's circuit is closed anyway.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    on: str | None = None
+    points: tuple[Point, ...] | None = None
+    ellipse: tuple[float, float, float, float] | None = None
+    arc: tuple[float, float] = (0.0, 360.0)
+    closed: bool = False
+    name: str = Field(default="the line", max_length=80)
+
+    @field_validator("on")
+    @classmethod
+    def _known(cls, value: str | None) -> str | None:
+        if value is not None and value not in centrelines():
+            names = ", ".join(f'"{name}"' for name in centrelines())
+            raise ValueError(f"names no line of a floor, expected one of {names}")
+        return value
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if sum(kind is not None for kind in (self.on, self.points, self.ellipse)) != 1:
+            raise ValueError("is no line, expected one of on, points and ellipse")
+        if not 0 < abs(self.arc[1] - self.arc[0]) <= 360:
+            raise ValueError("has an arc of no length or of more than 360 degrees, expected arc = [from, to]")
+        if self.ellipse is not None and not (self.ellipse[2] > 0 and self.ellipse[3] > 0):
+            raise ValueError("has an ellipse without radii, expected [x, y, horizontal radius, vertical radius]")
+        if len(self.corners()) < 2 or self.length() <= 0:
+            raise ValueError("has a line of fewer than two points, expected points = [[x, y], [x, y], ...]")
+        return self
+
+    def corners(self) -> tuple[Point, ...]:
+        """The corners of the line; a closed one ends where it begins."""
+        if self.on is not None:
+            return centrelines()[self.on]
+        if self.points is not None:
+            return (*self.points, self.points[0]) if self.closed else self.points
+        x, y, across, up = self.ellipse or (0.0, 0.0, 0.0, 0.0)
+        start, end = (math.radians(angle) for angle in self.arc)
+        steps = 180
+        angles = (start + (end - start) * step / steps for step in range(steps + 1))
+        return tuple((x + across * math.cos(angle), y + up * math.sin(angle)) for angle in angles)
+
+    def length(self) -> float:
+        """mm."""
+        corners = self.corners()
+        return sum(math.dist(before, after) for before, after in itertools.pairwise(corners))
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether one can drive on from the end to the beginning."""
+        return (
+            self.closed
+            or self.on == "Thruxton_Circuit"
+            or (abs(self.arc[1] - self.arc[0]) == 360 and bool(self.ellipse))
+        )

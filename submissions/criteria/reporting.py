@@ -1,0 +1,123 @@
+"""Criteria about what a program reports: the right figures, in the right order, at the right place.
+
+Single texts and how often they come are asked in ``texts.py``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
+from submissions.criteria.parts import Table, Zone, zone_with_room
+
+Source = Literal["print", "speech", "either"]
+
+
+class Reports(CriterionBase):
+    """Printed, said or answered figures and words are those that belong to the pose.
+
+    ``expected`` has a list for each pose of the scenario, or a single one for all poses; each entry, a number
+    or a text, must come in this order somewhere in what the program prints and says (``source`` narrows it
+    down; ``reply`` looks at the responder's answers). Numbers are met within ``tolerance``, texts as whole
+    words without regard to case. ``among`` lists the words to choose from: any of them that is not expected
+    is wrong, so that saying all of them does not help. ``only`` asks that no other number is reported.
+    ``expected = "label"`` is what the floor has under the left light sensor at the start.
+    """
+
+    check: Literal["reports"]
+    source: Literal["print", "speech", "either", "reply"] = "either"
+    expected: Literal["label"] | tuple[tuple[float | str, ...], ...]
+    tolerance: float = Field(default=0.5, ge=0)
+    among: Texts = ()
+    only: bool = False
+
+    @field_validator("expected", mode="plain")
+    @classmethod
+    def _rows(cls, value: object) -> object:
+        if value == "label":
+            return value
+        rows = value if isinstance(value, list | tuple) else ()
+        if rows and all(isinstance(row, list | tuple) and row and all(map(_entry, row)) for row in rows):
+            return tuple(tuple(row) for row in rows)
+        raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
+
+    @field_validator("among")
+    @classmethod
+    def _words(cls, value: Texts) -> Texts:
+        return not_blank(value)
+
+
+class Sequence(CriterionBase):
+    """Words come one after the other, however they are spread over what is said or printed.
+
+    ``words`` are compared without regard to case and punctuation; one in a list of its own may be any of that
+    list: ``["T", ["M", "em"], "1"]``. Number words count as numbers ("ten" is 10). Before them, other words
+    may come with ``lead_in``; nothing may come between them, and after them only with ``more``. "TM" is one
+    word, "T M" are two. ``waits`` asks that none is said before the one before has been spoken to its end.
+    """
+
+    check: Literal["sequence"]
+    source: Literal["print", "speech"] = "speech"
+    words: tuple[Texts, ...] = Field(min_length=1)
+    lead_in: bool = False
+    more: bool = False
+    waits: bool = False
+
+    @field_validator("words", mode="before")
+    @classmethod
+    def _alternatives(cls, value: Any) -> Any:
+        return tuple(one_or_many(word) for word in value) if isinstance(value, list | tuple) else value
+
+    @field_validator("words")
+    @classmethod
+    def _some_word(cls, value: tuple[Texts, ...]) -> tuple[Texts, ...]:
+        for words in value:
+            if not words or not all(any(c.isalnum() for c in word) for word in words):
+                raise ValueError("has an entry without a letter or digit, expected words to look for")
+        return value
+
+    @model_validator(mode="after")
+    def _waits_for_speech(self) -> Self:
+        if self.waits and self.source != "speech":
+            raise ValueError('has waits with source = "print", expected it with speech')
+        return self
+
+
+class EventAt(Table):
+    """A text, and the zone that the sensor must be in when it comes."""
+
+    text: Texts = Field(min_length=1)  # any of these
+    zone: Zone
+
+    @field_validator("text", mode="before")
+    @classmethod
+    def _texts(cls, value: object) -> object:
+        return one_or_many(value)
+
+    @field_validator("zone")
+    @classmethod
+    def _room(cls, value: Zone) -> Zone:
+        return zone_with_room(value)
+
+
+class Events(CriterionBase):
+    """Each text is said or printed, in this order, while the sensor is where it belongs.
+
+    ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``; a text is found anywhere in
+    what is said, as whole words, number words counting as numbers. The sensor (``middle`` is the middle of
+    the axle) may be up to ``margin`` mm outside of the zone.
+    """
+
+    check: Literal["events"]
+    source: Source = "either"
+    sensor: Literal["left", "right", "middle"] = "left"
+    events: tuple[EventAt, ...] = Field(min_length=1)
+    margin: float = Field(default=0.0, ge=0)
+
+
+def _entry(value: object) -> bool:
+    if isinstance(value, str):
+        return any(c.isalnum() for c in value)
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,56 @@
+"""Criteria about time, and about ranks: how long it took, and what a measured figure is worth.
+
+Whether a program ends at all is asked in ``ending.py``.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from submissions.criteria.common import CriterionBase
+
+
+class Timing(CriterionBase):
+    """How long it took, in seconds of simulated time: from ``between[0]`` to ``between[1]``.
+
+    ``of = "program"`` is from the start to the program's end, ``"moving"`` the time in which the robot moved or
+    turned, ``"speech"`` until the last thing that was said had been spoken.
+    """
+
+    check: Literal["timing"]
+    of: Literal["program", "moving", "speech"] = "program"
+    between: tuple[float, float]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.between[0] > self.between[1]:
+            raise ValueError("has an empty range in between, expected [least, most]")
+        return self
+
+
+class Ranking(CriterionBase):
+    """A figure that another criterion measures is worth marks by steps: the fastest lap gets all of them.
+
+    ``of`` is the id of that criterion and ``measure`` the name of its figure, as reports show it. ``steps``
+    are [figure, share]: up to that figure (``highest = true``: from it on) the share of the marks is given.
+    A trial in which the other criterion failed is worth nothing. The figure is shown for a table of ranks.
+    """
+
+    check: Literal["ranking"]
+    of: str = Field(min_length=1, max_length=80)
+    measure: str = Field(min_length=1, max_length=60)
+    steps: tuple[tuple[float, float], ...] = Field(min_length=1)
+    highest: bool = False
+    over: Literal["share", "all", "mean", "median", "worst"] = "mean"
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for better, worse in pairwise(self.steps):
+            if (better[0] >= worse[0]) != self.highest or better[1] <= worse[1]:
+                raise ValueError("has steps out of order, expected the best first, each worth less than the one before")
+        if not all(0 <= share <= 1 for _, share in self.steps):
+            raise ValueError("has a share out of range in steps, expected from 0 to 1")
+        return self

@@ -1,0 +1,68 @@
+"""Sweeps: the conditions that a scenario can vary one at a time, and the levels of each.
+
+Plain data; what a trial does under a condition is the grader's, and what the trials show is judged elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Literal
+
+Condition = Literal["offset_x", "offset_y", "heading", "light_noise", "motor_noise", "loss", "delay"]
+
+#: One trial's levels of what is swept: at most one pair, empty in a scenario without a sweep.
+Coordinates = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """What a condition is called, its unit, and the levels that make sense."""
+
+    words: str
+    unit: str
+    least: float
+    most: float
+
+
+CONDITIONS: Mapping[str, Varied] = MappingProxyType(
+    {
+        "offset_x": Varied("start offset in x", "mm", -100, 100),
+        "offset_y": Varied("start offset in y", "mm", -100, 100),
+        "heading": Varied("heading offset", "degrees", -180, 180),
+        "light_noise": Varied("light noise", "grey levels", 0, 128),
+        "motor_noise": Varied("motor noise", "degrees per second", 0, 500),
+        "loss": Varied("message loss", "share of messages", 0, 1),
+        "delay": Varied("message delay", "s", 0, 60),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """The levels of each condition; a condition without levels is not varied."""
+
+    offset_x: tuple[float, ...] = ()
+    offset_y: tuple[float, ...] = ()
+    heading: tuple[float, ...] = ()
+    light_noise: tuple[float, ...] = ()
+    motor_noise: tuple[float, ...] = ()
+    loss: tuple[float, ...] = ()
+    delay: tuple[float, ...] = ()
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """The conditions that are varied."""
+        return tuple(field.name for field in fields(self) if getattr(self, field.name))
+
+    def coordinates(self) -> Iterator[Coordinates]:
+        """One condition after the other, each over its levels; a single empty one if nothing is varied."""
+        if not self.conditions:
+            yield ()
+        for condition in self.conditions:
+            for level in getattr(self, condition):
+                yield ((condition, level),)
+
+
+NO_SWEEP = Sweep()

@@ -1,0 +1,320 @@
+"""Criteria about code: texts read and functions called inside the walls, and checks of the instructor's in Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from responders.conversation import Code
+from responders.function_calls import FunctionCall, call_functions
+from responders.sandbox.running_child import ChildLimits
+from service.grading.findings import HandedIn, look_at
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.grading.source_rules import SourceFacts, judge_source
+from sim.errors import AssignmentError
+from sim.recording import Verdict
+from submissions.assignment import Assignment, Limits, Parts, WorldSpec
+from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.criteria import SCHEMAS, Criterion
+from submissions.magics import split_program
+from submissions.plain_cells import python_of
+from submissions.submission import Cell, Notebook, Source, Submission
+
+LIMITS = ChildLimits(1.0, 256 << 20)
+
+
+def criterion(check: str, **keys: Any) -> Criterion:
+    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
+    return made  # type: ignore[return-value]
+
+
+def without_robot(*criteria: Criterion) -> Assignment:
+    return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), criteria)
+
+
+def facts_of(text: str, rig: Rig) -> SourceFacts:
+    asked = without_robot(criterion("source", uses=["for"]))
+    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, lambda: None).facts["program"]
+
+
+def graded(text: str, rig: Rig, *criteria: Criterion) -> Grade:
+    submission = Submission("ada", responder=Source("responder.py", text))
+    return grade(submission, without_robot(*criteria), rig=rig)
+
+
+# what the text has
+
+PROGRAM = """%%sim_magic_preloaded -b Loop -pR
+import time
+from ev3dev2.sound import Sound as Voice
+def square(side):
+    global count
+    for _ in range(4):
+        tank_drive.on_for_rotations(SpeedPercent(40), SpeedPercent(40), side)
+        if colorLeft.rgb[0] > 3: break
+    else:
+        say("done")
+while True:
+    square(2)
+names = [name for name in "abc"]
+"""
+
+
+@pytest.fixture(scope="module")
+def facts(rig: Rig) -> SourceFacts:
+    return facts_of(split_program(PROGRAM)[1], rig)
+
+
+@pytest.mark.parametrize(
+    ("rules", "holds"),
+    [
+        ({"uses": ["for", "while", "if", "else", "break", "def", "global", "comprehension"]}, True),
+        ({"uses": ["try"]}, False),
+        ({"uses": ["say()", "range()", "tank_drive.on_for_rotations()", "on_for_rotations()"]}, True),
+        ({"uses": ["on()"]}, False),
+        ({"uses": ["on_for_*()"]}, True),
+        ({"avoids": ["on_for_*()"]}, False),
+        ({"avoids": ["on_for_seconds()", "import random", "colorRight"]}, True),
+        ({"uses": ["import time", "import ev3dev2", "import ev3dev2.sound"]}, True),
+        ({"uses": ["import ev3"]}, False),
+        ({"uses": ["colorLeft", "colorLeft.rgb", "rgb"]}, True),
+        ({"uses": ["color"]}, False),
+        ({"in_loop": ["square()", "on_for_rotations()"]}, True),
+        ({"in_loop": ["Sound()"]}, False),
+        ({"defines": ["square"]}, True),
+        ({"defines": ["triangle"]}, False),
+        ({"flags": ["-b Loop", "-p", "-R"]}, True),
+        ({"flags": ["-b Square"]}, False),
+        ({"flags": ["--autorun"]}, True),
+    ],
+)
+def test_rules_on_the_text(facts: SourceFacts, rules: dict[str, Any], holds: bool) -> None:
+    outcome = judge_source(criterion("source", **rules), facts, split_program(PROGRAM)[0])  # type: ignore[arg-type]
+    assert outcome.passed is holds, outcome.message
+
+
+def test_rule_that_is_broken_is_told_with_its_line(facts: SourceFacts) -> None:
+    rules = criterion("source", avoids=["while", "say()"], uses=["for"])
+    outcome = judge_source(rules, facts, split_program(PROGRAM)[0])  # type: ignore[arg-type]
+    assert outcome.message == "Expected your program to do without a while loop, but line 11 has it."
+    assert outcome.score == pytest.approx(1 / 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("x = (", "'(' was never closed (line 1)"),
+        ("print 'x'", "Missing parentheses"),
+        ("(" * 50_000, "too many nested parentheses"),
+        ("-" * 200_000 + "1", "nested too deeply"),
+        ("x" + ".y" * 100_000, "nested too deeply"),
+        ("x = " + "+".join("1" * 100_000), "nested too deeply"),
+        ("if x:\n" + "".join(" " * (depth + 1) + "if x:\n" for depth in range(98)) + " " * 100 + "pass\n", ""),
+        ("\n".join(f"name_{i}.part_{i}({i})" for i in range(4_000)), ""),
+        ("x = 1\n" * 60_000, "more than 300000 characters"),
+        ("'" + "\\N{DIGIT ONE}" * 1000 + "'", ""),
+        ("x = '\ud800'", "characters"),
+    ],
+)
+def test_hostile_texts_are_read_or_refused_inside_the_walls(text: str, error: str, rig: Rig) -> None:
+    found = facts_of(text, rig)
+    assert error in found.error
+    assert bool(found.error) is bool(error)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [None, 3, [], {"error": None}, {"error": {"line": "x"}}, {"calls": {"say": "x"}}, {"calls": [[1, 2, 3], "ab"]}],
+)
+def test_nonsense_from_the_reader_is_no_facts(told: Any) -> None:
+    found = SourceFacts.read(told)
+    assert found.error or not any(found.found.values())
+
+
+def test_text_of_a_notebook_is_its_plain_cells() -> None:
+    cells = (
+        "%%sim_magic_preloaded\nsay('x')",
+        "import re\n%matplotlib inline",
+        "if re:\n    !ls\n",
+        "%%writefile a\nx",
+    )
+    notebook = Notebook("a.ipynb", tuple(Cell(number, text) for number, text in enumerate(cells, 1)))
+    text = python_of(notebook)
+    compile(text, "a", "exec")
+    assert "say" not in text
+    assert "import re" in text
+
+
+# what functions return
+
+
+@pytest.mark.parametrize(
+    ("keys", "text", "marks"),
+    [
+        ({"returns": 3}, "def f(): return 3", 4),
+        ({"returns": 3}, "def f(): return 3.0", 4),
+        ({"returns": 3}, "def f(): return True", 0),
+        ({"returns": 1}, "def f(): return True", 0),
+        ({"returns": None}, "def f(): pass", 4),
+        ({"returns": [1, {"a": [2]}]}, "def f(): return (1, {'a': [2.0]})", 4),
+        ({"returns": [0, 1]}, "import numpy as np\ndef f(): return np.arange(2)", 4),
+        ({"returns": [1, 2]}, "def f(): return {2, 1}", 4),
+        ({"returns": "a b"}, "def f(): return ' a   b '", 4),
+        ({"returns": "A"}, "def f(): return 'a'", 0),
+        ({"one_of": ["heads", "tails"]}, "import random\ndef f(): return random.choice(['heads', 'tails'])", 4),
+        ({"returns": 1}, "def f(): raise KeyError('x')", 0),
+        ({"returns": 1}, "def g(): return 1", 0),
+        ({"returns": 1}, "f = 1", 0),
+        ({"returns": 1}, "def f(", 0),
+        ({"returns": 1}, "def f(): return object()", 0),
+        ({"returns": 1}, "def f(): return float('nan')", 0),
+        ({"returns": "x"}, "def f(): return 'x' * 100_000", 0),
+        ({"returns": 1}, "import os\ndef f(): os._exit(0)", 0),
+        ({"returns": 1}, "def f():\n    while True: pass", 0),
+        ({"returns": 1}, "def f(): return 10 ** 400", 0),
+        ({"returns": 1}, "def f():\n    x = []\n    x.append(x)\n    return x", 0),
+    ],
+)
+def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, rig: Rig) -> None:
+    asked = criterion("functions", function="f", calls=[keys])
+    result = grade(
+        Submission("ada", responder=Source("responder.py", text)),
+        Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (asked,), limits=Limits(responder_cpu=0.5)),
+        rig=rig,
+    )
+    assert result.marks == marks, result.criteria[0].message
+    assert (result.verdict, result.trials) == (Verdict.FINISHED, ())
+
+
+def test_calls_are_made_one_after_the_other_in_one_process(rig: Rig) -> None:
+    text = "count = 0\ndef responder(text, more=0):\n    global count\n    count += 1\n    return count + more\n"
+    calls = [{"arguments": [""], "returns": 1}, {"arguments": [""], "named": {"more": 5}, "returns": 7}]
+    assert graded(text, rig, criterion("functions", calls=calls)).marks == 4
+
+
+def test_entries_of_a_list_are_marked_one_by_one(rig: Rig) -> None:
+    asked = criterion("functions", function="f", calls=[{"returns": ["a", "b", "c", "d"]}], each=True, at_least=0.75)
+    assert graded("def f(): return ['a', 'b', 'c', 'x']", rig, asked).marks == 4
+    assert graded("def f(): return ['a', 'b', 'x', 'x']", rig, asked).marks == 2
+    assert graded("def f(): return ['a', 'b', 'c', 'd', 'e', 'f', 'g', 'h']", rig, asked).marks == 2
+
+
+def test_first_wrong_call_is_told(rig: Rig) -> None:
+    calls = [{"arguments": [2], "returns": 4}, {"arguments": [3], "returns": 9}]
+    result = graded("def f(x): return x + x", rig, criterion("functions", function="f", calls=calls))
+    assert result.criteria[0].message == 'Expected f(3) to return "9", but it returned "6" (1 of 2 calls right).'
+    assert result.walls.startswith("Landlock")
+
+
+def test_same_functions_give_the_same_values(rig: Rig) -> None:
+    text = "import random, time\ndef f(): return [random.random(), time.time()]"
+    asked = criterion("functions", function="f", calls=[{"returns": 0}])
+    assert graded(text, rig, asked).criteria == graded(text, rig, asked).criteria
+
+
+def test_what_the_module_prints_counts_against_its_output(rig: Rig) -> None:
+    text = "def f():\n    for _ in range(100): print('x' * 100)\n    return 1\n"
+    called = call_functions(Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, rig._sandboxes, 1)
+    fault = called.returned[0].fault
+    assert fault is not None
+    assert fault.verdict is Verdict.OUTPUT_LIMIT
+
+
+# checks in Python
+
+HEAD = """
+id = "a"
+title = "A"
+[parts]
+responder = "none"
+[[scenario]]
+id = "s"
+poses = [[100, 800, 0], [100, 400, 0]]
+seconds = 5
+[[criterion]]
+id = "checked"
+title = "C"
+marks = 4
+check = "python"
+file = "check.py"
+over = "mean"
+"""
+
+
+def checked(folder: Path, check: str, rig: Rig) -> Grade:
+    folder.mkdir(exist_ok=True)
+    (folder / "assignment.toml").write_text(HEAD)
+    (folder / "check.py").write_text(check)
+    program = Source("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
+    return grade(Submission("ada", program), read_assignment(folder), rig=rig)
+
+
+def test_a_check_in_python_sees_the_recording_and_says_what_it_found(tmp_path: Path, rig: Rig) -> None:
+    text = """
+def check(trial):
+    way = trial["end"]["x"] - trial["start"]["x"]
+    same = way == trial["ticks"]["x"][-1] - 100 and len(trial["ticks"]["left_rgb"][0]) == 3
+    assert same and trial["spoken"][0][1] == "x" and trial["datalog"][0][1:] == ["Light_left", 3.0, 1.0]
+    high = trial["start"]["y"] > 500
+    return {"passed": high, "score": 0.5, "message": f"went {way:.1f} mm", "measures": {"way": way}}
+"""
+    result = checked(tmp_path / "a", text, rig).criteria[0]
+    assert result.marks == 3
+    assert "went 172.1 mm" in result.message
+    assert [(each.passed, each.measures[0].name) for each in result.evidence] == [(True, "way"), (False, "way")]
+    assert result.evidence[0].measures[0].value == pytest.approx(172.0685, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("check", "words"),
+    [
+        ("def check(trial): return 1 / 0", r"check\.py: ZeroDivisionError: division by zero \(line 1\)"),
+        ("def other(trial): return True", "there is no function called check"),
+        ("def check(trial): return 'yes'", "expected True, False or a dict"),
+        ("def check(trial): return {'passed': True, 'score': 'all'}", "score a number"),
+        ("def check(trial): return {'passed': 1}", "expected True, False or a dict"),
+        ("import os\ndef check(trial): return os.listdir('/') == []", "PermissionError"),
+        ("def check(", "SyntaxError"),
+    ],
+)
+def test_a_check_that_fails_is_the_instructors_mistake(check: str, words: str, tmp_path: Path, rig: Rig) -> None:
+    with pytest.raises(AssignmentError, match=words):
+        checked(tmp_path / "a", check, rig)
+
+
+# what does not fit together
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("check.py", "other.py"), r'file is "other\.py", expected a \.py file beside this file'),
+        (
+            ('check = "python"\nfile = "check.py"', 'check = "ranking"\nof = "x"\nmeasure = "time"\nsteps = [[1, 1]]'),
+            'of is "x"',
+        ),
+        (
+            ('check = "python"\nfile = "check.py"', 'check = "functions"\ncalls = [{ returns = 1 }]'),
+            "looks at the responder",
+        ),
+        (('responder = "none"', 'program = "none"'), "a trial runs a program"),
+    ],
+)
+def test_what_does_not_fit_together_is_named(change: tuple[str, str], words: str, tmp_path: Path) -> None:
+    (tmp_path / "assignment.toml").write_text(HEAD.replace(*change))
+    (tmp_path / "check.py").write_text("def check(trial): return True")
+    with pytest.raises(AssignmentProblems, match=words):
+        read_assignment(tmp_path)
+
+
+def test_a_run_cannot_be_judged_where_no_robot_runs(tmp_path: Path) -> None:
+    text = (
+        'id = "a"\ntitle = "A"\n[parts]\nprogram = "none"\n[[criterion]]\ntitle = "F"\nmarks = 1\ncheck = "finishes"\n'
+    )
+    (tmp_path / "assignment.toml").write_text(text)
+    with pytest.raises(AssignmentProblems, match="check judges a run of the robot"):
+        read_assignment(tmp_path)

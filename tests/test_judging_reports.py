@@ -1,0 +1,386 @@
+"""Judging what is reported, said in order, stopped on and logged, with recordings made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from service.grading.grade import CriterionResult, TrialResult
+from service.grading.judge import judge
+from service.grading.words import tokens_of, words_of
+from sim.backgrounds import floor
+from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
+from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.criteria import SCHEMAS, Criterion
+
+START = Pose(100, 800, 0)
+
+
+def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts: Any) -> Recording:
+    """A run along x at 30 mm a second, the left sensor over ``rgb`` and the right one over white."""
+    count = round(seconds * 30)
+    zeros = np.zeros(count)
+    sums = np.tile(np.array(rgb, np.int64) * 305, (count, 1))
+    white = np.full((count, 3), 255 * 305, np.int64)
+    x = 100 + np.arange(1, count + 1.0)
+    end = Pose(100 + count, 800, 0)
+    values: dict[str, Any] = {
+        "background": "Empty_Map",
+        "start": START,
+        "end": end,
+        "end_t": seconds,
+        "ticks": Ticks(x, zeros + 800, zeros, zeros, zeros, sums, white, zeros, zeros),
+        "verdict": Verdict.FINISHED,
+        "sha256": "0" * 64,
+    }
+    return Recording(**(values | parts))
+
+
+def criterion(check: str, **keys: Any) -> Criterion:
+    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
+    return made  # type: ignore[return-value]
+
+
+def judged(asked: Criterion, *recordings: Recording, poses: Sequence[Pose] = (START,)) -> CriterionResult:
+    world = WorldSpec(recordings[0].background)
+    assignment = Assignment("a", "A", world, Parts(), (Scenario("s", tuple(poses)),), (asked,))
+    trials = tuple(
+        TrialResult("s", index, 1, 0.0, 0.0, "visible", recording) for index, recording in enumerate(recordings)
+    )
+    (result,) = judge(assignment, trials)
+    return result
+
+
+def lines(*texts: str, every: float = 1.0) -> tuple[Line, ...]:
+    return tuple(Line(place * every, text) for place, text in enumerate(texts))
+
+
+# words and numbers
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("T M 1 2 9", ["t", "m", "1", "2", "9"]),
+        ("TM129!", ["tm129"]),
+        ("Tee, em; ONE-two", ["tee", "em", "1", "2"]),
+        ("one hundred and ninety", ["100", "and", "90"]),
+        ("", []),
+    ],
+)
+def test_words_without_case_and_punctuation(text: str, words: list[str]) -> None:
+    assert words_of(text) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("Light: 86.27%", [86.27]),
+        ("[211, 211,211]", [211, 211, 211]),
+        ("-3 and +4.5, 1e3", [-3, 4.5, 1000]),
+        ("v2 a1b 2nd", []),
+        ("x=.5", [0.5]),
+        ("ten", [10]),
+        ("82.", [82]),
+        ("1e999999", []),
+    ],
+)
+def test_numbers_as_python_writes_them(text: str, values: list[float]) -> None:
+    assert [token.value for token in tokens_of(text) if token.value is not None] == values
+
+
+# reports
+
+
+@pytest.mark.parametrize(
+    ("keys", "printed", "passes"),
+    [
+        ({"expected": [[86.27]]}, ["Light: 86.2745"], True),
+        ({"expected": [[86.27]]}, ["Light: 85.7"], False),
+        ({"expected": [[86.27]], "tolerance": 1}, ["Light: 85.7"], True),
+        ({"expected": [[5, "Red"]]}, ["5 red"], True),
+        ({"expected": [[5, "Red"]]}, ["Red 5"], False),
+        ({"expected": [[5, "Red"]]}, ["5", "it is Red!"], True),
+        ({"expected": [["dark grey"]], "among": ["dark grey", "black"]}, ["dark  GREY"], True),
+        ({"expected": [["dark grey"]], "among": ["dark grey", "black"]}, ["dark grey or black"], False),
+        ({"expected": [["dark"]], "among": ["dark", "light"]}, ["darker"], False),
+        ({"expected": [[3]], "only": True}, ["3"], True),
+        ({"expected": [[3]], "only": True}, ["1 2 3 4"], False),
+        ({"expected": [[3]]}, [], False),
+    ],
+)
+def test_reported_figures(keys: dict[str, Any], printed: list[str], passes: bool) -> None:
+    result = judged(criterion("reports", **keys), recorded(printed=lines(*printed)))
+    assert result.marks == (4 if passes else 0), result.message
+
+
+def test_each_pose_has_its_own_figures() -> None:
+    asked = criterion("reports", expected=[[100], [50]])
+    poses = (START, Pose(200, 800, 0))
+    right = [recorded(printed=lines("100")), recorded(printed=lines("50"))]
+    assert judged(asked, *right, poses=poses).marks == 4
+    assert judged(asked, *reversed(right), poses=poses).marks == 0
+
+
+def test_what_say_prints_as_well_is_reported_once() -> None:
+    said = lines("3", "4")
+    assert judged(criterion("reports", expected=[[3, 4]]), recorded(printed=said, spoken=said)).marks == 4
+    assert judged(criterion("reports", expected=[[3, 4, 3]]), recorded(printed=said, spoken=said)).marks == 0
+
+
+def test_replies_are_looked_at_whether_they_arrived_or_not() -> None:
+    talk = (Message(0, "robot", "IMG_DATA::{}", 0), Message(0, "responder", '{"rows": 7}', None, 0, "undelivered"))
+    asked = criterion("reports", source="reply", expected=[["rows", 7]])
+    assert judged(asked, recorded(messages=talk)).marks == 4
+    assert "did not answer anything" in judged(asked, recorded()).message
+
+
+def test_label_of_the_floor_is_what_has_to_be_reported() -> None:
+    start = Pose(600, 750, 90)
+    label = floor("MNIST_Digits", seed=34).label_at(580, 780)
+    asked = criterion("reports", expected="label", only=True)
+    told = recorded(background="MNIST_Digits", sheet=34, start=start, printed=lines(f"Label: {label}"))
+    assert judged(asked, told, poses=(start,)).marks == 4
+    wrong = replace(told, printed=lines(f"Label: {(int(label or 0) + 1) % 10}"))
+    assert judged(asked, wrong, poses=(start,)).marks == 0
+
+
+# sequence
+
+
+@pytest.mark.parametrize(
+    ("keys", "said", "marks"),
+    [
+        ({}, ["1", "2", "3"], 4),
+        ({}, ["one two", "three"], 4),
+        ({}, ["1 2 3 4"], 0),
+        ({"more": True}, ["1 2 3 4"], 4),
+        ({}, ["I count 1 2 3"], 0),
+        ({"lead_in": True}, ["I count one", "1 2 3"], 4),
+        ({"lead_in": True}, ["1 2", "and 3"], 0),
+        ({}, ["123"], 0),
+        ({"over": "mean"}, ["1", "2"], Decimal("2.67")),
+        ({}, [], 0),
+    ],
+)
+def test_words_in_sequence(keys: dict[str, Any], said: list[str], marks: Decimal) -> None:
+    result = judged(criterion("sequence", words=["1", "2", "3"], **keys), recorded(spoken=lines(*said)))
+    assert result.marks == marks, result.message
+
+
+def test_a_word_may_be_any_of_a_list() -> None:
+    asked = criterion("sequence", words=[["T", "tee"], ["M", "em"]])
+    assert judged(asked, recorded(spoken=lines("Tee em"))).marks == 4
+    assert judged(asked, recorded(spoken=lines("TM"))).marks == 0
+
+
+def test_nothing_is_said_before_the_word_before_has_been_spoken() -> None:
+    asked = criterion("sequence", words=["1", "2"], waits=True)
+    assert judged(asked, recorded(spoken=lines("1", "2", every=0.47))).marks == 4
+    hurried = judged(asked, recorded(spoken=lines("1", "2", every=0.44)))
+    assert hurried.marks == 0
+    assert "while it was still speaking" in hurried.message
+
+
+# events
+
+BANDS = [{"text": "1", "zone": [120, 700, 140, 900]}, {"text": ["2", "two"], "zone": [160, 700, 180, 900]}]
+
+
+@pytest.mark.parametrize(
+    ("times", "marks"),
+    # The left sensor is 30 mm ahead and moves at 30 mm a second from x = 130.
+    [((0.1, 1.2), 4), ((0.1, 0.9), 2), ((1.2, 0.1), 0), ((0.1, 2.0), 2), ((0.1,), 2)],
+)
+def test_each_event_happens_at_its_place(times: tuple[float, ...], marks: int) -> None:
+    said = tuple(Line(t, text) for t, text in zip(times, ("band 1", "band two"), strict=False))
+    result = judged(criterion("events", events=BANDS, over="mean"), recorded(spoken=said))
+    assert result.marks == marks, result.message
+
+
+def test_margin_widens_every_zone() -> None:
+    said = (Line(0.1, "1"), Line(2.0, "2"))
+    assert judged(criterion("events", events=BANDS, margin=15), recorded(spoken=said)).marks == 4
+
+
+# stop on
+
+
+@pytest.mark.parametrize(
+    ("keys", "passes"),
+    [
+        ({"reflected": [0, 5]}, True),
+        ({"reflected": [5, 100]}, False),
+        ({"rgb": [0, 0, 0]}, True),
+        ({"rgb": [255, 0, 0]}, False),
+        ({"sensor": "right", "reflected": [100, 100]}, True),
+        ({"sensor": "either", "reflected": [100, 100]}, True),
+        # The left sensor ends 30 mm ahead of (190, 800) and 20 mm to the left.
+        ({"near": [220, 820], "within": 1}, True),
+        ({"near": [220, 780], "within": 1}, False),
+        ({"zone": [215, 815, 225, 825]}, True),
+        ({"zone": [180, 790, 200, 810]}, False),
+        ({"reflected": [0, 5], "still": 0.5}, False),
+    ],
+)
+def test_what_the_sensor_stops_on(keys: dict[str, Any], passes: bool) -> None:
+    result = judged(criterion("stop_on", **keys), recorded(rgb=(0, 0, 0)))
+    assert result.marks == (4 if passes else 0), result.message
+
+
+@pytest.mark.parametrize(("verdict", "marks"), [(Verdict.TIME_LIMIT, 0), (Verdict.PROGRAM_ERROR, 4)])
+def test_a_program_that_is_still_running_has_not_stopped(verdict: Verdict, marks: int) -> None:
+    cut = recorded(rgb=(0, 0, 0), verdict=verdict, faults=(Fault(3.0, verdict, "program", "x", 7),))
+    assert judged(criterion("stop_on", reflected=[0, 5]), cut).marks == marks
+
+
+def test_a_robot_without_a_tick_has_not_stopped_on_anything() -> None:
+    assert judged(criterion("stop_on", reflected=[0, 5]), recorded(seconds=0, rgb=(0, 0, 0))).marks == 0
+
+
+# datalog
+
+
+def series(*values: float, name: str = "Light_left", timed: bool = True) -> tuple[Datum, ...]:
+    return tuple(Datum(float(t), name, value, float(t) if timed else None) for t, value in enumerate(values))
+
+
+@pytest.mark.parametrize(
+    ("keys", "values", "marks"),
+    [
+        ({"at_least": 3}, [1, 2, 3], 4),
+        ({"at_least": 4, "over": "mean"}, [1, 2, 3], 3),
+        ({"at_most": 2}, [1, 2, 3], 0),
+        ({"plateaus": [100, 0]}, [100, 100, 50, 0, 0], 4),
+        ({"plateaus": [100, 0]}, [100, 0, 100, 0], 0),
+        ({"plateaus": [100, 0], "plateau_samples": 1}, [100, 0], 4),
+        ({"plateaus": [0, 100], "over": "mean"}, [100, 100, 0, 0], 2),
+        ({"between": [0, 100]}, [0, 100], 4),
+        ({"between": [0, 100]}, [0, 101], 0),
+        ({"covers": [10, 90]}, [5, 95], 4),
+        ({"covers": [10, 90]}, [15, 95], 0),
+        ({}, [], 0),
+    ],
+)
+def test_series_of_the_datalog(keys: dict[str, Any], values: list[float], marks: int) -> None:
+    result = judged(criterion("datalog", series="Light_left", **keys), recorded(datalog=series(*values)))
+    assert result.marks == marks, result.message
+
+
+def test_one_series_dips_below_another_and_samples_have_times() -> None:
+    both = series(50, 20, name="Light_right") + series(50, 30)
+    assert judged(criterion("datalog", series="Light_right", dips_below="Light_left"), recorded(datalog=both)).marks
+    assert not judged(criterion("datalog", series="Light_left", dips_below="Light_right"), recorded(datalog=both)).marks
+    untimed = recorded(datalog=series(1, 2, timed=False))
+    assert not judged(criterion("datalog", series="Light_left", timed=True), untimed).marks
+
+
+# image log
+
+
+def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tuple[str, str, int]:
+    """What the sensor sees at ``pose`` on sheet 34, from the picture itself."""
+    picture = floor("MNIST_Digits", seed=34).picture
+    column = int(pose.x) - (30 if side == "left" else -10)
+    row = 1143 - int(pose.y) - 40
+    pixels = np.full((20, 20, 4), 255, np.uint8)
+    crop = picture[row : row + 20, column : column + 20].astype(int)
+    pixels[:, :, :3] = np.clip(crop + noise, 0, 255)
+    return side, ",".join(map(str, pixels.ravel().tolist())), tick
+
+
+def test_image_log_shows_what_lies_at_the_start() -> None:
+    pose = Pose(600, 750, 90)
+    asked = criterion("image_log", left=1, right=1, pairs=True, at_start=True, uniform="right")
+
+    def run(*log: tuple[str, str, int]) -> Recording:
+        return recorded(background="MNIST_Digits", sheet=34, start=pose, end=pose, image_log=log)
+
+    pair = (image(pose), image(pose, "right"))
+    assert judged(asked, run(*pair), poses=(pose,)).marks == 4
+    assert judged(asked, run(*reversed(pair)), poses=(pose,)).marks == 0
+    assert judged(asked, run(pair[0]), poses=(pose,)).marks == 0
+    moved = Pose(603, 750, 90)
+    elsewhere = judged(asked, run(image(moved), image(moved, "right")), poses=(pose,))
+    assert "taken at the start pose" in elsewhere.message
+    assert judged(asked, run(*pair, *pair), poses=(pose,)).marks == 0
+
+
+def test_image_log_without_images_has_no_marks() -> None:
+    result = judged(criterion("image_log", at_start=True), recorded(background="MNIST_Digits"))
+    assert "there is none" in result.message
+
+
+# time and ranks
+
+
+def test_time_of_program_movement_and_speech() -> None:
+    run = recorded(spoken=lines("one two", every=1))
+    assert judged(criterion("timing", between=[2.9, 3.1]), run).marks == 4
+    assert judged(criterion("timing", of="moving", between=[2.9, 3.1]), run).marks == 4
+    assert judged(criterion("timing", of="speech", between=[0.9, 0.95]), run).marks == 4
+    late = judged(criterion("timing", between=[1, 2]), run)
+    assert late.marks == 0
+    assert "to take from 1 to 2 s, but it took 3.00 s" in late.message
+
+
+@pytest.mark.parametrize(
+    ("steps", "highest", "marks"),
+    [
+        ([[3, 1], [10, 0.5]], False, 4),
+        ([[2, 1], [10, 0.5]], False, 2),
+        ([[1, 1], [2, 0.5]], False, 0),
+        ([[3, 1], [1, 0.5]], True, 4),
+        ([[5, 1], [1, 0.25]], True, 1),
+    ],
+)
+def test_figure_of_another_criterion_is_worth_marks_by_steps(
+    steps: list[list[float]], highest: bool, marks: int
+) -> None:
+    ranked = criterion("ranking", of="ends", measure="time", steps=steps, highest=highest)
+    ends = criterion("finishes").model_copy(update={"id": "ends"})
+    assignment = Assignment("a", "A", WorldSpec(), Parts(), (Scenario("s", (START,)),), (ranked, ends))
+
+    def marks_of(recording: Recording) -> Decimal:
+        results = judge(assignment, (TrialResult("s", 0, 1, 0.0, 0.0, "visible", recording),))
+        assert [result.id for result in results] == ["c", "ends"]
+        return results[0].marks
+
+    assert marks_of(recorded()) == marks
+    assert marks_of(recorded(verdict=Verdict.TIME_LIMIT)) == 0
+
+
+# what cannot be asked
+
+
+@pytest.mark.parametrize(
+    ("check", "keys", "words"),
+    [
+        ("stop_on", {}, "asks for nothing"),
+        ("stop_on", {"zone": [2, 2, 1, 3]}, "expected \\[left, bottom, right, top\\]"),
+        ("reports", {"expected": "digit"}, "one for each pose"),
+        ("reports", {"expected": [[]]}, "one for each pose"),
+        ("reports", {"expected": [[True]]}, "one for each pose"),
+        ("sequence", {"words": ["-"]}, "without a letter or digit"),
+        ("sequence", {"words": ["1"], "source": "print", "waits": True}, "waits"),
+        ("datalog", {"series": "Light_left", "plateaus": [100, 100.5]}, "two plateaus in a row"),
+        ("datalog", {"series": "Light_left", "between": [5, 1]}, "empty range"),
+        ("image_log", {}, "asks for nothing"),
+        ("timing", {"between": [3, 1]}, "empty range"),
+        ("ranking", {"of": "a", "measure": "m", "steps": [[1, 0.5], [2, 1]]}, "the best first"),
+        ("source", {}, "asks for nothing"),
+        ("source", {"flags": ["-y"]}, "needs a value"),
+        ("source", {"in_loop": ["say"]}, "expected calls"),
+        ("functions", {"calls": [{"returns": 1}], "each": True}, "expected a list in every returns"),
+        ("functions", {"calls": [{"returns": 1}], "at_least": 0.5}, "at_least without each"),
+    ],
+)
+def test_criterion_that_cannot_be_asked_is_refused(check: str, keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        criterion(check, **keys)
