@@ -1,0 +1,10 @@
+%%sim_magic_preloaded -b Radial_grey
+# Crossed: the lighter side drives the other motor, and turns the robot towards the light.
+left_light = colorLeft.reflected_light_intensity_pc
+right_light = colorRight.reflected_light_intensity_pc
+
+while left_light > 5 and right_light > 5:
+    tank_drive.on(SpeedPercent(right_light), SpeedPercent(left_light))
+
+    left_light = colorLeft.reflected_light_intensity_pc
+    right_light = colorRight.reflected_light_intensity_pc

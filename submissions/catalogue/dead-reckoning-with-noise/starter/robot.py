@@ -1,0 +1,20 @@
+%%sim_magic_preloaded -b FLL_2018_Into_Orbit -r Small_Robot -x 150 -y 150 -a 90 -p
+"""Drive to the satellite at (1250, 430) by distances and angles alone; the noise is switched on for you."""
+
+MM_PER_ROTATION = 44  # half of the wheels' circumference, 88 mm
+DEGREES_PER_ROTATION = 56
+
+
+def forwards(mm):
+    tank_drive.on_for_rotations(SpeedPercent(20), SpeedPercent(20), mm / MM_PER_ROTATION)
+
+
+def turn_left(degrees):
+    tank_turn.on_for_rotations(-100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+def turn_right(degrees):
+    tank_turn.on_for_rotations(100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+# TODO: take your program that reaches the satellite.

@@ -1,0 +1,4 @@
+%%sim_magic_preloaded -b MNIST_Digits -x 100 -y 50 -a 90
+# Log what the left light sensor sees.
+
+print("TODO")

@@ -1,0 +1,2 @@
+%%sim_magic_preloaded -b WRO_2018_Regular_Junior -x 1180 -y 150 -a 90
+tank_drive.on_for_rotations(SpeedPercent(40), SpeedPercent(40), 9.4)

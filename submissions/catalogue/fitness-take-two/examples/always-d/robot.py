@@ -1,0 +1,4 @@
+%%sim_magic_preloaded -b Empty_Map -x 200 -y 800
+for factor in range(1, 4):
+    tank_drive.on_for_rotations(SpeedPercent(40), SpeedPercent(40), 2)
+    tank_drive.on_for_rotations(SpeedPercent(-40), SpeedPercent(-40), 2)

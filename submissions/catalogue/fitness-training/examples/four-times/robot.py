@@ -1,0 +1,5 @@
+%%sim_magic_preloaded -b Empty_Map -x 200 -y 800
+for exercise in range(1, 5):
+    tank_drive.on_for_rotations(SpeedPercent(50), SpeedPercent(50), 2)
+    tank_drive.on_for_rotations(SpeedPercent(-50), SpeedPercent(-50), 2)
+    say(str(exercise))

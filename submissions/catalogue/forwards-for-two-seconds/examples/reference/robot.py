@@ -1,0 +1,2 @@
+%%sim_magic_preloaded -b Empty_Map -x 200 -y 800
+tank_drive.on_for_seconds(SpeedPercent(50), SpeedPercent(50), 2)

@@ -1,0 +1,5 @@
+%%sim_magic_preloaded -b Empty_Map -x 200 -y 800
+"""Drive forwards for two seconds, then stop."""
+
+# TODO: this drives for how long?
+tank_drive.on_for_rotations(SpeedPercent(50), SpeedPercent(50), 2)

@@ -1,0 +1,3 @@
+%%sim_magic_preloaded -b MNIST_Digits -x 100 -y 50 -a 90
+print("image_data both")
+print("Label: " + str(round(colorRight.reflected_light_intensity / 25)))

@@ -1,0 +1,2 @@
+%%sim_magic -b Simple_Shapes -OAHWR
+print("Hello from my own cell")

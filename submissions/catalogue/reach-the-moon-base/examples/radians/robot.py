@@ -1,0 +1,21 @@
+%%sim_magic_preloaded -b FLL_2018_Into_Orbit -r Small_Robot -x 1250 -y 450 -a 90
+import math
+MM_PER_ROTATION = 44  # half of the wheels' circumference, 88 mm
+DEGREES_PER_ROTATION = 56
+
+
+def forwards(mm):
+    tank_drive.on_for_rotations(SpeedPercent(20), SpeedPercent(20), mm / MM_PER_ROTATION)
+
+
+def turn_left(degrees):
+    tank_turn.on_for_rotations(-100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+def turn_right(degrees):
+    tank_turn.on_for_rotations(100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+# The angle is in radians here, but turn_right takes degrees.
+turn_right(90 - math.atan2(500, 900))
+forwards(math.hypot(900, 500))

@@ -1,0 +1,20 @@
+%%sim_magic_preloaded -b FLL_2018_Into_Orbit -r Small_Robot -x 1250 -y 450 -a 90
+"""Drive from (1250, 450), facing up, to the moon base at (2150, 950)."""
+
+MM_PER_ROTATION = 44  # half of the wheels' circumference, 88 mm
+DEGREES_PER_ROTATION = 56
+
+
+def forwards(mm):
+    tank_drive.on_for_rotations(SpeedPercent(20), SpeedPercent(20), mm / MM_PER_ROTATION)
+
+
+def turn_left(degrees):
+    tank_turn.on_for_rotations(-100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+def turn_right(degrees):
+    tank_turn.on_for_rotations(100, SpeedPercent(5), degrees / DEGREES_PER_ROTATION)
+
+
+# TODO: work out the angle and the distance.

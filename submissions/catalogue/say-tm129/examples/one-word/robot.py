@@ -1,0 +1,2 @@
+%%sim_magic_preloaded
+say("Hello, this is TM129")

@@ -1,0 +1,3 @@
+import time
+
+# Drive, and print("IMG_DATA") again and again.
