@@ -11,17 +11,64 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
+from typing import Any
 
+from models.intervals import wilson
 from sim.errors import HostError, UsageError
+
+Confusion = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
-    """How often the classifier is right under one condition, such as ``light noise 32``: right of n."""
+class Tally:
+    """How many of ``n`` pictures were named rightly."""
 
-    name: str
     right: int
     n: int
+
+    @property
+    def share(self) -> float:
+        return self.right / self.n if self.n else 0.0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the share, by Wilson."""
+        return wilson(self.right, self.n)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Tallies while one condition is varied and the rest stays as ``under`` says."""
+
+    varied: str
+    unit: str
+    under: str
+    values: tuple[float, ...]  # ascending
+    tallies: tuple[Tally, ...]  # one a value
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a test of a classifier found."""
+
+    accuracy: Tally  # of everything in the confusion
+    confusion: Confusion  # rows are the truth, columns what was answered
+    curves: tuple[Curve, ...]
+
+    @classmethod
+    def from_plain(cls, data: Mapping[str, Any]) -> Measured:
+        """From what ``asdict`` and JSON have made of one."""
+        curves = tuple(
+            Curve(
+                curve["varied"],
+                curve["unit"],
+                curve["under"],
+                tuple(curve["values"]),
+                tuple(Tally(**tally) for tally in curve["tallies"]),
+            )
+            for curve in data["curves"]
+        )
+        return cls(Tally(**data["accuracy"]), tuple(tuple(row) for row in data["confusion"]), curves)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,23 +82,22 @@ class Card:
     preprocessing: str
     training_data: str
     training_images: int
+    test_data: str
     seed: int
     classes: tuple[str, ...]
-    conditions: tuple[Condition, ...]
-    confusion: tuple[tuple[int, ...], ...]  # rows are the truth, over all conditions
+    measured: Measured
     libraries: Mapping[str, str]
     sha256: str  # of the weights file
 
     def to_json(self) -> str:
         """Text that does not change unless the card does."""
-        return json.dumps(asdict(self), indent=2, sort_keys=True) + "\n"
+        return json.dumps(asdict(self), indent=1, sort_keys=True) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Card:
         data = json.loads(text)
         data["classes"] = tuple(data["classes"])
-        data["conditions"] = tuple(Condition(**condition) for condition in data["conditions"])
-        data["confusion"] = tuple(tuple(row) for row in data["confusion"])
+        data["measured"] = Measured.from_plain(data["measured"])
         return cls(**data)
 
 

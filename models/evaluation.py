@@ -1,32 +1,119 @@
-"""Measures a packaged classifier again, here and now, and says how that compares with its card."""
+"""Measures a classifier: how often it names rightly what a robot sees, and how that falls as conditions get harder.
+
+It draws nothing; tables and plots of what was found are the service's.
+"""
 
 from __future__ import annotations
 
-import io
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
-import joblib
+import numpy as np
+from numpy.typing import NDArray
 
-from models import shapes
-from models.cards import Card, Condition, card, weights_bytes
+from models import digits, networks, shapes
+from models.cards import Card, Curve, Measured, Tally, card, weights_bytes
+from models.preprocessing import Grey, features
+from models.tasks import Task
+from models.views import Place, Shift, Viewer
+
+TASKS = {task.name: task for task in (digits.DIGITS, digits.DIGITS_28, shapes.TASK)}
+
+Axis = Literal["x", "y", "heading", "noise"]
+
+_LIGHT_NOISES: tuple[float, ...] = (0, 10, 32, 64, 96, 128)
+_MILLIMETRES: tuple[float, ...] = (-6, -4, -3, -2, -1, 0, 1, 2, 3, 4, 6)
+_DEGREES: tuple[float, ...] = (-8, -5, -3, -2, -1, -0.5, 0, 0.5, 1, 2, 3, 5, 8)
+
+
+class Network(Protocol):
+    """What can be measured."""
+
+    def predict(self, images: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The class number of each row."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """One picture of the test: where it was taken, what it shows, and what it was taken for."""
+
+    place: Place
+    noise: float
+    grey: Grey
+    answer: int
+
+    @property
+    def right(self) -> bool:
+        return self.answer == self.place.label
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What was measured: conditions and confusion (rows are the truth)."""
+    """What was measured here and now, beside what the card says; ``answered`` are the pictures in the confusion."""
 
     card: Card
-    conditions: tuple[Condition, ...]
-    confusion: tuple[tuple[int, ...], ...]
+    measured: Measured
+    answered: tuple[Answered, ...]
 
 
 def evaluate(name: str) -> Evaluation:
-    """Run the packaged classifier over every test condition. Raises UsageError for an unknown name."""
+    """Run the packaged classifier over its whole test. Raises UsageError for an unknown name."""
     about = card(name)
-    network = joblib.load(io.BytesIO(weights_bytes(name)))
-    source = shapes.ShapeSource()
-    try:
-        conditions, confusion = shapes.evaluate(network, source)
-    finally:
-        source.close()
-    return Evaluation(about, conditions, confusion)
+    measured, answered = measure(TASKS[name], networks.read(weights_bytes(name)))
+    return Evaluation(about, measured, answered)
+
+
+def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...]]:
+    """The whole test of ``task``, and the pictures that its accuracy counts."""
+    with Viewer() as viewer:
+        answered = tuple(_accuracy(task, network, viewer))
+        curves = tuple(_curves(task, network, viewer))
+    confusion = np.zeros((len(task.classes), len(task.classes)), np.int64)
+    for each in answered:
+        confusion[each.place.label, each.answer] += 1
+    table = tuple(tuple(int(count) for count in row) for row in confusion)
+    return Measured(Tally(int(np.trace(confusion)), len(answered)), table, curves), answered
+
+
+def _accuracy(task: Task, network: Network, viewer: Viewer) -> Iterator[Answered]:
+    test = task.test()
+    for noise, draws in test.noises:
+        found = list(viewer.draws(test.places, Shift(noise=noise), "accuracy", draws))
+        answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
+        for (place, grey), answer in zip(found, answers, strict=True):
+            yield Answered(place, noise, grey, int(answer))
+
+
+def _curves(task: Task, network: Network, viewer: Viewer) -> Iterator[Curve]:
+    words = ("light noise", "grey levels either way", "on the spot")
+    yield _curve(task, network, viewer, words, _LIGHT_NOISES, Shift(), "noise")
+    sweeps: tuple[tuple[str, str, tuple[float, ...], Axis], ...] = (
+        ("offset in x", "mm", _MILLIMETRES, "x"),
+        ("offset in y", "mm", _MILLIMETRES, "y"),
+        ("heading", "degrees", _DEGREES, "heading"),
+    )
+    for varied, unit, values, axis in sweeps:
+        for noise in task.test().noises_beside:
+            words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
+            yield _curve(task, network, viewer, words, values, Shift(noise=noise), axis)
+
+
+def _curve(
+    task: Task,
+    network: Network,
+    viewer: Viewer,
+    words: tuple[str, str, str],
+    values: Sequence[float],
+    rest: Shift,
+    axis: Axis,
+) -> Curve:
+    test = task.test()
+    tallies = []
+    for value in values:
+        found = list(viewer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws))
+        answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
+        right = sum(place.label == answer for (place, _), answer in zip(found, answers, strict=True))
+        tallies.append(Tally(int(right), len(found)))
+    return Curve(*words, tuple(float(value) for value in values), tuple(tallies))

@@ -42,6 +42,13 @@ def list_assignments() -> None:
     Console().print(table)
 
 
+def _cell(which: str) -> str:
+    """The marked robot program of a notebook, in words."""
+    if which.isdecimal():
+        return f"robot program {which}"
+    return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'
+
+
 @assignments_app.command()
 def show(assignment: Which) -> None:
     """What an assignment asks for, and how it is marked."""
@@ -53,7 +60,7 @@ def show(assignment: Which) -> None:
         console.print(Text(_flowing(readable(found.description.strip(), 20_000, lines=500))))
     console.print(
         f"\nworld: {found.world.background}, robot {found.world.robot}; "
-        f"program: {found.parts.program}, responder: {found.parts.responder}",
+        f"program: {found.parts.program}, responder: {found.parts.responder}; of a notebook: {_cell(found.parts.cell)}",
         highlight=False,
         markup=False,
     )

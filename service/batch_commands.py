@@ -5,10 +5,8 @@ Reading the folder is ``preflight.py``; the grading itself is the workers'.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated
 
 import typer
@@ -16,29 +14,25 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from responders.sandbox.manager import Sandboxes
 from service.batch_control_commands import BatchId, cancel, pause, resume, retry
 from service.batch_export_command import export
+from service.batch_regrade_commands import publish, regrade
+from service.batch_tables import changes_table, history_table, marks_table, summary
+from service.batch_waiting import marks_awaited
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
-from service.queue.embedded import EmbeddedServices
 from service.queue.logs import configure_logging
 from service.queue.nudges import Nudger
 from service.report_files import write_batch
 from service.reports.written import prepare_folder
 from service.settings import Settings, load_settings
-from service.store import batches, intake
-from service.store.batches import BatchLine, JobLine
+from service.store import audit, batches, figures, intake, regrades
+from service.store.batches import JobLine
 from service.store.engine import Store, open_store
-from service.store.models import BatchState, JobState, Lane
-from service.waiting import Waiting
+from service.store.models import JobState, Lane
 from sim.errors import Cancelled, HostError, UsageError
 
 batch_app = typer.Typer(help="Grade many hand-ins through the queue.", no_args_is_help=True)
-
-_STYLES: Mapping[JobState, str] = MappingProxyType(
-    {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
-)
 
 
 @batch_app.command()
@@ -126,7 +120,7 @@ def list_batches() -> None:
     table = Table("batch", "name", "taken in", "hand-ins", "refused", "state", box=None, pad_edge=False)
     for line in lines:
         when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        row = (line.id, line.name, when, str(line.jobs), str(len(line.problems)), _summary(line))
+        row = (line.id, line.name, when, str(line.jobs), str(len(line.problems)), summary(line))
         table.add_row(*map(Text, row))
     Console().print(table)
 
@@ -138,10 +132,20 @@ def status(batch: BatchId) -> None:
     with open_store(settings) as store, store.reading() as session:
         line = batches.batch(session, batches.find_batch(session, batch))
         lines = batches.job_lines(session, line.id)
+        changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
+        waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, line.id)
+        history = audit.entries(session, "batch", line.id)
+        pace = figures.pace(session, line.id)
     console = Console()
-    console.print(Text(f"batch {line.id}: {line.name}: {_summary(line)}"))
+    console.print(Text(f"batch {line.id}: {line.name}: {summary(line)}"))
+    if pace is not None:
+        console.print(f"{pace.per_minute:.0f} a minute, {pace.left} left", highlight=False)
     _print_problems(line.problems, console)
-    console.print(_marks_table(lines))
+    console.print(marks_table(lines) if line.regrade_of is None else changes_table(changes))
+    if waiting:
+        console.print(f"{waiting} regrades are done and not published: robomark batch publish {line.id}")
+    if history:
+        console.print(history_table(history))
 
 
 batch_app.command()(export)
@@ -149,6 +153,8 @@ batch_app.command()(pause)
 batch_app.command()(resume)
 batch_app.command()(cancel)
 batch_app.command()(retry)
+batch_app.command()(regrade)
+batch_app.command()(publish)
 
 
 def _checked(hand_ins: Path, assignment: str | None, console: Console) -> Preflight:
@@ -171,60 +177,43 @@ def _accept(
     if accepted.known:
         table = Table("nothing new of", "why", box=None, pad_edge=False)
         for known in accepted.known:
-            dead = f", dead: robomark batch retry {known.batch_id}" if known.state is JobState.DEAD else ""
-            table.add_row(Text(known.student), Text(f"already handed in as {known.job_id}{dead}"))
+            table.add_row(Text(known.student), Text(f"already handed in as {known.job_id}{_hint(known)}"))
         console.print(table)
     if accepted.batch is None:
         console.print("nothing new; --again grades it again", highlight=False)
     else:
-        console.print(f"batch {accepted.batch.id}: {_new(accepted)} queued", highlight=False)
+        copied = sum(job.copied_from is not None for job in accepted.batch.jobs)
+        alike = f"; {copied} identical to a graded one, and so graded already" if copied else ""
+        console.print(f"batch {accepted.batch.id}: {_new(accepted)} queued{alike}", highlight=False)
+        over = [job for job in accepted.batch.jobs if job.staff_only]
+        if over:
+            table = Table("for staff only", "why", box=None, pad_edge=False)
+            for job in over:
+                table.add_row(Text(job.student), Text(job.staff_only))
+            console.print(table)
     return accepted
 
 
+def _hint(known: intake.Known) -> str:
+    if known.state is JobState.DEAD:
+        return f", dead: robomark batch retry {known.batch_id}"
+    if known.other_grader and known.batch_id is not None:
+        return f", by another version of the grader: robomark batch regrade {known.batch_id}"
+    return ""
+
+
 def _new(accepted: intake.AcceptedNew) -> int:
-    return 0 if accepted.batch is None else len(accepted.batch.jobs)
+    return 0 if accepted.batch is None else sum(job.copied_from is None for job in accepted.batch.jobs)
 
 
 def _wait(store: Store, settings: Settings, accepted: intake.AcceptedNew, console: Console) -> list[JobLine]:
     """Wait for the marks of what was new and of what was known, show them, and wait for the plots."""
-    unfinished = _unfinished(store, accepted, console)
-    with ExitStack() as services:
-        waiting: list[Waiting] = []
-        if unfinished:
-            if settings.broker_url:
-                broker, keep_up = settings, _nothing
-            else:
-                with Sandboxes() as sandboxes:
-                    # Here the reason can be said; a worker that refuses would only be seen to end.
-                    sandboxes.check()
-                embedded = services.enter_context(EmbeddedServices(settings, store))
-                broker, keep_up = embedded.settings, embedded.ensure
-            nudger = _nudger(broker, store)
-            nudger.grade(Lane.BATCH, _new(accepted))
-            waiting = [Waiting(store, nudger, batch_id, console, keep_up) for batch_id in unfinished]
-        for each in waiting:
-            each.for_marks()
-        lines = _lines(store, accepted)
-        console.print(_marks_table(lines))
-        for each in waiting:
-            each.for_plots()
-    return lines
-
-
-def _unfinished(store: Store, accepted: intake.AcceptedNew, console: Console) -> list[str]:
-    """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
     own = [] if accepted.batch is None else [accepted.batch.id]
-    unfinished = []
-    with store.reading() as session:
-        for batch_id in dict.fromkeys([*own, *(known.batch_id for known in accepted.known if known.batch_id)]):
-            far = batches.progress(session, batch_id)
-            if far.ended == far.jobs and not far.plots_due:
-                continue
-            if batches.batch(session, batch_id).state is BatchState.OPEN:
-                unfinished.append(batch_id)
-            else:
-                console.print(f"batch {batch_id} is paused: robomark batch resume {batch_id}", highlight=False)
-    return unfinished
+    batch_ids = [*own, *(known.batch_id for known in accepted.known if known.batch_id)]
+    with marks_awaited(store, settings, batch_ids, _new(accepted), console):
+        lines = _lines(store, accepted)
+        console.print(marks_table(lines))
+    return lines
 
 
 def _lines(store: Store, accepted: intake.AcceptedNew) -> list[JobLine]:
@@ -233,10 +222,6 @@ def _lines(store: Store, accepted: intake.AcceptedNew) -> list[JobLine]:
         if accepted.batch is not None:
             lines += batches.job_lines(session, accepted.batch.id)
     return sorted(lines, key=lambda line: (line.student, line.id))
-
-
-def _nothing() -> None:
-    """Services that are not ours are kept up by others."""
 
 
 def _nudger(settings: Settings, store: Store) -> Nudger:
@@ -250,32 +235,3 @@ def _print_problems(problems: Sequence[tuple[str, str]], console: Console) -> No
     for name, sentence in problems:
         table.add_row(Text(name), Text(sentence))
     console.print(table)
-
-
-def _summary(line: BatchLine) -> str:
-    parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
-    return held + (", ".join(parts) or "empty")
-
-
-def _marks_table(lines: Sequence[JobLine]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("student", "assignment"):
-        table.add_column(heading, overflow="fold")
-    table.add_column("marks", justify="right")
-    table.add_column("accuracy", justify="right")
-    for heading in ("verdict", "grade"):
-        table.add_column(heading)
-    for line in lines:
-        marks = "" if line.marks is None else f"{line.marks.normalize():f} / {line.max_marks.normalize():f}"
-        accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
-        outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
-        table.add_row(
-            Text(line.student),
-            Text(line.assignment),
-            marks,
-            accuracy,
-            Text(outcome, style=_STYLES.get(line.state, "")),
-            line.id,
-        )
-    return table

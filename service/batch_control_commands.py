@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from service.settings import load_settings
-from service.store import batch_control, batches
+from service.store import audit, batch_control, batches
 from service.store.engine import Store, open_store
 from sim.errors import UsageError
 
@@ -21,7 +21,7 @@ def pause(batch: BatchId) -> None:
     """Begin no more of a batch; what is being graded is graded to its end."""
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
-        held = batch_control.pause(store, batch_id)
+        held = batch_control.pause(store, batch_id, actor=audit.this_user())
     was = "is paused" if held.changed else "was paused already"
     print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} graded to their end")
 
@@ -30,7 +30,7 @@ def resume(batch: BatchId) -> None:
     """Let a paused batch go on."""
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
-        held = batch_control.resume(store, batch_id)
+        held = batch_control.resume(store, batch_id, actor=audit.this_user())
     was = "goes on" if held.changed else "was not paused"
     print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} being graded")
 
@@ -39,7 +39,7 @@ def cancel(batch: BatchId) -> None:
     """End what of a batch is not graded yet; marks that are there stay."""
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
-        ended = batch_control.cancel(store, batch_id)
+        ended = batch_control.cancel(store, batch_id, actor=audit.this_user())
     if ended.changed:
         print(f"batch {batch_id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
     else:
@@ -55,7 +55,7 @@ def retry(
         raise UsageError("name one batch, or --all for the dead of all batches")
     with open_store(load_settings()) as store:
         batch_id = None if batch is None else _find(store, batch)
-        retried = batch_control.retry(store, batch_id)
+        retried = batch_control.retry(store, batch_id, actor=audit.this_user())
     where = "all batches" if batch_id is None else f"batch {batch_id}"
     if retried.queued + retried.outdated == 0:
         print(f"{where}: nothing changed, no hand-in is dead")

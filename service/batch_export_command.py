@@ -24,7 +24,7 @@ from service.reports.json_output import json_document
 from service.reports.junit import junit_text
 from service.reports.written import file_name
 from service.settings import load_settings
-from service.store import batches, grades
+from service.store import batches, grades, regrades
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.models import JobState
@@ -58,6 +58,7 @@ def export(
             "-o", "--out", "--output", help="A file instead of the screen; for gradescope and junit, a folder."
         ),
     ] = None,
+    published: Annotated[bool, typer.Option("--published", help="Only the grades that are published.")] = False,
 ) -> None:
     """The marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON."""
     each = _FOR_EACH.get(form)
@@ -65,8 +66,12 @@ def export(
         raise UsageError(f"{form.value} is a file for each hand-in; name a folder with --out")
     with open_store(load_settings()) as store:
         with store.reading() as session:
-            lines = batches.job_lines(session, batches.find_batch(session, batch))
-        graded = [line for line in lines if line.state is JobState.DONE]
+            batch_id = batches.find_batch(session, batch)
+            lines = batches.job_lines(session, batch_id)
+            waiting = regrades.unpublished_regrades(session, batch_id)
+        graded = _exported(lines, published=published)
+        if waiting:
+            print(f"robomark: {waiting} regrades are not published: these are the grades that stand", file=sys.stderr)
         if each is not None and output is not None:
             _write_each(store, graded, each, output)
             return
@@ -75,6 +80,16 @@ def export(
         sys.stdout.write(text)
     else:
         _write(output, text)
+
+
+def _exported(lines: Sequence[JobLine], *, published: bool) -> list[JobLine]:
+    """The grades that stand, but for those that only staff may see, which are named."""
+    graded = [line for line in lines if line.state is JobState.DONE and line.suspect is None]
+    hidden = [line for line in graded if line.staff_only is not None]
+    for line in hidden:
+        print(f"robomark: {line.student} is left out: {line.staff_only}; robomark show {line.id}", file=sys.stderr)
+    shown = [line for line in graded if line.staff_only is None]
+    return [line for line in shown if line.published_at is not None] if published else shown
 
 
 def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: Path) -> None:

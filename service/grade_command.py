@@ -72,7 +72,7 @@ def grade(
         prepare_folder(report)
     worst: RobomarkError | None = None
     if unsafe:
-        print("robomark: NO WALLS: these hand-ins can read and change everything that you can", file=sys.stderr)
+        warn_of_no_walls()
     with Rig(NONE if unsafe else FULL) as rig:
         for path in submissions:
             try:
@@ -91,6 +91,11 @@ def grade(
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every hand-in could be graded")
+
+
+def warn_of_no_walls() -> None:
+    """Said whenever student code is let loose."""
+    print("robomark: NO WALLS: these hand-ins can read and change everything that you can", file=sys.stderr)
 
 
 def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission, Assignment]:

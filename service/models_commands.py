@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from models import card, names
+from models.cards import Confusion, Curve, Tally
 from models.training import train as train_model
+from service.reports.written import prepare_folder
+from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from models.evaluation import Evaluation
 
 models_app = typer.Typer(help="List, train and evaluate classifiers.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(help="The model's name, such as shapes.")]
+Name = Annotated[str, typer.Argument(help="The model's name, such as shapes, digits or digits-28.")]
+Report = Annotated[
+    Path | None, typer.Option("--report", metavar="DIR", help="Write the plots and the numbers into this folder.")
+]
 
 
 @models_app.command("list")
 def list_models() -> None:
-    """The packaged classifiers and their accuracy on the spot, without noise."""
-    table = Table("name", "file", "architecture", "images", "on the spot", box=None, pad_edge=False)
+    """The packaged classifiers and how often each is right, with the 95 % interval."""
+    table = Table("name", "file", "trained on", "right", "95 % interval", "of", box=None, pad_edge=False)
+    for column in table.columns[2:]:
+        column.justify = "right"
     for name in names():
         about = card(name)
-        first = about.conditions[0]
-        table.add_row(name, about.file, about.architecture, str(about.training_images), f"{first.right}/{first.n}")
+        accuracy = about.measured.accuracy
+        table.add_row(name, about.file, str(about.training_images), f"{accuracy.share:.3f}", _interval(accuracy),
+                      str(accuracy.n))  # fmt: skip
     Console().print(table)
 
 
@@ -33,7 +47,7 @@ def train(
     name: Name,
     out: Annotated[Path, typer.Option(help="Folder for the weights and the card.")] = Path("models-trained"),
 ) -> None:
-    """Train a classifier again; the same version of the libraries gives the same bytes."""
+    """Train a classifier again; the same versions of the libraries give the same bytes."""
     about = train_model(name, out)
     same = name in names() and card(name).sha256 == about.sha256
     typer.echo(f"{out / about.file}: {about.training_images} images, sha256 {about.sha256[:16]}")
@@ -41,21 +55,90 @@ def train(
 
 
 @models_app.command()
-def evaluate(name: Name) -> None:
-    """Measure a packaged classifier over offsets and noise."""
+def evaluate(name: Name, report: Report = None) -> None:
+    """Measure a packaged classifier where it is trained for, beside the spot, and with noise."""
+    if report is not None:
+        prepare_folder(report)
     # scikit-learn takes a second to import, which no other command should have to wait for.
     from models.evaluation import evaluate as measure
 
     result = measure(name)
-    table = Table("condition", "right", "of", "share", box=None, pad_edge=False)
+    console = Console()
+    console.print(_head(result))
+    console.print()
+    console.print(_confusion(result.card.classes, result.measured.confusion))
+    for table in _curves(result.measured.curves):
+        console.print()
+        console.print(table)
+    if result.measured != result.card.measured:
+        typer.echo("\nThis is not what the card says: other versions of the libraries, or other weights.")
+    if report is not None:
+        _write(result, report)
+
+
+def _head(result: Evaluation) -> Table:
+    about, accuracy = result.card, result.measured.accuracy
+    table = Table.grid(padding=(0, 2))
+    right = f"{accuracy.share:.3f} ({accuracy.right} of {accuracy.n}), 95 % interval {_interval(accuracy)}"
+    for key, value in (
+        ("model", f"{about.name}, {about.file}"),
+        ("task", about.task),
+        ("network", about.architecture),
+        ("input", about.preprocessing),
+        ("trained on", f"{about.training_images} images, seed {about.seed}: {about.training_data}"),
+        ("tested on", about.test_data),
+        ("right", right),
+    ):
+        table.add_row(key, value)
+    return table
+
+
+def _confusion(classes: tuple[str, ...], confusion: Confusion) -> Table:
+    short = [label if len(label) < 3 else str(number) for number, label in enumerate(classes)]
+    table = Table("shown \\ read as", *short, "recall", "precision", box=None, pad_edge=False)
     for column in table.columns[1:]:
         column.justify = "right"
-    for condition in result.conditions:
-        share = condition.right / condition.n
-        table.add_row(condition.name, str(condition.right), str(condition.n), f"{share:.3f}")
-    console = Console()
-    console.print(table)
-    matrix = Table("shown \\ answered", *(str(number) for number in range(len(result.card.classes))), box=None)
-    for number, (label, row) in enumerate(zip(result.card.classes, result.confusion, strict=True)):
-        matrix.add_row(f"{number} {label}", *(str(count) if count else "·" for count in row))
-    console.print(matrix)
+    for number, (label, row) in enumerate(zip(classes, confusion, strict=True)):
+        read = sum(other[number] for other in confusion)
+        name = label if label == short[number] else f"{number} {label}"
+        table.add_row(
+            name, *(str(count) if count else "·" for count in row), _share(row[number], sum(row)),
+            _share(row[number], read),
+        )  # fmt: skip
+    return table
+
+
+def _curves(curves: tuple[Curve, ...]) -> list[Table]:
+    tables = []
+    for curve in curves:
+        table = Table(f"{curve.varied} ({curve.unit})", "right", "of", "share", "95 % interval", box=None,
+                      pad_edge=False, title=f"{curve.varied}: {curve.under}", title_justify="left")  # fmt: skip
+        for column in table.columns:
+            column.justify = "right"
+        for value, tally in zip(curve.values, curve.tallies, strict=True):
+            table.add_row(f"{value:g}", str(tally.right), str(tally.n), f"{tally.share:.3f}", _interval(tally))
+        tables.append(table)
+    return tables
+
+
+def _interval(tally: Tally) -> str:
+    low, high = tally.interval
+    return f"{low:.3f} to {high:.3f}"
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.3f}" if whole else "·"
+
+
+def _write(result: Evaluation, folder: Path) -> None:
+    from service.reports.model_plots import evaluation_plots
+
+    numbers = json.dumps({"name": result.card.name} | asdict(result.measured), indent=1) + "\n"
+    files = {f"{result.card.name}.json": numbers.encode()} | evaluation_plots(result)
+    for name, data in files.items():
+        path = folder / name
+        try:
+            path.write_bytes(data)
+        except OSError as error:
+            raise UsageError(f"{path} cannot be written: {error.strerror}") from error
+        typer.echo(str(path))

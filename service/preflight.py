@@ -109,7 +109,7 @@ def _roster_hand_in(
     path = file_inside(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
     submission = read_submission(path, asked=assignment.parts)
-    return HandIn(replace(submission, student=row.student), assignment, shown(row.file))
+    return HandIn(replace(submission, student=row.student), assignment, shown(row.file), row.handed_in)
 
 
 def _roster_assignment(folder: Path, name: str) -> Assignment:

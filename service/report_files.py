@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.queue.plotting import PREFIX, draw
-from service.reports.html import BatchRow, batch_index, student_report
+from service.reports.html import BatchRow, batch_index, staff_report, student_report
 from service.reports.written import file_name, write_page
-from service.store import artifacts, grades, intake
+from service.store import artifacts, grades, intake, policies
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.models import Job, JobState, PlotState
+from service.store.models import Job, JobState, PlotState, Submission
 from sim.recording import Verdict
 
 _INDEX = "index.html"
@@ -53,7 +53,7 @@ def write_batch(
 
     Raises UsageError when the folder cannot be written to.
     """
-    graded = [line.id for line in lines if line.state is JobState.DONE]
+    graded = [line.id for line in lines if line.state is JobState.DONE and line.staff_only is None]
     pages = {written.job_id: written.path.name for written in write_reports(store, graded, folder)}
     rows = [
         BatchRow(
@@ -62,7 +62,7 @@ def write_batch(
             line.max_marks,
             None if line.verdict is None else Verdict(line.verdict),
             pages.get(line.id),
-            line.error or ("" if line.state is JobState.DONE else line.state.value),
+            line.error or _remark(line),
         )
         for line in lines
     ]
@@ -71,12 +71,22 @@ def write_batch(
     return write_page(folder, _INDEX, batch_index(rows, title, walls))
 
 
+def _remark(line: JobLine) -> str:
+    if line.staff_only is not None:
+        return f"for staff only: {line.staff_only}"
+    return "" if line.state is JobState.DONE else line.state.value
+
+
 def _page(store: Store, job_id: str) -> tuple[str, str]:
     with store.reading() as session:
         grade = grades.load(session, job_id)
         hand_in = intake.load_hand_in(session, job_id)
         job = session.get_one(Job, job_id)
+        released = policies.released(session, job_id)
+        staff_only = session.get_one(Submission, job.submission_id).staff_only
         kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
     files = kept if job.plots is PlotState.DONE else draw(grade, hand_in.assignment)
     plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
-    return grade.student, student_report(grade, plots, hand_in.submission)
+    if staff_only is not None:
+        return grade.student, staff_report(grade, plots, hand_in.submission)
+    return grade.student, student_report(grade, plots, hand_in.submission, released)

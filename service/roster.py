@@ -10,12 +10,13 @@ import io
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
 from submissions.raw_files import shown
 
-COLUMNS = ("student", "file", "assignment")
+COLUMNS = ("student", "file", "assignment", "handed_in")
 _MOST_BYTES = 10_000_000
 _LONGEST_NAME = 100
 _SEPARATORS = (",", ";", "\t")
@@ -30,10 +31,13 @@ class RosterRow:
     file: str = ""
     assignment: str = ""
     problem: str = ""
+    handed_in: datetime | None = None
 
 
 def read_roster(path: Path) -> list[RosterRow]:
-    """The rows of a roster with the columns student, file and, if it has one, assignment; others are passed over.
+    """The rows of a roster with the columns student, file and, if it has them, assignment and handed_in.
+
+    Other columns are passed over.
 
     Comma, semicolon or tab; quoted cells; UTF-8 with or without a byte order mark. Raises UsageError when the
     file as a whole is no roster.
@@ -91,7 +95,7 @@ def _text(path: Path) -> str:
 def _separator(lines: Sequence[str], name: str) -> str:
     """The separator by which the first line has most of our columns."""
     if not lines:
-        raise UsageError(f"{name}: is empty, expected the columns {', '.join(COLUMNS)}.")
+        raise UsageError(f"{name}: is empty, expected the columns {', '.join(COLUMNS[:3])}.")
 
     def found(separator: str) -> int:
         cells = next(_records(lines, separator)).cells
@@ -128,7 +132,7 @@ def _places(header: _Record, name: str) -> Mapping[str, int]:
     if missing:
         raise UsageError(
             f"{name}: has no column {' and no column '.join(missing)} in its first line, expected "
-            f"{', '.join(COLUMNS)} (assignment may be left out with -a)."
+            f"{', '.join(COLUMNS[:3])} (assignment may be left out with -a)."
         )
     return {column: cells.index(column) for column in COLUMNS if column in cells}
 
@@ -142,9 +146,24 @@ def _row(record: _Record, places: Mapping[str, int], columns: int) -> RosterRow:
         )
     found = {column: record.cells[at] if at < len(record.cells) else "" for column, at in places.items()}
     student = _student(found["student"])
-    return RosterRow(
-        record.line, student, found["file"], found.get("assignment", ""), problem=_problem(student, found["file"])
-    )
+    problem = _problem(student, found["file"])
+    try:
+        handed_in = moment(found["handed_in"]) if found.get("handed_in") else None
+    except ValueError:
+        handed_in = None
+        problem = problem or f"has {shown(found['handed_in'])} for handed_in, expected a moment like 2026-11-30 17:00."
+    return RosterRow(record.line, student, found["file"], found.get("assignment", ""), problem, handed_in)
+
+
+def moment(text: str, *, end_of_day: bool = False) -> datetime:
+    """A date, or a date and time, in the zone of this machine unless it names its own.
+
+    A date alone is its first moment, or with ``end_of_day`` its last. Raises ValueError for anything else.
+    """
+    read = datetime.fromisoformat(text)
+    if end_of_day and len(text.strip()) <= len("2026-11-30"):
+        read += timedelta(days=1, microseconds=-1)
+    return read.astimezone()
 
 
 def _problem(student: str, file: str) -> str:

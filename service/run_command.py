@@ -13,20 +13,25 @@ from models import weights_bytes
 from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
+from responders.sandbox.manager import FULL, NONE
 from responders.sandbox.running_child import ChildLimits
+from service.grade_command import warn_of_no_walls
 from service.grading.grade import TrialResult
 from service.grading.rig import Rig
 from service.reports.figure import png
 from service.reports.path_plot import draw_path
 from service.reports.readable import readable
 from service.reports.trace import trace
+from service.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from sim.backgrounds import floor
 from sim.errors import UsageError
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
-from submissions.magics import Flags, Setup, setup, split_program
+from submissions.magics import Flags, setup, split_program
+from submissions.notebook import is_script, read_notebook, read_script
 from submissions.source_text import decode_source
+from submissions.submission import Notebook
 
 _PROGRAM = ChildLimits(5.0, 128 << 20)
 _RESPONDER = ChildLimits(10.0, 512 << 20)
@@ -36,7 +41,7 @@ _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 
 def run(
-    program: Annotated[Path, typer.Argument(help="The robot program, a .py file.")],
+    program: Annotated[Path, typer.Argument(help="The robot program, a .py file, or a notebook.")],
     background: Annotated[str | None, typer.Option("-b", "--background", help="Floor.")] = None,
     robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot.")] = None,
     obstacles: Annotated[str | None, typer.Option("-o", "--obstacles", help="Obstacle preset.")] = None,
@@ -70,11 +75,14 @@ def run(
     responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
+    sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the path over the floor, as PNG.")] = None,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
+    ] = False,
 ) -> None:
-    """Run a robot program in the simulator, set up by the flags of %sim_magic; print what it says."""
-    flags, text = _program(program)
+    """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
     values = {
         "b": background,
         "r": robot_setup,
@@ -86,14 +94,30 @@ def run(
         "M": motor_noise,
         "P": pen_colour,
     }
-    switches = {letter for letter, on in (("p", pen_down), ("L", collab)) if on}
-    flags = Flags(flags.preamble, flags.with_values(**values).values, flags.switches | switches)
+    switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
+    wanted = Flags(switches=frozenset(switches)).with_values(**values)
+    if unsafe:
+        warn_of_no_walls()
+    notebook = _notebook(program)
+    if notebook is not None:
+        if responder is not None:
+            raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
+        last = LastRun(wanted, seed, seed if sheet is None else sheet)
+        limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
+        with Rig(NONE if unsafe else FULL) as rig:
+            played = run_notebook(notebook, _files_beside(program), limits, last, rig)
+        show_notebook(played, _show)
+        if played.runs:
+            _keep(played.runs[-1].recording, program.name, seed, trace_file, picture)
+        return
+    flags, text = _program(program)
+    flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
     chosen = setup(flags)
     order = TrialOrder(
         program=ProgramOrder(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
         responder=_responder(responder),
         collaborative=chosen.collaborative or responder is not None,
-        floor=floor(chosen.background),
+        floor=floor(chosen.background, seed=seed if sheet is None else sheet),
         robot=robot(chosen.robot),
         pose=chosen.pose,
         noise=Noise(chosen.light_noise, chosen.motor_noise),
@@ -104,13 +128,28 @@ def run(
     )
     for note in chosen.notes:
         typer.echo(f"note: {note}", err=True)
-    with Rig() as rig:
+    with Rig(NONE if unsafe else FULL) as rig:
         recording = rig.run(order, chosen.obstacles)
     _show(recording)
+    _keep(recording, program.name, seed, trace_file, picture)
+
+
+def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, picture: Path | None) -> None:
     if trace_file is not None:
         _write(trace_file, json.dumps(trace(recording)).encode())
     if picture is not None:
-        _write(picture, _drawn(recording, program.name, chosen, seed))
+        _write(picture, _drawn(recording, name, seed))
+
+
+def _notebook(path: Path) -> Notebook | None:
+    """The notebook in a file, or that nbconvert has made a file of; None if it is a robot program."""
+    if path.suffix.lower() == ".ipynb":
+        read = read_notebook(_read(path), path.name)
+        for note in read.notes:
+            typer.echo(f"note: {note}", err=True)
+        return read.notebook
+    text = _source(path)
+    return read_script(text, path.name) if is_script(text) else None
 
 
 def _program(path: Path) -> tuple[Flags, str]:
@@ -149,16 +188,19 @@ def _responder(given: str | None) -> ResponderOrder | None:
     if not path.exists() and ":" in given:
         file, _, name = given.rpartition(":")
         path = Path(file)
+    return ResponderOrder(Code(path.name, _source(path)), _files_beside(path), _RESPONDER, _OUTPUT_BYTES, name)
+
+
+def _files_beside(path: Path) -> dict[str, bytes]:
     files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
-    text = _source(path)
     left = _FILES_BYTES
     for beside in sorted(path.parent.iterdir()):
-        if beside.suffix in (".py", "") or beside.is_symlink() or not beside.is_file():
+        if beside.suffix in (".py", ".ipynb", "") or beside.is_symlink() or not beside.is_file():
             continue
         left -= beside.stat().st_size
         if left >= 0:
             files[beside.name] = beside.read_bytes()
-    return ResponderOrder(Code(path.name, text), files, _RESPONDER, _OUTPUT_BYTES, name)
+    return files
 
 
 def _show(recording: Recording) -> None:
@@ -178,12 +220,12 @@ def _show(recording: Recording) -> None:
         f"{recording.verdict}"
     )
     for fault in recording.faults:
-        where = f" (line {fault.line} of the {fault.who})" if fault.line is not None else ""
+        where = f" ({fault.place} of the {fault.who})" if fault.line is not None else ""
         typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
         if fault.hint:
             typer.echo(f"            {fault.hint}", err=True)
 
 
-def _drawn(recording: Recording, name: str, chosen: Setup, seed: int) -> bytes:
-    trial = TrialResult("run", 0, seed, chosen.light_noise, chosen.motor_noise, "visible", recording)
-    return png(draw_path(trial, name, floor(chosen.background).picture))
+def _drawn(recording: Recording, name: str, seed: int) -> bytes:
+    trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
+    return png(draw_path(trial, name, floor(recording.background, seed=recording.sheet).picture))

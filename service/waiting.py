@@ -13,10 +13,12 @@ from datetime import timedelta
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
 from rich.text import Text
+from sqlalchemy import select
 
 from service.queue.nudges import Nudger
 from service.store import batches
 from service.store.engine import Store
+from service.store.models import Batch, BatchState
 
 _LOOK_SECONDS = 0.25
 _SWEEP_SECONDS = 2.0
@@ -57,6 +59,11 @@ class Waiting:
         most = self._look().plots_due
         self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
 
+    def _held(self) -> bool:
+        with self.store.reading() as session:
+            state = session.scalar(select(Batch.state).where(Batch.id == self.batch_id))
+        return state is BatchState.PAUSED
+
     def _look(self) -> batches.Progress:
         with self.store.reading() as session:
             return batches.progress(session, self.batch_id)
@@ -74,7 +81,12 @@ class Waiting:
         with Progress(*columns, console=self.console, transient=True) as bars:
             bar = bars.add_task(what, total=total, completed=before, before=before)
             swept = float("-inf")
+            was_held = False
             while True:
+                if (held := self._held()) is not was_held:
+                    goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
+                    self.console.print(f"batch {self.batch_id} {goes_on}", highlight=False, soft_wrap=True)
+                    was_held = held
                 self.keep_up()
                 if time.monotonic() - swept >= _SWEEP_SECONDS:
                     self.nudger.sweep()

@@ -13,7 +13,14 @@ from decimal import Decimal
 
 import numpy as np
 
-from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade, Sight, TrialResult
+from service.grading.grade import (
+    Accuracy,
+    CriterionResult,
+    Evidence,
+    Grade,
+    Sight,
+    TrialResult,
+)
 from sim.backgrounds import floor
 from sim.recording import (
     Call,
@@ -145,6 +152,21 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
         ),
         **changes,
     )  # fmt: skip
+
+
+def swept_grade() -> Grade:
+    """A shape grade whose trials were swept over light noise, with all that recognition measures."""
+    grade = shape_grade()
+    trials = tuple(
+        replace(trial, sweep=(("light_noise", float(32 * index)),), light_noise=32.0 * index)
+        for index, trial in enumerate(grade.trials)
+    )
+    levels = tuple(Level(32.0 * index, int(index != 4), 1, 0.2, 0.9) for index in range(6))
+    first = grade.criteria[0]
+    assert first.accuracy is not None
+    accuracy = replace(first.accuracy, counts=Counts(7, 5, 1, 0, 1, 2, 6, 0), confidence=Confidence(0.9, 5, None, 0))
+    result = replace(first, accuracy=accuracy, curves=(AccuracyCurve("light_noise", levels, 0.8),))
+    return replace(grade, trials=trials, criteria=(result, *grade.criteria[1:]))
 
 
 def faulty_grade() -> Grade:

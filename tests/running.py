@@ -9,8 +9,8 @@ from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
 from responders.sandbox.running_child import ChildLimits
 from service.grading.rig import Rig
-from sim.arena import Rectangle
 from sim.backgrounds import floor
+from sim.motion import COURSE_PHYSICS, Physics, Rectangle
 from sim.recording import Pose, Recording
 from sim.robot import robot
 from sim.world import Noise
@@ -35,6 +35,7 @@ def run_program(
     seconds: float = 60,
     seed: int = 1,
     output_bytes: int = 1_000_000,
+    physics: Physics = COURSE_PHYSICS,
     pulse: Callable[[], None] = lambda: None,
 ) -> Recording:
     """One trial; the start is the background's own unless given."""
@@ -52,5 +53,6 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
+        physics=physics,
     )
     return rig.run(order, obstacles, pulse)

@@ -6,12 +6,13 @@ import json
 import re
 import shutil
 import time
+from decimal import Decimal
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from rich.console import Console
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 from builders import hand_in, settings_in
 from service.queue.celery_app import make_celery
@@ -20,7 +21,7 @@ from service.queue.nudges import Nudger
 from service.store import batch_control
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
-from service.store.models import Job, JobState, Lane
+from service.store.models import CriterionRow, Job, JobState, Lane, TrialRow
 from service.waiting import Waiting
 from submissions.example_folder import examples
 from test_batch_commands import Ended, robomark
@@ -30,12 +31,15 @@ SPIN = "while True:\n    pass\n"
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]:
-    """A home after a roster of two good rows and a bad one; the roster; what the command said."""
+    """A home after a roster of two good rows and one of each bad kind; the roster; what the command said."""
     folder = tmp_path_factory.mktemp("class")
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
     roster = folder / "roster.csv"
-    roster.write_text("student;file\n=1/2 🤖;reference\nbob;flawed\neve;nowhere.zip\n", encoding="utf-8-sig")
+    (folder / "broken.zip").write_bytes(b"PK\3\4 and no more")
+    rows = ["student;file;assignment", "=1/2 🤖;reference;", "bob;flawed;", "eve;nowhere.zip;"]
+    rows += ["bob;reference;", "mia;broken.zip;", "kim;reference;no-such-thing"]
+    roster.write_text("\n".join(rows) + "\n", encoding="utf-8-sig")
     home = tmp_path_factory.mktemp("home")
     return home, roster, robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
 
@@ -49,7 +53,14 @@ def _batch(ended: Ended) -> str:
 def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Path, Path, Ended]) -> None:
     home, roster, ended = graded
     assert ended.status == 2
-    assert re.search(r"^line 4: eve +nowhere\.zip: does not exist", ended.out, re.MULTILINE)
+    for row in (
+        r"line 4: eve +nowhere\.zip: does not exist",
+        r"line 5: bob +line 3: bob is already this student's hand-in",
+        r"line 6: mia +broken\.zip: ",
+        r"line 7: kim +.*no-such-thing",
+        r"=1/2 🤖 +echo-responder +10 / 10",
+    ):
+        assert re.search(rf"^{row}", ended.out, re.MULTILINE), row
     marked = re.search(r"^bob +echo-responder .* (\w{12})$", ended.out, re.MULTILINE)
     assert marked is not None, ended
     again = robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
@@ -130,3 +141,52 @@ def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
 def _states(store: Store, batch: str) -> list[JobState]:
     with store.reading() as session:
         return list(session.scalars(select(Job.state).where(Job.batch_id == batch)))
+
+
+@pytest.mark.long
+def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
+    graded: tuple[Path, Path, Ended], tmp_path: Path
+) -> None:
+    home, _, ended = graded
+    batch = _batch(ended)
+    changed = tmp_path / "echo-responder"
+    shutil.copytree(examples("echo-responder").parent, changed, ignore=shutil.ignore_patterns("examples"))
+    text = (changed / "assignment.toml").read_text()
+    (changed / "assignment.toml").write_text(text.replace("marks = 4", "marks = 6"))
+    regraded = robomark(home, "batch", "regrade", batch, "-a", changed, "--wait")
+    assert regraded.status == 0, regraded
+    assert re.search(r"^=1/2 🤖 +10 / 10 +12 / 12 .*: 4 / 4 to 6 / 6 +assignment changed", regraded.out, re.MULTILINE)
+    again = re.search(r"batch (\w{12}): 2 queued to be graded again", regraded.out)
+    assert again is not None
+
+    kept = robomark(home, "batch", "export", batch)
+    assert "2 regrades are not published" in kept.err
+    assert ",10,10," in kept.out
+    assert robomark(home, "batch", "export", batch, "--published").out.strip().count("\n") == 0
+    assert "2 grades published, 2 of them regrades" in robomark(home, "batch", "publish", batch[:8]).out
+    assert ",12,12," in robomark(home, "batch", "export", batch, "--published").out
+
+    status = robomark(home, "batch", "status", batch)
+    assert re.search(r"^=1/2 🤖 .* 12 / 12 .*published", status.out, re.MULTILINE)
+    assert re.search(r"\w+@\S+ +publish +published 2, replaced 2", status.out)
+    assert "2 of the new grades stand" in robomark(home, "batch", "status", again[1]).out
+    grade = re.search(r"^bob .* (\w{12})$", status.out, re.MULTILINE)
+    assert grade is not None
+    verified = robomark(home, "verify", grade[1])
+    assert (verified.status, "is what grading it again gives" in verified.out) == (0, True)
+    with open_store(settings_in(home)) as store, store.transaction() as session:
+        session.execute(update(TrialRow).where(TrialRow.job_id == grade[1]).values(sha256="0" * 64))
+        session.execute(update(CriterionRow).where(CriterionRow.job_id == grade[1]).values(marks=Decimal(0)))
+    doubted = robomark(home, "verify", grade[1])
+    assert (doubted.status, "is not what grading it again gives" in doubted.err) == (3, True)
+
+
+def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:
+    assert "no policy" in robomark(tmp_path, "course", "policy").out
+    set_ = robomark(tmp_path, "course", "policy", "--due", "2026-11-30", "--attempts", "2", "--late-days", "1")
+    assert re.search(r"^all others +2026-11-30 23:59 +1 +2", set_.out, re.MULTILINE)
+    assert robomark(tmp_path, "course", "policy").out == set_.out
+    extended = robomark(tmp_path, "course", "extend", "ada", "-a", "json-queue", "--due", "2026-12-02T12:00")
+    assert extended.out == "ada: json-queue may be handed in until 2026-12-02 12:00\n"
+    for words in (("policy", "--due", "soon"), ("extend", "ada"), ("policy", "--attempts", "0")):
+        assert robomark(tmp_path, "course", *words).status == 2

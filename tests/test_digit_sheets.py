@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from notebook_builder import notebook
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.rig import Rig
@@ -17,6 +18,7 @@ from sim.backgrounds import floor, label_names
 from sim.recording import SENSOR_SIDE, Image
 from submissions.assignment import Assignment
 from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.bundle import read_submission
 from submissions.submission import Source, Submission
 
 ASSIGNMENT = """
@@ -86,12 +88,28 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(tmp
     recording = bare.trials[0].recording
     assert (recording.sheet, recording.patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
-    path = next(name for name in draw_all(bare) if name.startswith("path"))
-    pictures = {draw_all(bare)[path]}
-    for change in ({"sheet": 0}, {"patches": True}):
-        other = tuple(replace(trial, recording=replace(trial.recording, **change)) for trial in bare.trials)
-        pictures.add(draw_all(replace(bare, trials=other))[path])
+    pictures = set()
+    for change in ({}, {"sheet": 0}, {"patches": True}):
+        trial = replace(bare.trials[0], recording=replace(recording, images=(), messages=(), **change))
+        drawn = draw_all(replace(bare, criteria=(), trials=(trial,)))
+        pictures.add(next(drawn[name] for name in drawn if name.startswith("path")))
     assert len(pictures) == 3
+
+
+def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(tmp_path: Path, rig: Rig) -> None:
+    asked = assignment(tmp_path, '"per-seed"')
+    asked = replace(asked, parts=replace(asked.parts, responder="student"))
+    cells = [
+        "def responder(text):\n    return seen",
+        '%%sim_magic_preloaded -R -b MNIST_Digits -x 400 -y 50 -a 90\nprint("image_data left")',
+        "seen = roboSim.image_data().vals[0]",
+        '%%sim_magic_preloaded -R\nimport time\nprint("IMG_DATA")\ntime.sleep(1)',
+    ]
+    result = grade(read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts), asked, rig=rig)
+    for trial in result.trials:
+        (answer,) = (message.text for message in trial.recording.messages if message.sender == "responder")
+        pixels = np.array(answer.split(","), np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 3)
+        assert pixels[3:17, 3:17, 0].tobytes() == on_sheet(0) != shown(trial.recording.images[0])
 
 
 @pytest.mark.parametrize("sheet", ["-1", "true", '"new"', "1.5", "[]"])

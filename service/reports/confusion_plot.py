@@ -17,8 +17,10 @@ from service.reports.figure import FAINT, HEAD, INK, RULE, WIDTH, axes_at, drawa
 from service.reports.readable import one_line
 
 NO_ANSWER = "no answer"
-_LABELS = 1.22  # inches for the truths at the left
-_HEADS = 0.86  # for the answers at the top
+_LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the truths at the left
+_SHORT = 6  # characters of a name that needs little room
+_TOTALS = 2.55  # cells for what stands right of the counts
+_HEADS, _SHORT_HEADS = 0.86, 0.42  # for the answers at the top
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,23 +50,36 @@ def confusion_table(accuracy: Accuracy) -> Table:
 
 def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> Figure:
     """The confusion matrix of ``accuracy`` with its value, interval and n."""
-    table = confusion_table(accuracy)
-    across = len(table.answers) + 1.25
-    cell = min(0.56, (WIDTH - _LABELS - 0.14) / across)
-    body = cell * len(table.truths)
     subtitle = (
         f"accuracy {accuracy.value:.2f}, 95 % interval {accuracy.low:.2f} to {accuracy.high:.2f}, "
-        f"n = {accuracy.n} pictures; {one_line(result.title, 34)}"
+        f"n = {accuracy.n} {counted(accuracy)}; {one_line(result.title, 34)}"
     )
-    figure = new_figure(HEAD + _HEADS + body + 0.30, title, subtitle)
-    axes = axes_at(figure, _LABELS, 0.30, cell * across, body + _HEADS)
+    return draw_table(confusion_table(accuracy), title, subtitle)
+
+
+def counted(accuracy: Accuracy) -> str:
+    """What ``n`` counts: ``pictures`` or ``patterns``."""
+    return accuracy.counts.of if accuracy.counts is not None else "pictures"
+
+
+def draw_table(table: Table, title: str, subtitle: str) -> Figure:
+    """The confusion matrix of ``table``, whoever counted it."""
+    across = len(table.answers) + _TOTALS
+    labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
+    cell = min(0.56, (WIDTH - labels - 0.14) / across)
+    body = cell * (len(table.truths) + 0.85)
+    heads = _HEADS if any(len(answer) > _SHORT for answer in table.answers) else _SHORT_HEADS
+    figure = new_figure(HEAD + heads + body + 0.42, title, subtitle)
+    axes = axes_at(figure, labels, 0.42, cell * across, body + heads)
     axes.set_axis_off()
     axes.set_xlim(0, across)
-    axes.set_ylim(body / cell, -_HEADS / cell)
+    axes.set_ylim(body / cell, -heads / cell)
     size = 9.0 if cell > 0.4 else max(5.0, 22 * cell)
     _draw_names(axes, table, size * 0.82)
     _draw_cells(axes, table, size)
-    write(figure, 0.08, 0.10, "rows: what it was;  columns: what was answered;  framed: right", size=7.2, colour=FAINT)
+    write(figure, 0.08, 0.24, "rows: what it was;  columns: what was answered;  framed: right", size=7.2, colour=FAINT)
+    write(figure, 0.08, 0.10, "recall: right of what it was;  precision: right of what was answered", size=7.2,
+          colour=FAINT)  # fmt: skip
     return figure
 
 
@@ -73,7 +88,9 @@ def _draw_names(axes: Axes, table: Table, size: float) -> None:
         _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center", rotation=0)
     for column, answer in enumerate(table.answers):
         _name(axes, column + 0.42, -0.14, answer, size, ha="left", va="bottom", rotation=52)
-    _name(axes, len(table.answers) + 0.67, -0.14, "in all", size, ha="left", va="bottom", rotation=52)
+    _name(axes, len(table.answers) + 0.60, -0.14, "in all", size, ha="left", va="bottom", rotation=52)
+    _name(axes, len(table.answers) + 1.75, -0.14, "recall", size, ha="left", va="bottom", rotation=52)
+    _name(axes, -0.12, len(table.truths) + 0.5, "precision", size, ha="right", va="center", rotation=0)
 
 
 def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float) -> None:
@@ -94,9 +111,25 @@ def _draw_cells(axes: Axes, table: Table, size: float) -> None:
                 column + 0.5, row + 0.5, str(count) if count else "·", font=font(size, bold=count > 0), ha="center",
                 va="center", color="white" if share > 0.55 else (INK if count else FAINT),
             )  # fmt: skip
-        axes.text(
-            len(counts) + 0.75, row + 0.5, str(table.totals[row]), font=font(size), ha="center", va="center", color=INK
-        )
+        _figure_text(axes, len(counts) + 0.65, row, str(table.totals[row]), size)
+        right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
+        _figure_text(axes, len(counts) + 1.85, row, _share(right_ones, table.totals[row]), size * 0.82)
+    for column, answer in enumerate(table.answers):
+        if answer in table.truths:
+            answered = sum(counts[column] for counts in table.counts)
+            right_ones = table.counts[table.truths.index(answer)][column]
+            _figure_text(axes, column + 0.5, len(table.truths), _share(right_ones, answered), size * 0.82)
+
+
+def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None:
+    axes.text(x, row + 0.5, text, font=font(size), ha="center", va="center", color=INK)
+
+
+def _share(part: int, whole: int) -> str:
+    """``.83``: narrow, so that ten columns of it can be read; a dash where there is nothing to divide by."""
+    if not whole:
+        return "\N{EN DASH}"
+    return str(part // whole) if part in (0, whole) else f"{part / whole:.2f}".lstrip("0")
 
 
 def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, right: bool) -> None:

@@ -48,10 +48,10 @@ class FaultGroup:
 
 def fault_groups(grade: Grade, submission: Submission | None = None, limit: int = 12) -> tuple[FaultGroup, ...]:
     """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
-    found: dict[tuple[str, str, int | None], list[tuple[int, Fault]]] = {}
+    found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
         for fault in trial.recording.faults:
-            found.setdefault((fault.who, fault.message, fault.line), []).append((index, fault))
+            found.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
     return tuple(_group(grade, places, submission) for places in list(found.values())[:limit])
 
 
@@ -59,8 +59,8 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
     index, fault = places[0]
     source = _source(fault, submission)
     where = _WHERE[fault.who] if source is None else f"{_WHERE[fault.who]} ({one_line(source.name, 60)})"
-    if fault.line is not None:
-        where += f", line {fault.line}"
+    if fault.place:
+        where += f", {fault.place}"
     trial = grade.trials[index]
     first = f"at {fault.t:.2f} s in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
     trials = len({trial_index for trial_index, _ in places})
@@ -74,6 +74,9 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
 def _source(fault: Fault, submission: Submission | None) -> Source | None:
     if submission is None:
         return None
+    if submission.notebook is not None and fault.cell is not None:
+        cells = {cell.number: cell.source for cell in submission.notebook.cells}
+        return Source(submission.notebook.name, cells.get(fault.cell, ""))
     return {"program": submission.program, "responder": submission.responder}.get(fault.who)
 
 

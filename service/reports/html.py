@@ -1,4 +1,4 @@
-"""A grade as one self-contained HTML file, for the student or for staff, and the index page of a batch.
+"""A grade as one self-contained HTML file, for the student or for staff; the index of a batch; the page of floors.
 
 Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
 the pages load nothing, run nothing and send nothing.
@@ -37,6 +37,23 @@ class BatchRow:
     verdict: Verdict | None = None
     report: str | None = None
     note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedFloor:
+    """A floor on the page of floors: its picture as a PNG, and the labels that places on it have."""
+
+    name: str
+    picture: bytes
+    labels: tuple[str, ...] = ()
+
+
+def gallery(floors: Sequence[PrintedFloor]) -> str:
+    """A page with every floor."""
+    shown = [
+        {"name": floor.name, "picture": _data_uri(floor.picture), "labels": ", ".join(floor.labels)} for floor in floors
+    ]
+    return _render("gallery.html", floors=shown)
 
 
 def student_report(

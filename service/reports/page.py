@@ -13,7 +13,8 @@ from service.reports.audience import scenarios, worst_trial
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
-from service.reports.verdict_words import VerdictWords, verdict_words
+from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.verdict_words import VerdictWords, grade_words, verdict_words
 from sim.recording import Message, Recording, Verdict
 from submissions.submission import Submission
 
@@ -101,6 +102,7 @@ class Page:
     criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     classification: tuple[Plot, ...]
+    recognition: tuple[RecognitionTable, ...]
     scenes: tuple[Scene, ...]
     trials: tuple[TrialLine, ...]
     more_trials: int
@@ -117,11 +119,12 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
         marks=number(grade.marks),
         max_marks=number(grade.max_marks),
         share=_share(float(grade.marks), float(grade.max_marks)),
-        words=verdict_words(grade.verdict),
+        words=grade_words(grade),
         next_step=_next_step(grade),
         criteria=tuple(_criterion_line(grade, result) for result in grade.criteria),
         faults=fault_groups(grade, submission),
         classification=tuple(plot for plot in plots if not plot.scenario),
+        recognition=recognition_tables(grade),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
@@ -147,7 +150,7 @@ def timeline(recording: Recording) -> tuple[Entry, ...]:
 
 def _next_step(grade: Grade) -> str:
     """The verdict's advice if something went wrong, else what would gain most marks."""
-    words = verdict_words(grade.verdict)
+    words = grade_words(grade)
     if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
         return words.next_step
     lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
@@ -198,7 +201,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
         more_messages=max(0, len(recording.messages) - _MOST_MESSAGES),
         responder_output=readable(recording.responder_output, 4000),
         responder_log=readable(recording.responder_log, 4000),
-        notes=tuple(readable(note, 400) for note in recording.notes[:10]),
+        notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
     )
 
 

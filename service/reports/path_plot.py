@@ -86,7 +86,7 @@ def draw_path(trial: TrialResult, title: str, floor: Picture | None) -> Figure:
     axes.set_xlim(view.left, view.right)
     axes.set_ylim(view.bottom, view.top)
     axes.set_facecolor(_OFF_THE_FLOOR)
-    _draw_floor(axes, floor, view)
+    draw_floor(axes, floor, view)
     _draw_obstacles(axes, recording)
     _draw_trace(axes, recording, points)
     _draw_robot(axes, recording.start, recording, dashed=True)
@@ -149,7 +149,8 @@ def _shaped(view: View) -> View:
     return View(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def _draw_floor(axes: Axes, floor: Picture | None, view: View) -> None:
+def draw_floor(axes: Axes, floor: Picture | None, view: View) -> None:
+    """The part of the floor that is in ``view``, lifted towards white; without a floor a white one."""
     if floor is None:
         axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
         return

@@ -13,25 +13,30 @@ from typing import Literal
 
 from matplotlib.figure import Figure
 
-from service.grading.grade import CriterionResult, Grade
+from service.grading.grade import AccuracyCurve, CriterionResult, Grade
 from service.reports.audience import BEFORE_PUBLICATION, scenarios, student_view, worst_trial
 from service.reports.confusion_plot import draw_confusion
 from service.reports.conversation_plot import draw_conversation
+from service.reports.curve_plot import Curve, Panel, draw_curves
 from service.reports.figure import png
+from service.reports.misread_plot import draw_misread, misread
 from service.reports.path_plot import Picture, draw_path
 from service.reports.readable import one_line
 from service.reports.sensor_plot import draw_sensors
 from service.reports.sights_plot import chosen_sights, draw_sights, is_right
+from service.reports.track_plot import draw_track, tracks, worst_track
 from sim.backgrounds import floor as floor_of
 from sim.errors import UsageError
+from sim.recording import Recording
+from submissions.sweep import CONDITIONS, Varied
 
-Kind = Literal["path", "sensors", "conversation", "confusion", "sights"]
+Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "sights"]
 _NO_PICTURES: Mapping[str, Picture] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """One plot of a grade. ``subject`` indexes the grade's trials, or its criteria for confusion and sights.
+    """One plot of a grade. ``subject`` indexes the grade's trials, or its criteria where no scenario is given.
 
     ``name`` ends in ``-staff`` if the plot shows anything that a student may not see before publication.
     """
@@ -39,7 +44,7 @@ class Plot:
     name: str
     kind: Kind
     subject: int
-    scenario: str  # empty for confusion and sights
+    scenario: str  # empty for what a criterion pools
     title: str
     caption: str
     alt: str
@@ -67,7 +72,7 @@ def draw_all(grade: Grade, pictures: Mapping[str, Picture] = _NO_PICTURES) -> di
 def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
     if plot.kind == "path":
         trial = grade.trials[plot.subject]
-        return draw_path(trial, plot.title, _floor(trial.recording.background, pictures))
+        return draw_path(trial, plot.title, _floor(trial.recording, pictures))
     if plot.kind == "sensors":
         return draw_sensors(grade.trials[plot.subject], plot.title)
     if plot.kind == "conversation":
@@ -75,14 +80,37 @@ def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
     result = grade.criteria[plot.subject]
     if plot.kind == "confusion" and result.accuracy is not None:
         return draw_confusion(result, result.accuracy, plot.title)
+    if plot.kind == "curves":
+        return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
+    if plot.kind == "track":
+        worst = worst_track(result.sights, grade.trials)
+        floor = _floor(grade.trials[worst].recording, pictures)
+        return draw_track(result.sights, grade.trials, plot.title, floor)
+    if plot.kind == "misread":
+        return draw_misread(misread(result.sights), len(result.sights), plot.title)
     return draw_sights(result.sights, plot.title)
 
 
-def _floor(background: str, pictures: Mapping[str, Picture]) -> Picture | None:
-    if background in pictures:
-        return pictures[background]
+def _panel(curve: AccuracyCurve) -> Panel:
+    about = CONDITIONS[curve.along] if curve.along in CONDITIONS else Varied(curve.along, "", 0, 0)
+    levels = curve.levels
+    drawn = Curve(
+        "",
+        tuple(level.at for level in levels),
+        tuple(level.value for level in levels),
+        tuple(level.low for level in levels),
+        tuple(level.high for level in levels),
+        tuple(level.n for level in levels),
+    )
+    return Panel(about.words, about.unit, (drawn,), curve.asked)
+
+
+def _floor(recording: Recording, pictures: Mapping[str, Picture]) -> Picture | None:
+    """The floor as it was in the trial, with the same digits and label patches."""
+    if recording.background in pictures:
+        return pictures[recording.background]
     try:
-        return floor_of(background).picture
+        return floor_of(recording.background, labels=recording.patches, seed=recording.sheet).picture
     except UsageError:
         return None
 
@@ -99,6 +127,7 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 f"Confusion matrix: {right} of {accuracy.n} pictures on the diagonal, accuracy {accuracy.value:.2f}, "
                 f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
             )  # fmt: skip
+        yield from _along(grade, index, result, suffix)
         if result.sights:
             shown = len(chosen_sights(result.sights))
             wrong = [sight for sight in result.sights if not is_right(sight)]
@@ -113,6 +142,39 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 f"{shown} sensor pictures, {len(wrong)} of {len(result.sights)} answered wrongly"
                 + (f": {told}." if told else "."),
             )  # fmt: skip
+
+
+def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> Iterator[Plot]:
+    """How accuracy changes along what is swept and along the way, and what was misread."""
+    title = one_line(result.title, 80)
+    if result.curves:
+        told = "; ".join(
+            f"{one_line(curve.along, 20)}: "
+            + ", ".join(f"{level.value:.2f} at {level.at:g}" for level in curve.levels[:9])
+            for curve in result.curves
+        )
+        yield Plot(
+            f"curves-{_slug(result.id)}{suffix}", "curves", index, "", _title(grade, "robustness"),
+            f"How often pictures were named rightly as conditions got harder, for “{title}”.",
+            f"Curves of accuracy. {told}.",
+        )  # fmt: skip
+    on_track = tracks(result.sights, grade.trials)
+    if on_track:
+        right = sum(is_right(sight) for sight in result.sights)
+        yield Plot(
+            f"track-{_slug(result.id)}{suffix}", "track", index, "", _title(grade, "along the track"),
+            "Where pictures were taken and whether they were named rightly: in the trial with most mistakes over the "
+            "floor, and in all trials by the way driven.",
+            f"{right} of {len(result.sights)} pictures right along the track in {len(on_track)} trials.",
+        )  # fmt: skip
+    wrong = misread(result.sights)
+    if wrong:
+        yield Plot(
+            f"misread-{_slug(result.id)}{suffix}", "misread", index, "", _title(grade, "what was misread"),
+            "Pictures that were misread, each beside the nearest one of the same truth that was read rightly, and the "
+            "nearest right one of what it was taken for.",
+            f"{len(wrong)} of {len(result.sights)} pictures were misread.",
+        )  # fmt: skip
 
 
 def _trials(grade: Grade) -> Iterator[Plot]:

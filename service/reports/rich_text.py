@@ -15,14 +15,14 @@ from service.grading.grade import Grade
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.readable import number, one_line, readable
 from service.reports.text import accuracy_words
-from service.reports.verdict_words import verdict_words
+from service.reports.verdict_words import grade_words
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 
 
 def rich_report(grade: Grade) -> RenderableType:
     """``grade`` as one renderable; print it with ``rich.console.Console().print``."""
-    words = verdict_words(grade.verdict)
+    words = grade_words(grade)
     heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
     verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.next_step}")
     parts: list[RenderableType] = [heading, marks_table(grade), verdict]

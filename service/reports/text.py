@@ -10,7 +10,7 @@ import textwrap
 from service.grading.grade import Grade
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.readable import number, one_line, readable
-from service.reports.verdict_words import verdict_words
+from service.reports.verdict_words import grade_words
 
 _WIDTH = 96
 
@@ -18,7 +18,7 @@ _WIDTH = 96
 def plain_text(grade: Grade) -> str:
     """``grade`` in lines of at most 96 characters, without colour or control codes."""
     title = f"{one_line(grade.assignment_title)}: {one_line(grade.student, 60)}"
-    words = verdict_words(grade.verdict)
+    words = grade_words(grade)
     lines = [title, "=" * min(len(title), _WIDTH), ""]
     lines += [f"{number(grade.marks)} of {number(grade.max_marks)} marks; {words.short}", ""]
     for result in grade.criteria:
@@ -43,7 +43,7 @@ def accuracy_words(grade: Grade) -> str:
         return ""
     return (
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
-        f"{accuracy.n} pictures)."
+        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'pictures'})."
     )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.grading.grade import Grade
 from sim.recording import Verdict
 
 Tone = Literal["good", "notice", "bad"]
@@ -119,3 +120,18 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
 def verdict_words(verdict: Verdict) -> VerdictWords:
     """The words for ``verdict``; every verdict has some."""
     return _WORDS[verdict]
+
+
+#: Where no robot was run: only functions were called and texts were read.
+_NO_ROBOT = VerdictWords(
+    "looked at",
+    "Your functions were called and your code was read; no robot was run.",
+    "What came of it is told at each criterion.",
+    "If marks are missing, call the function yourself with the values that are named there.",
+    "good",
+)
+
+
+def grade_words(grade: Grade) -> VerdictWords:
+    """The words for a grade's verdict, or that there was nothing to run."""
+    return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT

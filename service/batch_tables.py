@@ -1,0 +1,116 @@
+"""The tables that ``robomark batch`` prints: marks, what a regrade changes, and who did what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from types import MappingProxyType
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from service.store.audit import Entry
+from service.store.batches import BatchLine, JobLine
+from service.store.models import BatchState, JobState, Standing
+from service.store.regrades import Change, CriterionChange
+
+_STYLES: Mapping[JobState, str] = MappingProxyType(
+    {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
+)
+
+
+def summary(line: BatchLine) -> str:
+    """How many jobs of a batch are in each state."""
+    parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
+    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
+    return held + (", ".join(parts) or "empty")
+
+
+def marks_table(lines: Sequence[JobLine]) -> Table:
+    """A row a hand-in: marks, accuracy, verdict, and what else is to be known of it."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("student", "assignment"):
+        table.add_column(heading, overflow="fold")
+    table.add_column("marks", justify="right")
+    table.add_column("accuracy", justify="right")
+    for heading in ("verdict", "grade"):
+        table.add_column(heading)
+    for line in lines:
+        accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
+        outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
+        table.add_row(
+            Text(line.student),
+            Text(line.assignment),
+            _out_of(line.marks, line.max_marks),
+            accuracy,
+            Text("; ".join([outcome, *_remarks(line)]), style=_STYLES.get(line.state, "")),
+            line.id,
+        )
+    return table
+
+
+def changes_table(changes: Sequence[Change]) -> RenderableType:
+    """A row a hand-in whose marks change, or that needs a look; the others are counted."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("student", overflow="fold")
+    for heading in ("before", "after"):
+        table.add_column(heading, justify="right")
+    for heading in ("criteria that changed", "why", "grade"):
+        table.add_column(heading, overflow="fold")
+    shown = [change for change in changes if _worth_a_row(change)]
+    for change in shown:
+        table.add_row(
+            Text(change.student),
+            _out_of(change.before, change.before_max),
+            _out_of(change.after, change.after_max),
+            Text("\n".join(_criterion(criterion) for criterion in change.criteria)),
+            Text(change.reason, style=_STYLES.get(change.state, "")),
+            change.job_id,
+        )
+    same = len(changes) - len(shown)
+    standing = sum(change.standing is Standing.STANDS for change in changes)
+    told = f"{same} of {len(changes)} unchanged; {standing} of the new grades stand"
+    return Group(table, Text(told)) if shown else Text(told)
+
+
+def history_table(history: Sequence[Entry]) -> Table:
+    """Who did what, and when."""
+    table = Table("when", "who", "did", "what came of it", box=None, pad_edge=False)
+    for entry in history:
+        detail = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in entry.detail.items())
+        when = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
+        table.add_row(when, Text(entry.actor), entry.action, Text(detail))
+    return table
+
+
+def _remarks(line: JobLine) -> list[str]:
+    remarks = []
+    if line.copied_from is not None:
+        remarks.append(f"same as {line.copied_from}")
+    if line.days_late:
+        remarks.append(f"{line.days_late} days late")
+    if line.staff_only is not None:
+        remarks.append(f"staff only: {line.staff_only}")
+    if line.suspect is not None:
+        remarks.append("suspect")
+    if line.published_at is not None:
+        remarks.append("published")
+    return remarks
+
+
+def _worth_a_row(change: Change) -> bool:
+    return (
+        change.differs or bool(change.criteria) or change.state is not JobState.DONE or "unexplained" in change.reason
+    )
+
+
+def _criterion(change: CriterionChange) -> str:
+    before, after = (_out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
+    return f"{change.title}: {before} to {after}"
+
+
+def _out_of(marks: Decimal | None, most: Decimal | None) -> str:
+    if marks is None:
+        return ""
+    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"

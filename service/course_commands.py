@@ -1,0 +1,100 @@
+"""``robomark course``: when and how often students may hand in, and what single students are allowed beyond it.
+
+What follows for a hand-in stands in ``store/policies.py``.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from service.roster import moment
+from service.settings import load_settings
+from service.store import audit, policies
+from service.store.engine import Store, now, open_store
+from service.store.intake import DEFAULT_COURSE, course_of, enrolment
+from service.store.policies import Limits
+from sim.errors import UsageError
+
+course_app = typer.Typer(help="When and how often students may hand in.", no_args_is_help=True)
+
+Assignment = Annotated[
+    str,
+    typer.Option("-a", "--assignment", help="For this one only; else for all that have none of their own."),
+]
+Due = Annotated[str | None, typer.Option(help="A date (its end), or a date and time: 2026-11-30T17:00.")]
+
+
+@course_app.command()
+def policy(
+    assignment: Assignment = "",
+    due: Due = None,
+    late_days: Annotated[int, typer.Option(min=0, max=365, help="So many days late is still marked.")] = 0,
+    attempts: Annotated[int | None, typer.Option(min=1, max=1000, help="Different hand-ins that are marked.")] = None,
+    cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two hand-ins.")] = 0.0,
+) -> None:
+    """Set what holds from now on, in place of what held; without options show what holds."""
+    allowed = Limits(_due(due), late_days, attempts, cool_down * 60)
+    with open_store(load_settings()) as store:
+        if allowed != Limits():
+            with store.transaction() as session:
+                course_id = course_of(session, DEFAULT_COURSE, now(session))
+                policies.set_policy(session, course_id, assignment, allowed)
+                audit.note(session, audit.this_user(), "policy", "course", str(course_id), **_told(assignment, allowed))
+        _show(store)
+
+
+@course_app.command()
+def extend(
+    student: Annotated[str, typer.Argument(help="The student's name, as handed in.")],
+    assignment: Assignment = "",
+    due: Due = None,
+    more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
+) -> None:
+    """Allow one student more time or attempts, in place of what they were allowed before."""
+    if due is None and not more_attempts:
+        raise UsageError("say what to allow: --due, --more-attempts, or both")
+    due_at = _due(due)
+    with open_store(load_settings()) as store, store.transaction() as session:
+        at = now(session)
+        course_id = course_of(session, DEFAULT_COURSE, at)
+        enrolment_id = enrolment(session, course_id, student, at)
+        policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
+        detail = {"student": student, **_told(assignment, Limits(due_at, attempts=more_attempts))}
+        audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
+    until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
+    more = f", {more_attempts} times more" if more_attempts else ""
+    print(f"{student}: {assignment or 'every assignment'} may be handed in{until}{more}")
+
+
+def _due(text: str | None) -> datetime | None:
+    if text is None:
+        return None
+    try:
+        return moment(text, end_of_day=True)
+    except ValueError:
+        raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
+
+
+def _told(assignment: str, allowed: Limits) -> dict[str, object]:
+    due_at = None if allowed.due_at is None else allowed.due_at.isoformat()
+    return {"assignment": assignment, "due": due_at, "late_days": allowed.late_days, "attempts": allowed.attempts}
+
+
+def _show(store: Store) -> None:
+    with store.transaction() as session:
+        found = policies.policies(session, course_of(session, DEFAULT_COURSE, now(session)))
+    if not found:
+        print("no policy: everything that is handed in is marked, whenever it comes")
+        return
+    table = Table("assignment", "due", "late days", "attempts", "cool-down", box=None, pad_edge=False)
+    for assignment, allowed in found.items():
+        due = "" if allowed.due_at is None else allowed.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        attempts = "" if allowed.attempts is None else str(allowed.attempts)
+        cool_down = f"{allowed.cool_down_seconds / 60:g} min" if allowed.cool_down_seconds else ""
+        table.add_row(assignment or "all others", due, str(allowed.late_days), attempts, cool_down)
+    Console().print(table)

@@ -1,0 +1,89 @@
+"""``robomark run`` for a notebook: every robot that its cells start, one after the other. No marks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import typer
+
+from responders.bridge import TrialOrder
+from responders.channel import Channel
+from responders.notebook_play import Played, Staged
+from responders.notebook_process import NotebookOrder
+from responders.sandbox.running_child import ChildLimits
+from service.grading.notebook_stage import NotebookStage, Program, UnmarkedRuns, program_order
+from service.grading.rig import Rig
+from service.reports.readable import readable
+from sim.backgrounds import floor
+from sim.recording import Recording
+from sim.robot import robot
+from sim.world import Noise
+from submissions.magics import Flags, Setup
+from submissions.marked_cell import sites
+from submissions.submission import Notebook
+
+
+@dataclass(frozen=True, slots=True)
+class RunLimits:
+    """What the notebook's process and each robot program may use, and for how long robots run, in seconds."""
+
+    notebook: ChildLimits
+    program: ChildLimits
+    output_bytes: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class LastRun:
+    """How the command line wants the last robot program to be run."""
+
+    flags: Flags
+    seed: int
+    sheet: int
+
+
+def run_notebook(notebook: Notebook, files: Mapping[str, bytes], limits: RunLimits, last: LastRun, rig: Rig) -> Played:
+    """Play the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
+
+    Raises UsageError for a flag of the command line that cannot be read.
+    """
+
+    def marked_run(program: Program, flags: Flags, setup: Setup) -> Staged:
+        wanted = stage.simulator.apply(last.flags)
+        order = TrialOrder(
+            program=program_order(program, limits.program, limits.output_bytes),
+            responder=None,
+            collaborative=setup.collaborative or wanted.collaborative,
+            floor=floor(wanted.background, seed=last.sheet),
+            robot=robot(wanted.robot),
+            pose=wanted.pose,
+            noise=Noise(wanted.light_noise, wanted.motor_noise),
+            channel=Channel(),
+            seconds=limits.seconds,
+            seed=last.seed,
+            pen_down=setup.pen_down or wanted.pen_down,
+        )
+        return Staged(order, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
+
+    found = sites(notebook)
+    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, last.sheet)
+    stage = NotebookStage(found[-1] if found else None, marked_run, unmarked, Staged())
+    cells = tuple(cell.source for cell in notebook.cells)
+    order = NotebookOrder(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)
+    return rig.play(order, stage)
+
+
+def show_notebook(played: Played, show: Callable[[Recording], None]) -> None:
+    """What the cells printed, every run by ``show``, and what was left out."""
+    for line in played.output.split("\n") if played.output else ():
+        typer.echo(readable(line, 400))
+    for run in played.runs:
+        typer.echo(f"--- the robot, started by cell {run.cell} ---")
+        show(run.recording)
+    for note in played.notes:
+        typer.echo(f"note: {readable(note, 400)}", err=True)
+    if played.stopped is not None:
+        typer.echo(f"{played.stopped.place}: {played.stopped.verdict}: {played.stopped.message}", err=True)
+    if not played.runs:
+        typer.echo("note: no robot was started: no cell begins with %%sim_magic_preloaded", err=True)

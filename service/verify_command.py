@@ -1,0 +1,59 @@
+"""``robomark verify``: runs a stored grading again, here, and compares every recording's hash and the marks."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from service.grading.grade import Grade, TrialResult
+from service.grading.grader import grade as grade_submission
+from service.settings import load_settings
+from service.store import batches, grades, intake
+from service.store.engine import open_store
+from service.store.models import Job
+from service.version import GRADER_VERSION, grader_sha256
+from sim.errors import HostError
+from sim.recording import Verdict
+
+#: How far such a trial came is decided by the machine and its load, so no hash is promised for it.
+_CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
+
+
+def verify(
+    grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
+) -> None:
+    """Run a stored grading again and compare; exit status 3 if anything differs that must not."""
+    with open_store(load_settings()) as store, store.reading() as session:
+        job = session.get_one(Job, batches.find_job(session, grade))
+        stored = grades.load(session, job.id)
+        hand_in = intake.load_hand_in(session, job.id)
+    again = grade_submission(hand_in.submission, hand_in.assignment)
+    rows = list(zip(stored.trials, again.trials, strict=False))
+    table = Table("scenario", "trial", "stored", "again", "", box=None, pad_edge=False)
+    for before, after in rows:
+        hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
+        table.add_row(Text(before.scenario), str(before.index), *hashes, _compared(before, after))
+    Console().print(table)
+    print(f"marks: {stored.marks} stored, {again.marks} again")
+    if job.grader_sha256 != grader_sha256():
+        print(f"graded by Robomark {stored.grader_version}, again by {GRADER_VERSION}; their code or libraries differ")
+    if not _same(stored, again, rows):
+        raise HostError(f"grade {job.id} is not what grading it again gives")
+    print(f"grade {job.id} is what grading it again gives")
+
+
+def _same(stored: Grade, again: Grade, rows: list[tuple[TrialResult, TrialResult]]) -> bool:
+    cut = any(before.verdict in _CUT or after.verdict in _CUT for before, after in rows)
+    same_marks = cut or [r.marks for r in stored.criteria] == [r.marks for r in again.criteria]
+    whole = len(stored.trials) == len(again.trials)
+    return whole and same_marks and all(_compared(before, after) != "differs" for before, after in rows)
+
+
+def _compared(before: TrialResult, after: TrialResult) -> str:
+    if before.recording.sha256 == after.recording.sha256:
+        return "same"
+    return "cut by a limit" if before.verdict in _CUT or after.verdict in _CUT else "differs"

@@ -1,0 +1,114 @@
+"""All of a service on one machine: broker, workers and web server, each started again when it ends.
+
+Runs no loop of its own and prints nothing; ``up_command.py`` does.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Self
+
+from service.queue.broker import EmbeddedBroker
+from service.queue.processes import run_file
+from service.queue.supervised import SupervisedProcess, SupervisedWorker, stop_all
+from service.queue.worker import release_dead_workers
+from service.settings import Settings
+from service.store.engine import Store
+from sim.errors import HostError, UsageError
+
+_GRACE_SECONDS = 5.0
+_SHORT_LIVES = 3
+
+
+class WholeService:
+    """Broker (unless the settings name one), workers, and a web server on a socket that listens (unless None)."""
+
+    def __init__(self, settings: Settings, store: Store, workers: int, listening: socket.socket | None) -> None:
+        self._store = store
+        self._broker = None if settings.broker_url else EmbeddedBroker(settings)
+        self.settings = settings if self._broker is None else self._broker.settings
+        logs = settings.home / "log"
+        names = ["worker", *(f"worker-{number}" for number in range(2, workers + 1))]
+        self.workers = [SupervisedWorker(self.settings, store, logs / f"{name}.log") for name in names]
+        self._web = [] if listening is None else [_web_server(self.settings, listening)]
+
+    @property
+    def ready(self) -> bool:
+        """Whether every worker looks for work."""
+        return all(worker.takes_messages for worker in self.workers)
+
+    def ensure(self) -> None:
+        """Start what is not there, or not there any more. Raises HostError when the broker cannot be started."""
+        if self._broker is not None:
+            self._broker.ensure()
+        for worker in self.workers:
+            worker.ensure()
+            worker.process.keep_log_small()
+        for web in self._web:
+            web.ended()
+            web.start({})
+            web.keep_log_small()
+
+    def short_lived(self) -> str | None:
+        """A sentence about a process that ends again and again as soon as it is started; None where none does."""
+        for process in [*(worker.process for worker in self.workers), *self._web]:
+            if process.short_lives >= _SHORT_LIVES:
+                return f"a process ends as soon as it is started; {process.log} may tell why"
+        return None
+
+    def stop(self) -> int:
+        """End everything that was started here; returns how many jobs in flight went back."""
+        stop_all([*(worker.process for worker in self.workers), *self._web], _GRACE_SECONDS)
+        given_back = sum(worker.forget() for worker in self.workers)
+        if self._broker is not None:
+            self._broker.stop()
+        return given_back
+
+    def __enter__(self) -> Self:
+        release_dead_workers(self.settings, self._store)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+@contextmanager
+def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
+    """Holds the place of the one service of a home; what it gives leaves a note for whoever finds the place taken.
+
+    Raises UsageError, with the note, when it is taken. The place is free again when this process has ended, however.
+    """
+    path = run_file(settings.home / "run" / "up.lock")
+    try:
+        with path.open("a+") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                lock.seek(0)
+                found = " ".join(lock.read(400).split())
+                raise UsageError(f"robomark is up already in {settings.home} ({found})") from None
+
+            def leave(note: str) -> None:
+                lock.truncate(0)
+                lock.write(f"process {os.getpid()}{note}")
+                lock.flush()
+
+            leave("")
+            yield leave
+    except OSError as error:
+        raise HostError(f"{path} cannot be used: {error.strerror}") from None
+
+
+def _web_server(settings: Settings, listening: socket.socket) -> SupervisedProcess:
+    number = listening.fileno()
+    command = [sys.executable, "-m", "service.web.server", str(number)]
+    environment = {**os.environ, **settings.environment()}
+    return SupervisedProcess(command, environment, settings.home / "log" / "web.log", [number])

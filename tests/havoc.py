@@ -1,0 +1,363 @@
+"""Everything that can go wrong with a service, done to a real one on purpose, and the count of what came of it.
+
+Workers, broker and database are processes of their own. Workers are started again as another machine would start
+them: nobody tells what the ones before held, so that nothing but leases and fences can save it.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from sqlalchemy import func, select
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.orm import Session
+
+from builders import hand_in
+from postgresql_server import PostgresqlServer
+from processes import children, command_line, descendants
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.queue.broker import EmbeddedBroker
+from service.queue.celery_app import make_celery
+from service.queue.nudges import Nudger
+from service.queue.processes import end_processes, start_process
+from service.queue.tasks import WORKER_VARIABLE
+from service.queue.worker import new_worker_name
+from service.settings import Settings
+from service.store.engine import Store
+from service.store.intake import HandIn, accept_batch, load_hand_in
+from service.store.models import UNFINISHED, CriterionRow, Job, JobState, Lane, Presence, TrialRow
+from sim.errors import HostError
+
+#: Behaviours that differ; every hand-in is one of them, with a text of its own so that none is a copy of another.
+_VARIANTS = 12
+_MOMENTS = ("due_at", "lease_until", "heartbeat_at", "queued_at", "nudged_at", "started_at", "graded_at", "finished_at")
+_STEP = timedelta(hours=1)
+
+
+def _program(variant: int, number: int) -> str:
+    # Every fourth computes for a while, so that something can be done to it meanwhile.
+    work = "sum(range(40_000_000))\n" if variant % 4 == 0 else ""
+    return (
+        f"# hand-in {number}\n"
+        "from ev3dev2.motor import MoveTank, SpeedPercent, OUTPUT_B, OUTPUT_C\n"
+        "tank = MoveTank(OUTPUT_B, OUTPUT_C)\n"
+        f"tank.on_for_rotations(SpeedPercent({20 + variant}), SpeedPercent(20), 0.5)\n"
+        f"{work}print('PY::variant {variant}')\n"
+        f"tank.on_for_rotations(SpeedPercent(20), SpeedPercent({20 + variant}), 0.5)\n"
+    )
+
+
+def some_hand_ins(count: int) -> list[HandIn]:
+    """Short hand-ins of many students, each with a text of its own."""
+    return [hand_in(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
+
+
+def quiet_hashes() -> list[tuple[str, ...]]:
+    """The hash chains of the trials of each variant, as a run without a queue gives them."""
+    with Rig() as rig:
+        graded = [grade(each.submission, each.assignment, rig=rig) for each in some_hand_ins(_VARIANTS)]
+    return [tuple(trial.recording.sha256 for trial in each.trials) for each in graded]
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What came of it all."""
+
+    states: Mapping[JobState, int]
+    errors: Sequence[str]  # of those without a grade
+    doubled: int  # jobs with more or fewer rows of marks or trials than one grading gives
+    differing: int  # jobs whose hashes are not those of the quiet run
+    most_attempts: int
+    seconds: float
+    plagues: Mapping[str, int]
+
+    def sentence(self) -> str:
+        """For a reader."""
+        states = ", ".join(f"{count} {state.value}" for state, count in self.states.items())
+        plagues = ", ".join(f"{count} x {name}" for name, count in self.plagues.items())
+        return (
+            f"{states}; {self.doubled} doubled, {self.differing} with other hashes; most attempts for one "
+            f"{self.most_attempts}; {self.seconds:.0f} s; {plagues}"
+        )
+
+
+class Havoc:
+    """A broker, workers and a database, and ways to harm them. ``ensure`` starts again what has ended."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        store: Store,
+        server: PostgresqlServer | None,
+        workers: int,
+        seed: int,
+        disk: Path | None,
+    ) -> None:
+        self._broker = EmbeddedBroker(settings)
+        self._home = settings.home
+        self.settings = self._broker.settings
+        self.store = store
+        self._server = server
+        self._disk = disk
+        self._workers: list[subprocess.Popen[bytes] | None] = [None] * workers
+        self._frozen: list[tuple[float, list[int]]] = []
+        self._chance = random.Random(seed)
+        self.done: Counter[str] = Counter()
+
+    def ensure(self) -> None:
+        """Start what has ended, and let go on what was frozen for long enough."""
+        with suppress(HostError):
+            self._broker.ensure()
+        if self._server is not None:
+            self._server.ensure()
+        for place, worker in enumerate(self._workers):
+            if worker is None or worker.poll() is not None:
+                self._workers[place] = self._new_worker(place)
+        still = []
+        for until, pids in self._frozen:
+            if time.monotonic() >= until:
+                _signal(pids, signal.SIGCONT)
+            else:
+                still.append((until, pids))
+        self._frozen = still
+
+    def stop(self) -> None:
+        """End everything."""
+        for _, pids in self._frozen:
+            _signal(pids, signal.SIGCONT)
+        end_processes([worker for worker in self._workers if worker is not None], 0)
+        self._broker.stop()
+
+    def plagues(self) -> Mapping[str, Callable[[], None]]:
+        """By name, all that can be done to this service."""
+        common: dict[str, Callable[[], None]] = {
+            "worker killed": self._kill_worker,
+            "pool child killed": self._kill_pool_child,
+            "worker frozen past its lease": self._freeze_worker,
+            "broker killed": self._kill_broker,
+            "broker killed, its file lost": self._lose_broker,
+            "clock set forward": lambda: self._step_clock(_STEP),
+            "clock set back": lambda: self._step_clock(-_STEP),
+        }
+        if self._server is None:
+            own = {"database locked": self._lock_database}
+        else:
+            own = {"database ended": self._end_database, "database killed": self._kill_database}
+        full = {"disk full": self._fill_disk} if self._disk is not None else {"no file may grow": self._forbid_growth}
+        return common | own | full
+
+    def strike(self, name: str) -> None:
+        """Do it."""
+        self.plagues()[name]()
+        self.done[name] += 1
+
+    def _new_worker(self, place: int) -> subprocess.Popen[bytes]:
+        environment = {**os.environ, **self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
+        if place == 0 and self._server is not None:
+            # On many machines, one's clock is wrong.
+            environment["PYTHONPATH"] = str(Path(__file__).parent / "wrong_clock")
+        log = self._home / "log" / f"worker-{place}.log"
+        return start_process([sys.executable, "-m", "service.queue.worker"], environment, log, signal.SIGKILL)
+
+    def _some_worker(self) -> int | None:
+        running = [worker.pid for worker in self._workers if worker is not None and worker.poll() is None]
+        busy = [pid for pid in running if _pool_children(pid)]
+        return self._chance.choice(busy) if busy else None
+
+    def _kill_worker(self) -> None:
+        _signal([self._some_worker()], signal.SIGKILL)
+
+    def _kill_pool_child(self) -> None:
+        worker = self._some_worker()
+        if worker is not None:
+            _signal([self._chance.choice(_pool_children(worker))], signal.SIGKILL)
+
+    def _freeze_worker(self) -> None:
+        worker = self._some_worker()
+        if worker is not None:
+            pids = [worker, *descendants(worker)]
+            _signal(pids, signal.SIGSTOP)
+            self._frozen.append((time.monotonic() + 1.5 * self.settings.lease_seconds, pids))
+
+    def _kill_broker(self) -> None:
+        _signal([self._broker.pid], signal.SIGKILL)
+
+    def _lose_broker(self) -> None:
+        self._kill_broker()
+        time.sleep(0.2)
+        for path in (self._home / "broker").rglob("*.*"):
+            if path.is_file():
+                path.unlink()
+
+    def _end_database(self) -> None:
+        assert self._server is not None
+        self._server.end(self._chance.choice([signal.SIGINT, signal.SIGQUIT]))
+
+    def _kill_database(self) -> None:
+        assert self._server is not None
+        self._server.end(signal.SIGKILL)
+
+    def _lock_database(self) -> None:
+        with closing(sqlite3.connect(self._home / "robomark.db", isolation_level=None, timeout=30)) as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            time.sleep(self.settings.lease_seconds)
+            connection.execute("ROLLBACK")
+
+    def _step_clock(self, step: timedelta) -> None:
+        """To set the clock forward is to make all that is written older, at one moment."""
+
+        def change(session: Session) -> None:
+            for job in session.scalars(select(Job).with_for_update()):
+                for name in _MOMENTS:
+                    moment: datetime | None = getattr(job, name)
+                    if moment is not None:
+                        setattr(job, name, moment - step)
+                if job.plots_due_at is not None:
+                    job.plots_due_at -= step
+            for presence in session.scalars(select(Presence).with_for_update()):
+                presence.seen_at -= step
+
+        with suppress(DBAPIError), self.store.transaction() as session:
+            change(session)
+
+    def _fill_disk(self) -> None:
+        assert self._disk is not None
+        ballast = self._disk / "ballast"
+        with suppress(OSError), ballast.open("wb", buffering=0) as file:
+            while True:
+                file.write(b"\0" * 65536)
+        time.sleep(self.settings.lease_seconds)
+        ballast.unlink()
+
+    def _forbid_growth(self) -> None:
+        """Where no small disk can be had: no worker may write beyond the first bytes of a file, for a while."""
+        pids = [pid for worker in self._workers if worker is not None for pid in (worker.pid, *descendants(worker.pid))]
+        python = [pid for pid in pids if "python" in command_line(pid)]
+        for pid in python:
+            _limit_files(pid, 4096)
+        time.sleep(self.settings.lease_seconds)
+        for pid in python:
+            _limit_files(pid, resource.RLIM_INFINITY)
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """So many hand-ins, and a plague every so often until all have ended."""
+
+    hand_ins: int
+    #: Seconds from one plague to the next, at least and at most; each kind comes before any comes again.
+    pause: tuple[float, float]
+    seed: int = 1
+    patience_seconds: float = 300.0
+    tell: Callable[[str], None] = field(default=lambda _: None)
+
+    def run(self, havoc: Havoc, quiet: Sequence[tuple[str, ...]]) -> Tally:
+        """Hand in, do harm, wait for all to end, and count."""
+        chance = random.Random(self.seed)
+        names = list(havoc.plagues())
+        batch = accept_batch(havoc.store, "chaos", some_hand_ins(self.hand_ins), [], max_attempts=20).id
+        havoc.ensure()
+        Nudger(make_celery(havoc.settings), havoc.store, havoc.settings).grade(Lane.BATCH, self.hand_ins)
+        begun = time.monotonic()
+        next_at = begun
+        coming: list[str] = []
+        while (left := _unfinished(havoc.store, batch)) != 0:
+            havoc.ensure()
+            moment = time.monotonic()
+            assert moment - begun < self.patience_seconds, f"{left} have not ended after {moment - begun:.0f} s"
+            if moment >= next_at and left is not None and _begun(havoc.store, batch):
+                coming = coming or chance.sample(names, len(names))
+                name = coming.pop()
+                self.tell(f"{moment - begun:4.0f} s, {left:4} left: {name}")
+                havoc.strike(name)
+                next_at = time.monotonic() + chance.uniform(*self.pause)
+            time.sleep(0.1)
+        return _tally(havoc, batch, quiet, time.monotonic() - begun)
+
+
+@contextmanager
+def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
+    """A disk of its own at ``folder``, for those who may mount one; None for others."""
+    folder.mkdir(exist_ok=True)
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m,mode=755", "robomark", str(folder)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        yield None
+        return
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], capture_output=True, check=False)
+
+
+def _tally(havoc: Havoc, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float) -> Tally:
+    with havoc.store.reading() as session:
+        jobs = session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)).all()
+        doubled = differing = 0
+        criteria = len(load_hand_in(session, jobs[0].id).assignment.criteria)
+        for job in jobs:
+            if job.state is not JobState.DONE:
+                continue
+            variant = int(load_hand_in(session, job.id).submission.student.partition("-")[2]) % len(quiet)
+            trials = session.scalars(
+                select(TrialRow).where(TrialRow.job_id == job.id).order_by(TrialRow.position)
+            ).all()
+            marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
+            doubled += (len(trials), session.scalar(marked)) != (len(quiet[variant]), criteria)
+            differing += tuple(trial.sha256 for trial in trials) != quiet[variant]
+        return Tally(
+            states=Counter(job.state for job in jobs),
+            errors=[job.error or "" for job in jobs if job.state is not JobState.DONE],
+            doubled=doubled,
+            differing=differing,
+            most_attempts=max(job.attempt for job in jobs),
+            seconds=seconds,
+            plagues=dict(havoc.done),
+        )
+
+
+def _unfinished(store: Store, batch: str) -> int | None:
+    """How many have not ended; None while the database does not say."""
+    query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
+    try:
+        with store.reading() as session:
+            return session.scalar(query)
+    except DBAPIError:
+        return None
+
+
+def _begun(store: Store, batch: str) -> bool:
+    """Whether workers are at it, so that there is something to harm."""
+    query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state == JobState.RUNNING)
+    with suppress(DBAPIError), store.reading() as session:
+        return bool(session.scalar(query))
+    return False
+
+
+def _pool_children(worker: int) -> list[int]:
+    return [pid for pid in children(worker) if "spawn_main" in command_line(pid)]
+
+
+def _signal(pids: Sequence[int | None], number: signal.Signals) -> None:
+    for pid in pids:
+        if pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(pid, number)
+
+
+def _limit_files(pid: int, size: int) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))

@@ -1,0 +1,4 @@
+import time
+
+print("IMG_DATA")
+time.sleep(1)

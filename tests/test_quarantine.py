@@ -1,0 +1,217 @@
+"""Workers that check themselves with a known answer: one that is wrong is shut out, and its grades are run again."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from sqlalchemy import select
+
+import false_worker
+import report_builders
+import sim.robot
+from builders import hand_in, settings_in
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.queue import canaries as known_answers
+from service.queue.broker import EmbeddedBroker
+from service.queue.canaries import Answer, Watch
+from service.queue.celery_app import make_celery
+from service.queue.nudges import Nudger
+from service.queue.worker import QUARANTINED
+from service.settings import Settings
+from service.store import audit, canaries, grades, intake, jobs
+from service.store.engine import Store, open_store
+from service.store.intake import accept_batch
+from service.store.models import Job, JobState, Lane, Standing
+from sim.recording import Recording
+
+MOVE = (
+    "from ev3dev2.motor import MoveTank, OUTPUT_B, OUTPUT_C, SpeedPercent\n"
+    "MoveTank(OUTPUT_B, OUTPUT_C).on_for_seconds(SpeedPercent(30), SpeedPercent({speed}), 0.5)\n"
+)
+T = TypeVar("T")
+
+
+def _take(store: Store, *students: str) -> str:
+    return accept_batch(store, "class", [hand_in(name) for name in students], [], max_attempts=3).id
+
+
+def _grade_next(store: Store, worker: str) -> str:
+    claim = jobs.claim(store, worker, 60)
+    assert claim is not None
+    jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    return claim.job_id
+
+
+def _job(store: Store, job_id: str) -> Job:
+    with store.reading() as session:
+        return session.get_one(Job, job_id)
+
+
+def test_this_machine_gives_the_known_answer(rig: Rig) -> None:
+    assert known_answers.ask(rig) == known_answers.known()
+
+
+def test_a_falsified_constant_is_found_out(store: Store, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = Watch(store, rig, "machine-1", 3600)
+    assert watch.look() is Answer.RIGHT
+    monkeypatch.setattr(sim.robot, "ACCELERATION", 5100.0)
+    _take(store, "ada")
+    with watch.busy():
+        assert jobs.claim(store, "machine-1", 60) is not None
+    assert watch.look() is Answer.WRONG
+    with store.reading() as session:
+        (shut_out,) = canaries.in_quarantine(session)
+        assert shut_out.worker == "machine-1"
+        assert "trial 1 of the known answer has another hash" in shut_out.reason
+        assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
+
+
+def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
+    class Broken(Rig):
+        def run(self, *_: object) -> Recording:  # type: ignore[override]
+            raise OSError("no more processes")
+
+    with Broken() as broken:
+        assert Watch(store, broken, "machine-1", 3600).look() is Answer.UNCLEAR
+    with store.reading() as session:
+        assert canaries.in_quarantine(session) == []
+
+
+def test_a_process_looks_while_nobody_asks_it_to(store: Store, rig: Rig) -> None:
+    watch = Watch(store, rig, "machine-1", 1.0)
+    watch.keep_looking()
+    try:
+        _until(lambda: _last_right(store))
+        first = _last_right(store)
+        _until(lambda: _last_right(store) != first)
+    finally:
+        watch.end()
+
+
+def _last_right(store: Store) -> datetime | None:
+    with store.reading() as session:
+        return session.scalar(select(canaries.Canary.right_at))
+
+
+def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_to_be_seen(store: Store) -> None:
+    _take(store, "ada", "bob", "cid", "dan", "eve")
+    canaries.answered_rightly(store, "wrong", os.getpid())
+    good = _grade_next(store, "wrong")
+    canaries.answered_rightly(store, "wrong", os.getpid())
+    bad = _grade_next(store, "wrong")
+    elsewhere = _grade_next(store, "right")
+    running = jobs.claim(store, "wrong", 60)
+    assert running is not None
+    done = canaries.quarantine(store, "wrong", "it adds wrongly")
+    assert (done.taken_back, done.suspect, len(done.again)) == (1, (bad,), 1)
+    assert canaries.quarantine(store, "wrong", "again").suspect == ()
+
+    assert jobs.claim(store, "wrong", 60) is None
+    with pytest.raises(jobs.Fenced):
+        jobs.finish(store, running, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    assert (_job(store, running.job_id).state, _job(store, running.job_id).attempt) == (JobState.QUEUED, 0)
+
+    suspect, again = _job(store, bad), _job(store, done.again[0])
+    assert (suspect.state, suspect.standing) == (JobState.DONE, Standing.KEPT)
+    assert "wrong was found to grade wrongly: it adds wrongly" in (suspect.suspect or "")
+    assert (again.state, again.standing, again.regrade_of) == (JobState.QUEUED, Standing.STANDS, bad)
+    assert (again.submission_id, again.batch_id) == (suspect.submission_id, suspect.batch_id)
+    assert [_job(store, job_id).suspect for job_id in (good, elsewhere)] == [None, None]
+    graded = {_grade_next(store, "right") for _ in range(3)}
+    assert {again.id, running.job_id} < graded
+
+
+def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) -> None:
+    _take(store, "ada")
+    claim = jobs.claim(store, "wrong", 60)
+    assert claim is not None
+    canaries.quarantine(store, "wrong", "it adds wrongly")
+    with store.transaction() as session:
+        job = session.get_one(Job, claim.job_id)
+        job.state, job.lease = JobState.RUNNING, claim.lease
+    with pytest.raises(jobs.Fenced, match="in quarantine"):
+        jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+
+
+def _until(look: Callable[[], T | None], seconds: float = 120) -> T:
+    begun = time.monotonic()
+    while not (found := look()):
+        assert time.monotonic() - begun < seconds, "it does not come"
+        time.sleep(0.1)
+    return found
+
+
+@contextmanager
+def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subprocess.Popen[bytes]]:
+    environment = {**os.environ, **settings.environment(), **more}
+    log = settings.home / f"{Path(command[-1]).stem}.log"
+    with (
+        log.open("ab") as output,
+        subprocess.Popen([sys.executable, *command], env=environment, stdout=output, stderr=output) as process,
+    ):
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGTERM)
+
+
+@pytest.mark.long
+def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_hand_ins_again(tmp_path: Path, rig: Rig) -> None:
+    here = settings_in(tmp_path, concurrency=1, canary_seconds=4.0, lease_seconds=6.0)
+    switch = tmp_path / "false"
+    entry = str(Path(false_worker.__file__))
+    with EmbeddedBroker(here) as broker, open_store(here) as store:
+        nudger = Nudger(make_celery(broker.settings), store, broker.settings)
+
+        def submit(speeds: range) -> list[str]:
+            programs = [hand_in(f"student-{speed}", MOVE.format(speed=speed)) for speed in speeds]
+            batch = accept_batch(store, "class", programs, [], max_attempts=3)
+            nudger.grade(Lane.BATCH, len(programs))
+            return [job.job_id for job in batch.jobs]
+
+        with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
+            before = submit(range(10, 13))
+            _until(lambda: _unfinished(store) == 0)
+            vouched = _last_right(store)
+            # Its next look is then some seconds away.
+            _until(lambda: _last_right(store) != vouched)
+            switch.touch()
+            time.sleep(0.3)
+            spoilt = submit(range(20, 24))
+            _until(lambda: any(_job(store, one).suspect for one in spoilt), seconds=60)
+            assert wrong.wait(timeout=60) == QUARANTINED
+        with _worker(broker.settings, "-m", "service.queue.worker"):
+            _until(lambda: nudger.sweep() or _unfinished(store) == 0)
+        with store.reading() as session:
+            differs = 0
+            for job_id in [*before, *spoilt]:
+                taken_in = intake.load_hand_in(session, job_id)
+                job = session.get_one(Job, job_id)
+                query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
+                stands = session.scalars(query).one()
+                honest = grade(taken_in.submission, taken_in.assignment, rig=rig)
+                assert _chains(grades.load(session, stands.id)) == _chains(honest)
+                assert (stands.id == job_id) == (job.suspect is None)
+                differs += _chains(grades.load(session, job_id)) != _chains(honest)
+            assert differs, "the switch changed no grade"
+        assert "worker.quarantined" in (tmp_path / "false_worker.log").read_text()
+
+
+def _chains(graded: grades.Grade) -> list[str]:
+    return [trial.recording.sha256 for trial in graded.trials]
+
+
+def _unfinished(store: Store) -> int:
+    with store.reading() as session:
+        return len(session.scalars(select(Job.id).where(Job.state.in_((JobState.QUEUED, JobState.RUNNING)))).all())

@@ -1,0 +1,355 @@
+"""Recognition judged with recordings made by hand: truths, what becomes of pictures, and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import report_builders as build
+from service.grading.classification import NO_PICTURE
+from service.grading.grade import Accuracy, Confidence, CriterionResult, TrialResult
+from service.grading.judge import judge
+from service.grading.patches import decoded
+from service.grading.per_class import class_scores
+from service.reports.audience import student_view
+from service.reports.json_output import json_document
+from service.reports.recognition_table import recognition_tables
+from sim.backgrounds import SHAPES
+from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
+from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.criteria import SCHEMAS, Criterion
+
+START = Pose(100, 800, 0)
+HEAD = """
+id = "a"
+title = "A"
+[world]
+background = "Simple_Shapes"
+labels = {labels}
+[[scenario]]
+id = "s"
+poses = [[200, 900, 0], [280, 900, 0]]
+{sweep}
+[[criterion]]
+title = "Names it"
+marks = 4
+check = "{check}"
+"""
+
+
+def asked(check: str = "classification", **keys: Any) -> Criterion:
+    return SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})  # type: ignore[return-value]
+
+
+def recorded(
+    images: tuple[Image, ...] = (), messages: tuple[Message, ...] = (), faults: tuple[Fault, ...] = ()
+) -> Recording:
+    zeros, sums = np.zeros(300), np.zeros((300, 3), dtype=np.int64)
+    ticks = Ticks(100 + np.arange(1, 301.0), zeros + 800, zeros, zeros, zeros, sums, sums, zeros, zeros)
+    return Recording(
+        "Simple_Shapes", START, Pose(400, 800, 0), 10.0, ticks, Verdict.FINISHED, "0" * 64,
+        messages=messages, images=images, faults=faults,
+    )  # fmt: skip
+
+
+def talk(*exchanges: tuple[str | None, str | None]) -> Recording:
+    """A picture a second, 30 mm apart: what each shows, and the answer that arrives a tenth later."""
+    messages: list[Message] = []
+    images = []
+    for number, (truth, answer) in enumerate(exchanges):
+        t = float(number)
+        pose = Pose(100 + 30 * t, 800, 0)
+        images.append(Image(t, 30 * number, pose, bytes([number]) * 1600, b"\0" * 1600, len(messages), truth))
+        messages.append(Message(t, "robot", "IMG_DATA::{}", t))
+        if answer is not None:
+            messages.append(Message(t, "responder", answer, t + 0.1, len(messages) - 1))
+    return recorded(tuple(images), tuple(messages))
+
+
+def judged(criterion: Criterion, *recordings: Recording) -> CriterionResult:
+    scenario = Scenario("s", (START,), trials=max(1, len(recordings)))
+    assignment = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), (scenario,), (criterion,))
+    trials = tuple(TrialResult("s", n, 1, 0.0, 0.0, "visible", recording) for n, recording in enumerate(recordings))
+    return judge(assignment, trials)[0]
+
+
+def accuracy(result: CriterionResult) -> Accuracy:
+    assert result.accuracy is not None
+    return result.accuracy
+
+
+# What becomes of a picture
+
+
+@pytest.mark.parametrize(
+    ("answers", "fate", "duplicates"),
+    [
+        ([("square", 0.1, "")], "answered", 0),
+        ([("square", 1.0, "")], "answered", 0),
+        ([("square", 1.2, "")], "late", 0),
+        ([("square", None, "undelivered")], "late", 0),
+        ([("square", None, "lost")], "unanswered", 0),
+        ([("JSON::{", 0.1, "malformed")], "malformed", 0),
+        ([("JSON::{", 0.1, "malformed"), ("square", 0.2, "")], "answered", 1),
+        ([("square", 0.1, ""), ("square", 0.2, "duplicated")], "answered", 1),
+        ([("square", None, "lost"), ("square", 0.3, "")], "answered", 0),
+        ([("square", 1.3, ""), ("square", 0.3, "duplicated"), ("square", 0.4, "duplicated")], "answered", 2),
+        ([], "unanswered", 0),
+    ],
+)
+def test_every_picture_has_one_fate(answers: list[tuple[str, float | None, str]], fate: str, duplicates: int) -> None:
+    first = Message(0.0, "robot", "IMG_DATA::{}", 0.0)
+    replies = tuple(Message(0.0, "responder", text, t, 0, note) for text, t, note in answers)
+    last = len(replies) + 1
+    images = (
+        Image(0.0, 0, START, b"", b"", 0, "square"),
+        Image(1.0, 30, Pose(300, 800, 0), b"", b"", last, None),
+    )
+    recording = recorded(images, (first, *replies, Message(1.0, "robot", "IMG_DATA::{}", 1.0)))
+    counts = accuracy(judged(asked(), recording)).counts
+    assert counts is not None
+    expected = {"answered": 0, "late": 0, "malformed": 0, "unanswered": 1} | {"sent": 2, "duplicates": duplicates}
+    expected[fate] += 1
+    assert {name: getattr(counts, name) for name in expected} == expected
+
+
+def test_an_answer_that_is_no_text_is_malformed() -> None:
+    fault = Fault(0.0, Verdict.PROTOCOL_ERROR, "responder", "the responder returned dict instead of a text")
+    recording = replace(talk(("square", None)), faults=(fault,))
+    result = judged(asked(), recording)
+    counts = accuracy(result).counts
+    assert counts is not None
+    assert (counts.malformed, counts.unanswered) == (1, 0)
+    assert "returned dict instead of a text" in result.message
+
+
+def test_a_late_answer_counts_unless_the_criterion_says_otherwise() -> None:
+    late = talk(("square", "square"))
+    late = replace(late, messages=(late.messages[0], replace(late.messages[1], delivered=None, note="undelivered")))
+    assert judged(asked(), late).marks == 4
+    refused = judged(asked(late="wrong"), late)
+    assert refused.marks == 0
+    assert 'the answer came too late: "square"' in refused.message
+    assert "0 answered, 1 late, 0 malformed, 0 unanswered" in refused.message
+
+
+_TEXTS = st.sampled_from(["square", "diamond", "JSON::{", 'JSON::{"shape": "square"}', "square or diamond", "?"])
+_TIMES = st.none() | st.floats(0, 12)
+_REPLIES = st.lists(
+    st.tuples(_TEXTS, _TIMES, st.sampled_from(["", "lost", "duplicated", "malformed", "undelivered"])), max_size=4
+)
+_PICTURES = st.lists(
+    st.tuples(st.floats(0, 2), st.sampled_from([None, "square", "diamond"]), _REPLIES, st.booleans()), max_size=7
+)
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> Recording:
+    """Any talk about pictures, in any order of arrival; faults at any time."""
+    messages: list[Message] = []
+    images = []
+    t = 0.0
+    for wait, truth, replies, lost in draw(_PICTURES):
+        t += wait
+        images.append(Image(t, int(30 * t), Pose(100 + 10 * t, 800, 0), b"", b"", len(messages), truth))
+        asked_at = len(messages)
+        messages.append(Message(t, "robot", "IMG_DATA::{}", None if lost else t, note="lost" if lost else ""))
+        messages += [Message(t, "responder", text, at, asked_at, note) for text, at, note in replies]
+    times = draw(st.lists(st.floats(0, 12), max_size=3))
+    faults = tuple(
+        Fault(at, Verdict.PROTOCOL_ERROR, "responder", "the responder returned int instead of a text") for at in times
+    )
+    return recorded(tuple(images), tuple(messages), faults)
+
+
+@given(
+    st.lists(recordings(), min_size=1, max_size=3),
+    st.sampled_from(
+        [{}, {"pictures": "last"}, {"late": "wrong"}, {"each_pattern": "majority", "patterns": 2}, {"answer": "shape"}]
+    ),
+)
+def test_the_counts_add_up(played: list[Recording], keys: dict[str, Any]) -> None:
+    result = judged(asked(**keys), *played)
+    found = accuracy(result)
+    counts = found.counts
+    assert counts is not None
+    assert counts.sent == sum(len(recording.images) for recording in played)
+    assert counts.sent == counts.answered + counts.late + counts.malformed + counts.unanswered
+    assert found.n == counts.counted + counts.missing == sum(number for _, _, number in found.confusion)
+    assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_PICTURE)
+    assert sum(score.shown for score in class_scores(found)) == found.n
+    assert 0 <= found.low <= found.value <= found.high <= 1
+    numbers = [int(word) for word in recognition_tables(_grade_of(result))[0].sums.split() if word.isdecimal()]
+    assert numbers[0] == sum(numbers[1:5])
+
+
+def _grade_of(result: CriterionResult) -> Any:
+    return replace(build.shape_grade(), criteria=(result,), trials=())
+
+
+# Where the truth comes from
+
+
+def test_the_grey_patch_can_be_the_truth() -> None:
+    def patch(grey: int, edge: int = 0) -> bytes:
+        pixels = np.full((20, 20, 4), 255, np.uint8)
+        pixels[:, edge:, :3] = grey
+        return pixels.tobytes()
+
+    greys = (0, 42, 85, 127, 170, 212)
+    shown = [Image(0, 0, START, b"", patch(grey), 0) for grey in greys]
+    assert [decoded(image, "Simple_Shapes") for image in shown] == list(SHAPES)
+    for useless in (patch(60), patch(85, edge=5), patch(255)):
+        assert decoded(replace(shown[0], right=useless), "Simple_Shapes") is None
+    chance = np.random.default_rng(1)
+    noisy = np.frombuffer(patch(127), np.uint8).astype(int) + chance.integers(-32, 33, 1600)
+    image = replace(shown[0], right=noisy.clip(0, 255).astype(np.uint8).tobytes())
+    assert decoded(image, "Simple_Shapes", light_noise=32) == "downwards facing triangle"
+    assert decoded(image, "Simple_Shapes") is None
+    recording = talk((None, "left facing triangle"), (None, "square"))
+    seen = tuple(replace(image, right=patch(85)) for image in recording.images)
+    assert judged(asked(truth="grey"), replace(recording, images=seen)).marks == 2
+
+
+def test_the_instructors_places_can_be_the_truth() -> None:
+    # The left sensor of a robot at (100, 800) that faces 0 degrees is at (130, 820).
+    places = [[130, 820, "church"], [160, 828, "mill"], [400, 400, "inn"]]
+    recording = talk((None, "a church"), (None, "the mill"), (None, "church"))
+    assert judged(asked(truth="places", places=places), recording).message.startswith("2 of 2 pictures named rightly")
+    near = judged(asked(truth="places", places=places, within=5), recording)
+    assert near.message.startswith("1 of 1 pictures")
+
+
+def test_places_are_read_from_a_file(tmp_path: Any) -> None:
+    (tmp_path / "assignment.toml").write_text(
+        HEAD.format(labels="true", sweep="", check="classification") + 'truth = "places"\nplaces = "places.csv"\n'
+    )
+    (tmp_path / "places.csv").write_text("x,y,label\n230, 920 ,church\n\n310,920,mill\n")
+    (criterion,) = read_assignment(tmp_path).criteria
+    assert criterion.places == ((230.0, 920.0, "church"), (310.0, 920.0, "mill"))  # type: ignore[union-attr]
+    (tmp_path / "places.csv").write_text("230,920,church\n310,north,mill\n")
+    with pytest.raises(AssignmentProblems, match=r"assignment\.toml:17: places\.csv:2: '310,north,mill' is no place"):
+        read_assignment(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("labels", "sweep", "check", "keys", "sentence"),
+    [
+        ("true", "", "classification", 'truth = "places"', "needs truth = \"places\" and places together"),
+        ("true", "", "classification", 'truth = "places"\nplaces = "x.csv"', "expected a CSV file of x, y, label"),
+        ("false", "", "classification", 'truth = "grey"', "the world has labels = false"),
+        ("true", "", "classification", 'truth = "gray"', "neither \"label\", \"grey\" or \"places\" nor a list"),
+        ("true", "", "classification", "steps = [[0.9, 4], [0.5, 2]]", "steps that do not ascend"),
+        ("true", "", "classification", "steps = [[0.5, 2], [0.9, 3]]", "a last step of 3 marks, expected 4"),
+        ("true", "", "classification", "steps = [[0.5, 4]]\nat_least = 0.5", "has steps beside at_least"),
+        ("true", "", "classification", "patterns = 3", "has patterns without each_pattern"),
+        ("true", "", "classification", 'answer_from = "print"\nlate = "wrong"', "has confidence or late beside"),
+        ("true", "", "robustness", 'along = "offset_x"', "no scenario of the criterion is swept over it"),
+        ("true", "sweep = {loss = [0, 2]}", "classification", "", "has 2 in it, expected numbers from 0 to 1"),
+        ("true", "sweep = {delay = [1, 1]}", "classification", "", "has a level twice"),
+        ("true", "sweep = {tilt = [1]}", "classification", "", '"tilt" is not a key of this table'),
+        ("true", "start_jitter = [1, 2]", "classification", "", "[mm in x, mm in y, degrees]"),
+        (
+            "true",
+            "sweep = {offset_x = [0, 1]}",
+            "robustness",
+            'along = "offset_x"\nmarks_from = "falls_below"',
+            "needs level with marks_from",
+        ),
+        ("true", "trials = 1000\nsweep = {loss = [0, 0.5, 1]}", "classification", "", "too many trials"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named_with_their_line(
+    tmp_path: Any, labels: str, sweep: str, check: str, keys: str, sentence: str
+) -> None:
+    (tmp_path / "assignment.toml").write_text(HEAD.format(labels=labels, sweep=sweep, check=check) + keys)
+    with pytest.raises(AssignmentProblems) as found:
+        read_assignment(tmp_path)
+    assert sentence in str(found.value)
+
+
+# Confidence, steps, patterns, classes
+
+
+def test_confidence_is_averaged_apart_for_right_and_wrong() -> None:
+    said = 'JSON::{{"shape": "{}", "confidence": {}}}'.format
+    recording = talk(
+        ("square", said("square", 0.9)),
+        ("square", said("square", 0.7)),
+        ("diamond", said("square", 0.4)),
+        ("diamond", said("diamond", 7)),
+        ("diamond", said("diamond", "true")),
+    )
+    result = judged(asked(answer="shape", confidence="confidence"), recording)
+    assert accuracy(result).confidence == Confidence(pytest.approx(0.8), 2, pytest.approx(0.4), 1)
+    assert "Mean confidence 0.80 when right (2) and 0.40 when wrong (1)." in result.message
+    assert accuracy(judged(asked(answer="shape"), recording)).confidence is None
+
+
+@pytest.mark.parametrize(("right", "marks"), [(0, "0"), (4, "0"), (5, "2"), (8, "2"), (9, "4"), (10, "4")])
+def test_marks_by_steps(right: int, marks: str) -> None:
+    answers = [("square", "square" if number < right else "diamond") for number in range(10)]
+    result = judged(asked(steps=[[0.5, 2], [0.9, 4]]), talk(*answers))
+    assert result.marks == Decimal(marks)
+    assert ("Marks: 2 from 0.5 on, 4 from 0.9 on." in result.message) is (result.marks < 4)
+
+
+@pytest.mark.parametrize(
+    ("how", "answers", "named"),
+    [
+        ("first", ["diamond", "square", "square"], False),
+        ("any", ["diamond", "square", None], True),
+        ("any", ["diamond", None], False),
+        ("majority", ["diamond", "square", "square"], True),
+        ("majority", [None, None, "square"], True),
+        ("majority", ["diamond", "square"], False),
+        ("majority", [None, None], False),
+    ],
+)
+def test_pictures_of_one_pattern_are_one_answer(how: str, answers: list[str | None], named: bool) -> None:
+    recording = talk(*[("square", answer) for answer in answers])
+    close = tuple(replace(image, pose=Pose(100 + n, 800, 0)) for n, image in enumerate(recording.images))
+    result = judged(asked(each_pattern=how), replace(recording, images=close))
+    assert (accuracy(result).n, result.marks) == (1, 4 if named else 0), result.message
+    assert len(result.sights) == len(answers)
+    assert "patterns named rightly" in result.message
+
+
+def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
+    # 30 mm apart: the pictures before the gap are of one square, those after it of another.
+    recording = talk(("square", "square"), ("square", "square"), (None, "square"), ("square", "square"))
+    assert accuracy(judged(asked(each_pattern="first"), recording)).n == 2
+    result = judged(asked(each_pattern="first", patterns=4), recording)
+    assert (accuracy(result).n, result.marks) == (4, 2)
+    assert "pictures of 2 patterns, and 4 were expected" in result.message
+
+
+def test_precision_and_recall_of_each_class() -> None:
+    said = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
+    scores = {score.label: score for score in class_scores(accuracy(judged(asked(), talk(*said))))}
+    assert (scores["square"].precision, scores["square"].recall) == (1.0, 0.5)
+    assert (scores["diamond"].precision, scores["diamond"].recall) == (0.5, 0.5)
+    assert (scores["upwards facing triangle"].precision, scores["upwards facing triangle"].recall) == (None, None)
+
+
+def test_the_json_tells_counts_and_classes() -> None:
+    result = judged(asked(), talk(("square", "square"), ("diamond", None)))
+    (told,) = json_document(_grade_of(result))["criteria"]
+    assert told["recognition"]["counts"]["unanswered"] == 1
+    assert {"label": "square", "shown": 1, "answered": 1, "right": 1, "precision": 1.0, "recall": 1.0} in told[
+        "recognition"
+    ]["classes"]
+
+
+def test_a_student_sees_no_curve_of_hidden_trials() -> None:
+    grade = build.swept_grade()
+    assert student_view(grade).criteria[0].curves
+    hidden = replace(grade, trials=(*grade.trials[:-1], replace(grade.trials[-1], visibility="hidden")))
+    assert not student_view(hidden).criteria[0].curves

@@ -1,0 +1,209 @@
+"""Models that hand-ins bring: good ones are marked, bad ones get a verdict and a sentence and touch nothing."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import pickle
+import re
+import socket
+import sys
+import tomllib
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from model_handins_maker import FOLDER, TRACE, hand_ins
+from models import weights_bytes
+from models.networks import read
+from running import run_program
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from sim.errors import UsageError
+from sim.recording import Verdict
+from submissions.assignment_file import find_assignment
+from submissions.bundle import read_submission
+
+EXPECTED: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
+KIT = Path(__file__).parents[1] / "responders" / "kit"
+ONNX = importlib.util.find_spec("onnxruntime") is not None
+
+ASK_ONCE = 'import time\nprint("PY::now")\ntime.sleep(1)\n'
+LOAD = 'import joblib\nnetwork = joblib.load("model.joblib")\ndef responder(text): return str(network)\n'
+
+
+def graded(folder: Path, rig: Rig) -> Grade:
+    asked = find_assignment(str(FOLDER))
+    return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
+
+
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+def test_a_model_gets_marks_or_a_sentence(name: str, rig: Rig) -> None:
+    wanted = EXPECTED[name]
+    if importlib.util.find_spec(wanted.get("needs", "numpy")) is None:
+        pytest.skip(f"{wanted['needs']} is not installed")
+    result = graded(FOLDER / name, rig)
+    told = "\n".join(criterion.message for criterion in result.criteria)
+    assert (str(result.verdict), result.marks) == (wanted["verdict"], Decimal(wanted["marks"])), told
+    for phrase in wanted["feedback"]:
+        assert phrase in told
+    noted = "\n".join(note for trial in result.trials for note in trial.recording.notes)
+    for phrase in wanted.get("notes", ()):
+        assert phrase in noted
+    assert not Path(TRACE).exists()
+
+
+def test_every_hand_in_with_a_model_has_an_expectation() -> None:
+    assert {path.name for path in FOLDER.iterdir() if path.is_dir()} == set(EXPECTED)
+
+
+@pytest.mark.skipif(ONNX, reason="onnxruntime is installed")
+def test_without_onnxruntime_the_sentence_says_what_to_use_instead(rig: Rig) -> None:
+    result = graded(FOLDER / "convolution", rig)
+    assert result.verdict is Verdict.RESPONDER_ERROR
+    assert "use a scikit-learn network or plain weights (.npz) (line 9)" in result.criteria[0].message
+
+
+@pytest.mark.skipif(not ONNX, reason="onnxruntime is not installed")
+def test_a_session_of_the_students_own_has_one_thread(rig: Rig) -> None:
+    text = (
+        "import onnxruntime, numpy\noptions = onnxruntime.SessionOptions()\noptions.intra_op_num_threads = 4\n"
+        'session = onnxruntime.InferenceSession("shapes.onnx", options)\n'
+        'def responder(text): return str(session.run(None, {"image": numpy.ones((1, 1, 14, 14), "f4")})[0].shape)\n'
+    )
+    files = {"shapes.onnx": (FOLDER / "convolution" / "shapes.onnx").read_bytes()}
+    recording = run_program(rig, ASK_ONCE, responder=text, files=files, preamble="none")
+    assert recording.verdict is Verdict.FINISHED, recording.faults
+    assert recording.messages[-1].text == "(1, 6)"
+
+
+class Calls:
+    """Becomes a call when it is unpickled."""
+
+    def __init__(self, function: Callable[..., Any], *args: Any) -> None:
+        self._call = function, args
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return self._call
+
+
+@pytest.mark.parametrize("deed", ["writes a file", "reads a file", "deletes a file", "ends its parent", "connects"])
+def test_a_hostile_pickle_touches_nothing_outside(deed: str, rig: Rig, tmp_path: Path) -> None:
+    victim = tmp_path / "victim.txt"
+    victim.write_text("secret")
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        listening.settimeout(0.2)
+        calls = {
+            "writes a file": Calls(Path.write_text, victim, "changed"),
+            "reads a file": Calls(Path.read_text, victim),
+            "deletes a file": Calls(os.unlink, str(victim)),
+            "ends its parent": Calls(exec, "import os; os.kill(os.getppid(), 9)"),
+            "connects": Calls(socket.create_connection, listening.getsockname()),
+        }
+        files = {"model.joblib": pickle.dumps(calls[deed])}
+        recording = run_program(rig, ASK_ONCE, responder=LOAD, files=files, preamble="none")
+        with pytest.raises(TimeoutError):
+            listening.accept()
+    assert recording.verdict is Verdict.RESPONDER_ERROR
+    # Where bubblewrap works too, the file is not even there.
+    words = recording.faults[0].message
+    assert "model.joblib was stopped while it was loaded" in words or "No such file" in words
+    assert recording.faults[0].line == 2
+    assert victim.read_text() == "secret"
+    assert "secret" not in repr(recording)
+
+
+def test_a_model_of_more_than_16_mb_is_refused_by_name(tmp_path: Path) -> None:
+    asked = find_assignment(str(FOLDER))
+    (tmp_path / "responder.py").write_text("def responder(text): return text\n")
+    (tmp_path / "model.joblib").write_bytes(bytes((16 << 20) + 1))
+    with pytest.raises(UsageError, match=r"model\.joblib is too large, expected at most 16 MB a file"):
+        read_submission(tmp_path, asked=asked.parts)
+
+
+def test_large_models_that_may_be_handed_in_can_be_used(rig: Rig) -> None:
+    files = {f"{name}.joblib": bytes(11 << 20) for name in ("first", "second")}
+    text = 'size = len(open("second.joblib", "rb").read())\ndef responder(text): return str(size)\n'
+    recording = run_program(rig, ASK_ONCE, responder=text, files=files, preamble="none")
+    assert recording.verdict is Verdict.FINISHED, recording.faults
+    assert recording.messages[-1].text == str(11 << 20)
+
+
+@pytest.fixture
+def weights(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    """The kit's module as responders import it, forgotten afterwards."""
+    monkeypatch.syspath_prepend(str(KIT))
+    yield importlib.import_module("nn_tools.weights")
+    for name in [name for name in sys.modules if name.split(".")[0] == "nn_tools"]:
+        del sys.modules[name]
+
+
+def _weights(**changed: Any) -> bytes:
+    arrays = {
+        "coefs_0": np.eye(4, 3),
+        "intercepts_0": np.zeros(3),
+        "coefs_1": np.eye(3, 2),
+        "intercepts_1": np.zeros(2),
+        "activation": "relu",
+        "classes": ["left", "right"],
+    }
+    arrays = {key: value for key, value in (arrays | changed).items() if value is not None}
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def _empty_zip() -> bytes:
+    file = io.BytesIO()
+    zipfile.ZipFile(file, "w").close()
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"no zip at all", "model.npz is no file of plain weights; expected arrays written by numpy.savez"),
+        (_weights()[:200], "model.npz is no file of plain weights"),
+        (_empty_zip(), "model.npz has no array called coefs_0; expected coefs_0, intercepts_0, coefs_1"),
+        (_weights(classes=None), "model.npz has no array called classes"),
+        (_weights(intercepts_1=None), "model.npz has no array called intercepts_1"),
+        (_weights(activation="swish"), "model.npz has the activation 'swish'; expected one of relu, tanh, logistic"),
+        (_weights(classes=["one"]), "model.npz has 1 classes and 2 outputs; expected as many"),
+        (_weights(coefs_1=np.eye(5, 2)), "coefs_1 in model.npz takes 5 numbers, but the layer before gives 3"),
+        (_weights(intercepts_0=np.zeros(9)), "have the shapes (4, 3) and (9,); expected (inputs, outputs)"),
+        (_weights(coefs_0=np.array([["a"]])), "coefs_0 in model.npz does not hold numbers"),
+        (_weights(coefs_0=np.array([object()])), "model.npz is no file of plain weights"),
+    ],
+)
+def test_a_bad_file_of_weights_is_refused_with_a_sentence(
+    tmp_path: Path, weights: ModuleType, data: bytes, sentence: str
+) -> None:
+    (tmp_path / "model.npz").write_bytes(data)
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        weights.load_weights(tmp_path / "model.npz")
+
+
+@pytest.mark.parametrize("activation", ["relu", "tanh", "logistic", "identity"])
+def test_plain_weights_answer_as_the_network_that_they_come_from(
+    tmp_path: Path, weights: ModuleType, activation: str
+) -> None:
+    network = read(weights_bytes("shapes"))
+    network.activation = activation
+    weights.save_weights(network, tmp_path / "model.npz")
+    loaded = weights.load_weights(tmp_path / "model.npz")
+    images = np.random.default_rng(3).random((50, 196))
+    assert np.allclose(loaded.predict_proba(images), network.predict_proba(images))
+    assert np.array_equal(loaded.predict(images), network.predict(images))
+
+
+def test_the_responders_are_what_their_maker_makes() -> None:
+    for name, files in hand_ins().items():
+        assert (FOLDER / name / "responder.py").read_bytes() == files["responder.py"], name
