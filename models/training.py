@@ -54,7 +54,8 @@ def train(name: str, folder: Path) -> Card:
         check=False,
     )
     if process.returncode != 0:
-        raise HostError(f"training {name} failed: {process.stderr.strip().splitlines()[-1:] or 'no reason given'}")
+        reason = (process.stderr.strip().splitlines() or ["no reason given"])[-1]
+        raise HostError(f"training {name} failed: {reason}")
     return Card.from_json((folder / f"{name}.json").read_text())
 
 

@@ -158,7 +158,7 @@ class Responder:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
 
     def _note(self, sentence: str) -> None:
-        if len(self.notes) < _MOST_NOTES:
+        if len(self.notes) < _MOST_NOTES and sentence not in self.notes:
             self.notes.append(sentence)
 
     def _print(self, text: str) -> None:

@@ -109,8 +109,6 @@ class NotebookProcess(Responder):
                 fault = replace(fault, message=fault.message.replace("the responder asked", "it asked", 1))
                 self.raised.append(replace(fault, cell=fault.cell or self._cell))
                 self._note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
-            case "note":
-                self.note(frame["line"], frame["text"][:400])
             case "magic":
                 self._magics += 1
                 if self._magics > _MOST_MAGICS:
@@ -124,10 +122,15 @@ class NotebookProcess(Responder):
                 self._take(frame, -1, [])
 
     def _take(self, frame: wire.Frame, message: int, slept: list[int]) -> None:
-        if frame["do"] == "refused":
-            self.note(frame["line"], frame["what"][:200])
-        else:
-            super()._take(frame, message, slept)
+        match frame["do"]:
+            case "refused":
+                self.note(frame["line"], frame["what"][:200])
+            case "note":
+                # A responder may call magics too.
+                self._spend("", "sent")
+                self.note(frame["line"], frame["text"][:400])
+            case _:
+                super()._take(frame, message, slept)
 
     def _print(self, text: str) -> None:
         if self._cell != self._printed_in:

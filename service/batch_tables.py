@@ -44,7 +44,7 @@ def marks_table(lines: Sequence[JobLine]) -> Table:
             Text(line.assignment),
             _out_of(line.marks, line.max_marks),
             accuracy,
-            Text("; ".join([outcome, *_remarks(line)]), style=_STYLES.get(line.state, "")),
+            Text("; ".join([outcome, *remarks(line)]), style=_STYLES.get(line.state, "")),
             line.id,
         )
     return table
@@ -84,19 +84,16 @@ def history_table(history: Sequence[Entry]) -> Table:
     return table
 
 
-def _remarks(line: JobLine) -> list[str]:
-    remarks = []
-    if line.copied_from is not None:
-        remarks.append(f"same as {line.copied_from}")
-    if line.days_late:
-        remarks.append(f"{line.days_late} days late")
-    if line.staff_only is not None:
-        remarks.append(f"staff only: {line.staff_only}")
-    if line.suspect is not None:
-        remarks.append("suspect")
-    if line.published_at is not None:
-        remarks.append("published")
-    return remarks
+def remarks(line: JobLine) -> list[str]:
+    """What else is to be known of a grade, beside its marks."""
+    told = {
+        f"same as {line.copied_from}": line.copied_from is not None,
+        f"{line.days_late} days late": line.days_late > 0,
+        f"staff only: {line.staff_only}": line.staff_only is not None,
+        "suspect": line.suspect is not None,
+        "published": line.published_at is not None,
+    }
+    return [remark for remark, holds in told.items() if holds]
 
 
 def _worth_a_row(change: Change) -> bool:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from service.batch_tables import remarks
 from service.doctor import examine
 from service.grade_command import warn_of_no_walls
 from service.queue.broker import EmbeddedBroker
@@ -79,7 +80,8 @@ def show(
             graded = grades.load(session, line.id)
             plots = artifacts.get(session, line.id, prefix=PREFIX)
         sys.stdout.write(plain_text(graded))
-        print(f"plots: {line.plots.value}; graded by {line.worker}; the student's attempt {line.attempt}")
+        by = f"graded by {line.worker}" if line.copied_from is None else "not run"
+        print("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if report is None:
             return
         for written in write_reports(store, [line.id], report):

@@ -15,9 +15,13 @@ import numpy as np
 
 from service.grading.grade import (
     Accuracy,
+    AccuracyCurve,
+    Confidence,
+    Counts,
     CriterionResult,
     Evidence,
     Grade,
+    Level,
     Sight,
     TrialResult,
 )

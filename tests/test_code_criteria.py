@@ -115,6 +115,7 @@ def test_rule_that_is_broken_is_told_with_its_line(facts: SourceFacts) -> None:
         ("x = " + "+".join("1" * 100_000), "nested too deeply"),
         ("if x:\n" + "".join(" " * (depth + 1) + "if x:\n" for depth in range(98)) + " " * 100 + "pass\n", ""),
         ("\n".join(f"name_{i}.part_{i}({i})" for i in range(4_000)), ""),
+        ("for i in x:\n" + "".join(f"    {chr(0x4E00 + i) * 40}.f()\n" for i in range(900)), ""),
         ("x = 1\n" * 60_000, "more than 300000 characters"),
         ("'" + "\\N{DIGIT ONE}" * 1000 + "'", ""),
         ("x = '\ud800'", "characters"),
@@ -124,6 +125,15 @@ def test_hostile_texts_are_read_or_refused_inside_the_walls(text: str, error: st
     found = facts_of(text, rig)
     assert error in found.error
     assert bool(found.error) is bool(error)
+
+
+def test_what_is_avoided_cannot_be_hidden_behind_many_names(rig: Rig) -> None:
+    rules = criterion("source", avoids=["eval()"])
+    few = facts_of("\n".join(f"name_{i} = {i}" for i in range(300)), rig)
+    many = facts_of("\n".join(f"name_{i}({i})" for i in range(500)) + "\neval('1')", rig)
+    assert judge_source(rules, few, split_program("")[0]).passed  # type: ignore[arg-type]
+    outcome = judge_source(rules, many, split_program("")[0])  # type: ignore[arg-type]
+    assert "too many names to be sure" in outcome.message
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,12 +17,20 @@ import pytest
 from notebook_builder import MESSAGING
 from service.settings import Settings
 from submissions.assignment_file import find_assignment
+from submissions.assignment_tables import read_table
 from submissions.criteria import SCHEMAS
+from submissions.criteria.common import CriterionBase
 from submissions.example_folder import examples
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
+#: The section of each kind of criterion.
+SECTIONS = dict(
+    re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", (ROOT / "docs" / "criteria.md").read_text(), re.DOTALL | re.MULTILINE)
+)
+#: Kinds whose settings are explained with another kind.
+SHARES = {"says": ("prints",), "messages": ("prints",), "replies": ("prints",)}
 
 
 def commands(document: Path) -> Iterator[list[str]]:
@@ -66,11 +75,29 @@ def test_the_assignment_shown_is_in_order(tmp_path: Path) -> None:
     assert assignment.max_marks == 8
 
 
-def test_every_criterion_is_in_the_table() -> None:
-    shown = set(
-        re.findall(r"^\| (`[a-z_]+`(?:, `[a-z_]+`)*) \|", (ROOT / "docs" / "instructors.md").read_text(), re.MULTILINE)
-    )
-    assert {name for cell in shown for name in re.findall(r"[a-z_]+", cell)} >= SCHEMAS.keys()
+def test_every_kind_of_criterion_is_listed_for_instructors() -> None:
+    shown = re.findall(r"\[`([a-z_]+)`\]\(criteria\.md#([a-z_]+)\)", (ROOT / "docs" / "instructors.md").read_text())
+    assert {name for name, _ in shown} == SCHEMAS.keys()
+    assert all(name == anchor for name, anchor in shown)
+
+
+@pytest.mark.parametrize("kind", sorted(SCHEMAS))
+def test_every_kind_of_criterion_has_a_section_with_an_example_that_is_in_order(kind: str) -> None:
+    section = SECTIONS[kind]
+    examples_shown = re.findall(r"```toml\n(.*?)```", section, re.DOTALL)
+    assert examples_shown
+    for example in examples_shown:
+        table = tomllib.loads(example)
+        assert table["check"] == kind
+        assert isinstance(read_table(SCHEMAS[kind], table), SCHEMAS[kind])
+
+
+@pytest.mark.parametrize("kind", sorted(SCHEMAS))
+def test_every_setting_of_a_criterion_is_explained(kind: str) -> None:
+    text = SECTIONS[kind] + "".join(SECTIONS[other] for other in SHARES.get(kind, ()))
+    fields = SCHEMAS[kind].model_fields.items()
+    settings = {field.alias or name for name, field in fields if name not in CriterionBase.model_fields}
+    assert not {name for name in settings - {"check"} if not re.search(rf"\b{name}\b", text)}
 
 
 def test_every_setting_is_in_the_table() -> None:

@@ -126,7 +126,7 @@ def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.nda
 
 
 @pytest.mark.parametrize(("background", "paper"), [("MNIST_Digits", 255), ("MNIST_Digits_Black", 0)])
-@pytest.mark.parametrize(("dx", "dy"), [(0, 0), (2, 0), (-1, 3), (3, -2)])
+@pytest.mark.parametrize(("dx", "dy"), [(2, -1), (-3, 3)])
 def test_training_images_are_what_the_sensor_would_see(
     handwriting: tuple[np.ndarray, np.ndarray], background: str, paper: int, dx: int, dy: int
 ) -> None:

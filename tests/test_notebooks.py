@@ -450,6 +450,24 @@ def test_the_same_notebook_gives_the_same_chain_whatever_ran_before(tmp_path: Pa
     assert answers(first) == answers(second)
 
 
+def test_a_responder_may_call_magics_but_no_second_robot(tmp_path: Path, rig: Rig) -> None:
+    cells = [
+        "def responder(text):\n    %sim_magic -R\n    %cat log.txt\n    !ls\n    return 'ok'",
+        "%%writefile log.txt\nhi",
+    ]
+    result = graded(tmp_path, rig, [*cells, PROGRAM])
+    recording = result.trials[0].recording
+    assert (answers(recording), recording.verdict) == (["ok"], Verdict.FINISHED)
+    assert "cell 1, line 2: %sim_magic was skipped: the robot is still running" in result.notes
+    assert recording.responder_output.endswith("hi\n")
+
+
+def test_forged_frames_end_the_notebook(tmp_path: Path, rig: Rig) -> None:
+    forged = 'import os\nos.write(3, b\'{"n":2,"do":"played","missing":null}\\n\')'
+    (fault,) = recorded(tmp_path, rig, [RESPONDER, forged, PROGRAM]).faults
+    assert (fault.verdict, fault.cell) == (Verdict.SANDBOX_VIOLATION, 2)
+
+
 @pytest.mark.long
 def test_runs_that_are_not_marked_have_an_end(tmp_path: Path, rig: Rig) -> None:
     cells = [RESPONDER, two_programs("x"), "for i in range(400):\n    %sim_magic -R", PROGRAM]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -24,7 +23,6 @@ from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.nudges import Nudger
-from service.queue.worker import worker_lives
 from service.settings import Settings
 from service.store import artifacts, batches, grades, jobs
 from service.store.engine import Store, open_store
@@ -243,34 +241,6 @@ def test_a_cancelled_job_stops(service: Service) -> None:
         assert session.scalar(select(func.count()).select_from(TrialRow).where(TrialRow.job_id == job.id)) == 0
 
 
-def test_nothing_survives_a_killed_parent(tmp_path: Path) -> None:
-    settings = settings_in(tmp_path)
-    script = (
-        "import time\n"
-        "from service.queue.embedded import EmbeddedServices\n"
-        "from service.settings import load_settings\n"
-        "from service.store.engine import open_store\n"
-        "settings = load_settings()\n"
-        "with open_store(settings) as store, EmbeddedServices(settings, store):\n"
-        "    print('up', flush=True)\n"
-        "    time.sleep(600)\n"
-    )
-    environment = {**os.environ, **settings.environment()}
-    with subprocess.Popen([sys.executable, "-c", script], env=environment, stdout=subprocess.PIPE) as parent:
-        assert parent.stdout is not None
-        assert parent.stdout.readline() == b"up\n"
-        _until(lambda: 1 if worker_lives(settings) else None)
-        below = _descendants(parent.pid)
-        assert len(below) >= 2
-        parent.kill()
-    _until(lambda: None if any(map(_alive, below)) else 1)
-    assert not broker_answers(settings)
-    assert not worker_lives(settings)
-    # Nothing that is left keeps the next from starting.
-    with EmbeddedBroker(settings):
-        assert broker_answers(settings)
-
-
 def test_a_home_with_a_long_path_has_its_socket_elsewhere(tmp_path: Path) -> None:
     settings = settings_in(tmp_path / ("deep" * 30))
     path = socket_path(settings)
@@ -280,6 +250,30 @@ def test_a_home_with_a_long_path_has_its_socket_elsewhere(tmp_path: Path) -> Non
         assert broker_answers(settings)
     assert not broker_answers(settings)
     path.parent.rmdir() if not any(path.parent.iterdir()) else None
+
+
+def test_a_broker_whose_file_is_rubbish_begins_afresh(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    with EmbeddedBroker(settings):
+        pass
+    for path in (settings.home / "broker" / "appendonlydir").iterdir():
+        path.write_bytes(b"rubbish" * 100)
+    with EmbeddedBroker(settings):
+        assert broker_answers(settings)
+    assert (settings.home / "broker.unreadable").is_dir()
+
+
+def test_a_broker_holds_the_lock_of_its_home_as_long_as_it_lives(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    with EmbeddedBroker(settings) as broker:
+        assert broker.pid is not None
+        with (settings.home / "run" / "broker.lock").open() as lock:
+            with pytest.raises(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.kill(broker.pid, signal.SIGKILL)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        broker.ensure()
+        assert broker_answers(settings)
 
 
 def test_a_broker_that_was_found_running_is_left_running(tmp_path: Path) -> None:

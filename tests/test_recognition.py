@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,6 @@ from service.grading.judge import judge
 from service.grading.patches import decoded
 from service.grading.per_class import class_scores
 from service.reports.audience import student_view
-from service.reports.json_output import json_document
 from service.reports.recognition_table import recognition_tables
 from sim.backgrounds import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
@@ -227,7 +228,7 @@ def test_the_instructors_places_can_be_the_truth() -> None:
     assert near.message.startswith("1 of 1 pictures")
 
 
-def test_places_are_read_from_a_file(tmp_path: Any) -> None:
+def test_places_are_read_from_a_file(tmp_path: Path) -> None:
     (tmp_path / "assignment.toml").write_text(
         HEAD.format(labels="true", sweep="", check="classification") + 'truth = "places"\nplaces = "places.csv"\n'
     )
@@ -235,7 +236,7 @@ def test_places_are_read_from_a_file(tmp_path: Any) -> None:
     (criterion,) = read_assignment(tmp_path).criteria
     assert criterion.places == ((230.0, 920.0, "church"), (310.0, 920.0, "mill"))  # type: ignore[union-attr]
     (tmp_path / "places.csv").write_text("230,920,church\n310,north,mill\n")
-    with pytest.raises(AssignmentProblems, match=r"assignment\.toml:17: places\.csv:2: '310,north,mill' is no place"):
+    with pytest.raises(AssignmentProblems, match=r"assignment\.toml:16: places\.csv:2: '310,north,mill' is no place"):
         read_assignment(tmp_path)
 
 
@@ -267,12 +268,24 @@ def test_places_are_read_from_a_file(tmp_path: Any) -> None:
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_line(
-    tmp_path: Any, labels: str, sweep: str, check: str, keys: str, sentence: str
+    tmp_path: Path, labels: str, sweep: str, check: str, keys: str, sentence: str
 ) -> None:
     (tmp_path / "assignment.toml").write_text(HEAD.format(labels=labels, sweep=sweep, check=check) + keys)
     with pytest.raises(AssignmentProblems) as found:
         read_assignment(tmp_path)
     assert sentence in str(found.value)
+
+
+def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
+    document = (Path(__file__).parents[1] / "docs" / "recognition.md").read_text()
+    shown, training = re.findall(r"```toml\n(.*?)```", document, re.DOTALL)
+    (tmp_path / "assignment.toml").write_text(shown)
+    found = read_assignment(tmp_path)
+    assert len(list(found.trials())) == 70
+    (tmp_path / "assignment.toml").write_text(f"{shown}\n{training}".replace('"collected"', '"worse-and-worse"'))
+    (tmp_path / "drive_over_shapes.py").write_text("")
+    with pytest.raises(AssignmentProblems, match="scenarios names every scenario, expected one whose pictures"):
+        read_assignment(tmp_path)
 
 
 # Confidence, steps, patterns, classes
@@ -337,15 +350,6 @@ def test_precision_and_recall_of_each_class() -> None:
     assert (scores["square"].precision, scores["square"].recall) == (1.0, 0.5)
     assert (scores["diamond"].precision, scores["diamond"].recall) == (0.5, 0.5)
     assert (scores["upwards facing triangle"].precision, scores["upwards facing triangle"].recall) == (None, None)
-
-
-def test_the_json_tells_counts_and_classes() -> None:
-    result = judged(asked(), talk(("square", "square"), ("diamond", None)))
-    (told,) = json_document(_grade_of(result))["criteria"]
-    assert told["recognition"]["counts"]["unanswered"] == 1
-    assert {"label": "square", "shown": 1, "answered": 1, "right": 1, "precision": 1.0, "recall": 1.0} in told[
-        "recognition"
-    ]["classes"]
 
 
 def test_a_student_sees_no_curve_of_hidden_trials() -> None:

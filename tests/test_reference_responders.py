@@ -15,7 +15,10 @@ from sim.backgrounds import SHAPES
 from sim.recording import Pose, Recording, Verdict
 from sim.world import Noise
 
-NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
+NETWORK = {
+    "mlp_shapes_14x14.joblib": weights_bytes("shapes"),
+    "mlp_digits_14x14.joblib": weights_bytes("digits"),
+}
 
 SAY = """
 import time
@@ -110,3 +113,31 @@ def test_the_library_gives_only_its_own_files() -> None:
     assert all(library.source(name).startswith('"""') for name in library.NAMES)
     with pytest.raises(KeyError):
         library.source("../kit/nn_tools/sensor_data")
+
+
+@pytest.mark.parametrize("name", ["digit_responder", "plain_digit_responder"])
+def test_digits_of_a_sheet_are_named(rig: Rig, name: str) -> None:
+    right = 0
+    for column in range(10):
+        recording = run_program(
+            rig,
+            SAY.format(texts=["IMG_DATA"]),
+            Pose(100 + 100 * column, 1050, 90),
+            responder=library.source(name),
+            files=NETWORK,
+            background="MNIST_Digits",
+            preamble="none",
+        )
+        (answer,) = answers(recording)
+        right += str(answer["digit"]) == recording.images[0].truth
+    assert right >= 9
+
+
+def test_the_digit_responder_says_how_sure_it_is_and_sees_paper_as_paper(rig: Rig) -> None:
+    sheet = {"background": "MNIST_Digits", "start": Pose(100, 1050, 90)}
+    (answer,) = answers(converse(rig, "digit_responder", ["IMG_DATA"], **sheet))
+    assert 0.5 < answer["confidence"] <= 1
+    assert answers(converse(rig, "digit_responder", ["IMG_DATA"], noise=Noise(light=64))) == [
+        {"report": "Agent says: I see no digit"}
+    ]
+    assert answers(converse(rig, "digit_responder", ["PY::hello"])) == [{"report": "Agent says: I heard hello"}]

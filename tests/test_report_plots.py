@@ -33,6 +33,7 @@ def _talk(*messages: Message, calls: tuple[Call, ...] = ()) -> Recording:
 def test_names_of_all_plots() -> None:
     assert set(draw_all(build.shape_grade())) == {
         "confusion-names-the-right-shape",
+        "misread-names-the-right-shape",
         "sights-names-the-right-shape",
         "path-each-shape-5",
         "sensors-each-shape-5",

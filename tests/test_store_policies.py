@@ -12,7 +12,7 @@ import report_builders
 from builders import hand_in
 from service.store import batches, grades, jobs, policies, regrades
 from service.store.engine import Store, now
-from service.store.intake import Accepted, accept_batch, accept_new, course_of, enrolment
+from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of, enrolment
 from service.store.models import Job, JobState, Lane, Submission
 from service.store.policies import Limits
 from sim.recording import Verdict
@@ -130,6 +130,16 @@ def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
     assert over.staff_only == "handed in 9 minutes after the one before, where 10 are asked for"
     # What was over does not itself count.
     assert _hand_in(store, 3, DUE + timedelta(minutes=10)).staff_only == ""
+
+
+def test_what_a_person_hands_in_is_handed_in_now(store: Store) -> None:
+    _set(store, Limits(datetime.now(UTC) - DAY, late_days=2, cool_down_seconds=3600))
+    first = accept(store, hand_in("ada", "print(1)\n"), max_attempts=3)
+    assert first.staff_only == ""
+    _grade_all(store)
+    assert "0 minutes after" in accept(store, hand_in("ada", "print(2)\n"), max_attempts=3).staff_only
+    with store.reading() as session:
+        assert session.scalars(select(Submission.days_late)).all() == [2, 2]
 
 
 def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store) -> None:

@@ -4,6 +4,7 @@ It imports nothing of ours, runs nothing of what it reads, and judges nothing.
 """
 
 import ast
+import json
 
 _CONSTRUCTS = {
     ast.For: "for",
@@ -32,6 +33,7 @@ _LOOPS = (ast.For, ast.AsyncFor, ast.While, ast.ListComp, ast.SetComp, ast.DictC
 _LONGEST_TEXT = 300_000
 _MOST = 400
 _LONGEST = 60
+_MOST_TOLD = 50_000
 
 
 def facts(text):
@@ -53,7 +55,8 @@ def facts(text):
         _note(node, in_loop, found)
         below = in_loop or isinstance(node, _LOOPS)
         waiting.extend((child, below) for child in reversed(list(ast.iter_child_nodes(node))))
-    return {"error": None, **{kind: sorted(lines.items(), key=lambda item: item[1]) for kind, lines in found.items()}}
+    told = _fitted({kind: _by_line(lines) for kind, lines in found.items()})
+    return {"error": None, "cut": any(len(told[kind]) < len(found[kind]) for kind in found), **told}
 
 
 def _note(node, in_loop, found):
@@ -79,8 +82,22 @@ def _note(node, in_loop, found):
         _add(found["imports"], node.module or "", line)
 
 
+def _by_line(lines):
+    return sorted(lines.items(), key=lambda item: item[1])
+
+
+def _fitted(found):
+    """As much from the beginning of the file as the wire carries."""
+    for lines in found.values():
+        del lines[_MOST:]
+    while len(json.dumps(found)) > _MOST_TOLD:
+        longest = max(found, key=lambda kind: len(found[kind]))
+        del found[longest][len(found[longest]) // 2 :]
+    return found
+
+
 def _add(lines, name, line):
-    if name and (name in lines or len(lines) < _MOST):
+    if name:
         lines[name[:_LONGEST]] = min(line, lines.get(name[:_LONGEST], line))
 
 

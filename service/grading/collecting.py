@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.outcome import Outcome, failed, passed, pose_at, quoted
@@ -76,18 +77,14 @@ def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[P
 
 
 def _logged(recording: Recording) -> Iterator[Image]:
-    """Every left image of the log with the right one that follows it, as ``get_sensor_image_pair`` takes them."""
+    """Every left image of the log, with the right one if that follows it, as ``get_sensor_image_pair`` takes them."""
     log = recording.image_log
-    place = 0
-    while place + 1 < len(log):
-        (side, left, tick), (other, right, _) = log[place], log[place + 1]
-        if (side, other) != ("left", "right"):
-            place += 1
-            continue
-        t = tick / 30
-        pixels = _bytes(left)
-        yield Image(t, tick, pose_at(recording, t), pixels, _bytes(right), -1, side=round((len(pixels) / 4) ** 0.5))
-        place += 2
+    for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
+        if side == "left":
+            t = tick / 30
+            pixels = _bytes(left)
+            beside = _bytes(right) if other == "right" else b""
+            yield Image(t, tick, pose_at(recording, t), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))
 
 
 def _bytes(csv: str) -> bytes:

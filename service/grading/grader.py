@@ -166,6 +166,9 @@ class _Watch:
 
 
 def _parts(submission: Submission, assignment: Assignment) -> _Parts:
+    if submission.notebook is not None and assignment.training is not None:
+        function = assignment.training.function
+        raise UsageError(f"{submission.notebook.name}: is a notebook, expected responder.py with a function {function}")
     if submission.notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
         return _notebook_parts(submission, submission.notebook, assignment)
     program = _part("robot program", "robot.py", assignment.parts.program, submission.program, assignment)

@@ -108,7 +108,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     if len(outs) != wanted:
         row = turns[-1].row if turns else 0
         return failed(
-            f"Expected the robot to go out and come back {_times(wanted)}, but it did so {_times(len(outs))}.",
+            f"Expected the robot to go out and come back {_times(wanted)}, but it {_did(len(outs))}.",
             *place_at(recording, row),
             score=right,
             measures=measures,
@@ -162,14 +162,19 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     ignored = next((row for row in falls if row not in answered), None)
     if ignored is not None:
         return failed(
-            f"{expected}, but it did so {_times(len(answered))}; the first time that it did not is here.",
+            f"{expected}, but it {_did(len(answered))}; here is the first time that it did not.",
             *place_at(recording, ignored),
             score=score,
             measures=measures,
         )
+    sensor = "a light sensor" if criterion.light == "either" else f"its {criterion.light} light sensor"
+    fell = (
+        f"fell below {criterion.below:g} % only {_times(len(falls))}"
+        if falls
+        else f"never fell below {criterion.below:g} %"
+    )
     return failed(
-        f"{expected}, but the reading of its {criterion.light} light sensor fell below {criterion.below:g} % "
-        f"only {_times(len(falls))}.",
+        f"{expected}, but the reading of {sensor} {fell}.",
         recording.end_t,
         recording.end,
         score=score,
@@ -329,6 +334,10 @@ def _answered(criterion: Encounters, recording: Recording, row: int) -> bool:
 
 def _times(count: int) -> str:
     return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def _did(count: int) -> str:
+    return f"did so {_times(count)}" if count else "never did"
 
 
 def _nth(number: int) -> str:

@@ -66,16 +66,15 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
             score=score,
             measures=measures,
         )
-    if criterion.without_stopping:
-        for place in criterion.places:
-            row = _stop_in(recording, place, points)
-            if row is not None:
-                return failed(
-                    f"Expected {who} not to stop in {place}, but it stood still there.",
-                    *place_at(recording, row),
-                    score=score,
-                    measures=measures,
-                )
+    stops = [(place, row) for place in criterion.places if (row := _stop_in(recording, place, points)) is not None]
+    if criterion.without_stopping and stops:
+        place, row = stops[0]
+        return failed(
+            f"Expected {who} not to stop in {place}, but it stood still there.",
+            *place_at(recording, row),
+            score=Fraction(max(min(reached, enough) - len(stops), 0), enough),
+            measures=measures,
+        )
     places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
     return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
 
@@ -102,6 +101,8 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
             score=share,
             measures=measures,
         )
+    if _way(recording) < criterion.drives:
+        return _drove_too_little(recording, criterion.drives, measures)
     return passed(f"{_upper(who)} stayed in {where}.", recording.end_t, recording.end, measures)
 
 
@@ -124,6 +125,8 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
             *place_at(recording, row),
             measures=measures,
         )
+    if _way(recording) < criterion.drives:
+        return _drove_too_little(recording, criterion.drives, measures)
     return passed(
         f"{_upper(who)} kept out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
         f"by {np.nanmin(distances):.0f} mm or more.",
@@ -226,6 +229,21 @@ def _driven(recording: Recording, part: Part) -> Floats | None:
     """The part's positions; None if the pen never drew."""
     points = positions(recording, part)
     return None if np.isnan(points).all() else points
+
+
+def _way(recording: Recording) -> float:
+    """How far the robot drove in all, mm."""
+    return float(np.hypot(*np.diff(positions(recording), axis=0).T).sum())
+
+
+def _drove_too_little(recording: Recording, least: float, measures: tuple[Measure, ...]) -> Outcome:
+    return failed(
+        f"Expected the robot to drive {least:g} mm or more, but it drove only {_way(recording):.0f} mm.",
+        recording.end_t,
+        recording.end,
+        score=Fraction(min(_way(recording) / least, 1.0)).limit_denominator(1000),
+        measures=measures,
+    )
 
 
 def _no_pen(recording: Recording) -> Outcome:

@@ -84,7 +84,9 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         finally:
             # However it was told to end, nobody waits for the lease of what it did not finish.
             _give_back(store, name)
-        return QUARANTINED if _in_quarantine(store, name) else status
+        with suppress(DBAPIError):
+            status = QUARANTINED if _in_quarantine(store, name) else status
+        return status
 
 
 def _in_quarantine(store: Store, name: str) -> bool:

@@ -6,12 +6,10 @@ It shows all of the grade it is given; pass it a student's view where a student 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from decimal import Decimal
 from typing import Any
 
-from service.grading.grade import Accuracy, CriterionResult, Grade
-from service.grading.per_class import class_scores
+from service.grading.grade import Accuracy, Grade
 from service.reports.trace import storable
 
 SCHEMA = 1
@@ -33,7 +31,6 @@ def json_document(grade: Grade) -> dict[str, Any]:
                 "max_marks": json_number(result.max_marks),
                 "message": storable(result.message),
             }
-            | _recognition(result)
             for result in grade.criteria
         ],
         "trials": [
@@ -62,26 +59,6 @@ def json_text(grade: Grade) -> str:
 def json_number(value: Decimal) -> int | float:
     """A Decimal as JSON writes it: whole numbers without a point."""
     return int(value) if value == value.to_integral_value() else float(value)
-
-
-def _recognition(result: CriterionResult) -> dict[str, Any]:
-    """What a recognition criterion counted and measured; nothing for any other."""
-    accuracy = result.accuracy
-    if accuracy is None:
-        return {}
-    known: dict[str, Any] = {"accuracy": _accuracy(accuracy)}
-    if accuracy.counts is not None:
-        known["counts"] = asdict(accuracy.counts)
-    if accuracy.confidence is not None:
-        known["confidence"] = asdict(accuracy.confidence)
-    known["classes"] = [
-        {"label": storable(score.label), "shown": score.shown, "answered": score.answered, "right": score.right}
-        | {"precision": score.precision, "recall": score.recall}
-        for score in class_scores(accuracy)
-    ]
-    if result.curves:
-        known["curves"] = [asdict(curve) for curve in result.curves]
-    return {"recognition": known}
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

@@ -79,8 +79,9 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
 
 def _curve(counted: Counted) -> curve_plot.Curve:
     intervals = [tally.interval for tally in counted.tallies]
+    counts = {tally.n for tally in counted.tallies}
     return curve_plot.Curve(
-        label=counted.under,
+        label=f"{counted.under}, n = {counts.pop()}" if len(counts) == 1 else counted.under,
         x=counted.values,
         share=tuple(tally.share for tally in counted.tallies),
         low=tuple(low for low, _ in intervals),

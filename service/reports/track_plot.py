@@ -145,16 +145,30 @@ def _draw_pictures(axes: Axes, pictures: Sequence[Taken], beside: float) -> None
     axes.plot(
         [item.x for item in pictures], [item.y for item in pictures], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
     )
+    shown = []
     for item in pictures:
         angle = math.radians(item.heading + 90)
         x, y = item.x + beside * math.cos(angle), item.y + beside * math.sin(angle)
         axes.plot([item.x, x], [item.y, y], color=FAINT, linewidth=0.5, zorder=3)
-        marker, colour = ("o", SAID) if item.right else ("x", FAULT) if item.answered else ("s", INK)
-        for edge, size, width in (("white", 5.4, 2.2), (colour, 4.4, 1.2)):
-            axes.plot(
-                [x], [y], marker=marker, markersize=size, markerfacecolor="none", markeredgecolor=edge,
-                markeredgewidth=width, linestyle="none", zorder=5,
-            )  # fmt: skip
+        shown.append((x, y, *_mark(item)))
+    for x, y, marker, _ in shown:
+        _draw_mark(axes, x, y, marker, "white", 5.4, 2.2)
+    for x, y, marker, colour in shown:
+        _draw_mark(axes, x, y, marker, colour, 4.4, 1.2)
+
+
+def _mark(item: Taken) -> tuple[str, str]:
+    """Marker and colour: they tell the same, so that either will do."""
+    if item.right:
+        return "o", SAID
+    return ("x", FAULT) if item.answered else ("s", INK)
+
+
+def _draw_mark(axes: Axes, x: float, y: float, marker: str, colour: str, size: float, width: float) -> None:
+    axes.plot(
+        [x], [y], marker=marker, markersize=size, markerfacecolor="none", markeredgecolor=colour,
+        markeredgewidth=width, linestyle="none", zorder=5,
+    )  # fmt: skip
 
 
 def _draw_along(axes: Axes, pictures: Sequence[Taken]) -> None:

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import Store, now
-from service.store.models import Batch, BatchState, Canary, Job, JobState, Lane, Standing, Worker, new_id
+from service.store.models import Batch, BatchState, Canary, Job, JobState, Lane, Standing, Worker
 from service.version import GRADER_VERSION, grader_sha256
 
 _FORGOTTEN = timedelta(days=30)
@@ -141,7 +141,6 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
 def _run_again(session: Session, job: Job, sentence: str, at: datetime) -> str:
     cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
     again = Job(
-        id=new_id(),
         submission_id=job.submission_id,
         assignment_version_id=job.assignment_version_id,
         enrolment_id=job.enrolment_id,

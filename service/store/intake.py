@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from service.store import copies, models
 from service.store.engine import Store, now
+from service.store.ids import new_id
 from service.store.models import (
     AssignmentVersion,
     Batch,
@@ -26,7 +27,6 @@ from service.store.models import (
     Person,
     Role,
     Standing,
-    new_id,
 )
 from service.store.policies import Ruling, rule
 from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
@@ -88,10 +88,14 @@ class AcceptedNew:
 def accept(
     store: Store, hand_in: HandIn, *, course: str = DEFAULT_COURSE, max_attempts: int, lane: Lane = Lane.INTERACTIVE
 ) -> Accepted:
-    """Take in one hand-in that a person waits for; where an identical one has a grade, it has that grade at once."""
+    """Take in one hand-in that a person waits for; where an identical one has a grade, it has that grade at once.
+
+    It is handed in now, unless it says when.
+    """
     (packed,) = _pack([hand_in])
     with store.transaction() as session:
         at = now(session)
+        packed = replace(packed, hand_in=replace(hand_in, handed_in_at=hand_in.handed_in_at or at))
         return _accept(session, packed, _Terms(course_of(session, course, at), lane, max_attempts, at))
 
 

@@ -5,7 +5,6 @@ Only shapes and constraints; what is done with them stands in the modules beside
 
 from __future__ import annotations
 
-import secrets
 from datetime import datetime
 from decimal import Decimal
 from enum import StrEnum
@@ -15,14 +14,8 @@ from sqlalchemy import BigInteger, CheckConstraint, Enum, ForeignKey, Index, Lar
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
-
-ID_ALPHABET = "0123456789abcdefghjkmnpqrstvwxyz"
-ID_LENGTH = 12
-
-
-def new_id() -> str:
-    """A name that is hard to guess (60 bits) and easy to read out."""
-    return "".join(secrets.choice(ID_ALPHABET) for _ in range(ID_LENGTH))
+from service.store.ids import LENGTH as ID_LENGTH
+from service.store.ids import new_id
 
 
 class Role(StrEnum):

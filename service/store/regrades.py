@@ -27,7 +27,6 @@ from service.store.models import (
     Standing,
     Submission,
     TrialRow,
-    new_id,
 )
 from service.store.versions import freeze, keep
 from sim.errors import UsageError
@@ -196,7 +195,6 @@ def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfi
 
 def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int, at: datetime) -> Job:
     return Job(
-        id=new_id(),
         submission_id=job.submission_id,
         assignment_version_id=version_id or job.assignment_version_id,
         enrolment_id=job.enrolment_id,

@@ -16,8 +16,8 @@ from submissions.criteria.places import Area, Part, Range, ordered
 class Visits(CriterionBase):
     """The robot comes through every place, in the order of the list unless ``in_order = false``.
 
-    ``at_least`` is how many of them are enough. With ``without_stopping`` it must not stand still (for more than half a second, nor at the end) in any of
-    them. The score is the share of them that were reached.
+    ``at_least`` is how many of them are enough. With ``without_stopping`` it must not stand still (for more
+    than half a second, nor at the end) in any of them. The score is the share of them that were reached.
     """
 
     check: Literal["visits"]
@@ -35,19 +35,27 @@ class Visits(CriterionBase):
 
 
 class StaysInside(CriterionBase):
-    """At all times ``of`` is in one of the areas."""
+    """At all times ``of`` is in one of the areas.
+
+    ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
+    """
 
     check: Literal["stays_inside"]
     areas: tuple[Area, ...] = Field(min_length=1)
     of: Part = "robot"
+    drives: float = Field(default=0.0, ge=0)
 
 
 class KeepsOut(CriterionBase):
-    """At no time is ``of`` in any of the areas."""
+    """At no time is ``of`` in any of the areas.
+
+    ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
+    """
 
     check: Literal["keeps_out"]
     areas: tuple[Area, ...] = Field(min_length=1)
     of: Part = "robot"
+    drives: float = Field(default=0.0, ge=0)
 
 
 class TouchesNothing(CriterionBase):

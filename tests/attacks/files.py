@@ -64,7 +64,7 @@ def read_the_key_as_a_numpy_memory_map():
 
 @attack(LANDLOCK)
 def read_the_key_with_dots():
-    return contents(os.path.join("..", os.path.basename(targets.folder), "key"))
+    return contents(os.path.relpath(targets.key))
 
 
 @attack(LANDLOCK)
@@ -87,7 +87,7 @@ def read_the_key_through_proc_root():
 
 @attack(LANDLOCK)
 def read_the_key_through_proc_cwd():
-    return contents(f"/proc/self/cwd/../{os.path.basename(targets.folder)}/key")
+    return contents(f"/proc/self/cwd/{os.path.relpath(targets.key)}")
 
 
 @attack(EITHER)

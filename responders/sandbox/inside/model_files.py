@@ -48,7 +48,7 @@ def explain_joblib() -> None:
             raise
         except PermissionError as error:
             words = error.args[1] if len(error.args) > 1 else error
-            raise PermissionError(1, f"{file} was stopped while it was loaded: {words}") from None
+            raise PermissionError(f"{file} was stopped while it was loaded: {words}") from None
         except ModuleNotFoundError as error:
             package = str(error.name).partition(".")[0]
             raise ModuleNotFoundError(

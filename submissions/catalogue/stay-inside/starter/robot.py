@@ -4,6 +4,7 @@
 while True:
     tank_drive.on(SpeedPercent(30), SpeedPercent(30))
 
-    # TODO: wait until the light sensor sees the border.
+    # TODO: wait until the light sensor sees the border; so far this reads it once.
+    light = colorLeft.reflected_light_intensity_pc
 
     # TODO: drive backwards a little, then turn.

@@ -1,7 +1,7 @@
 %%sim_magic_preloaded -b Thruxton_Circuit -r Small_Robot -x 457 -y 242 -a 120
 SPEED = 40
 GAIN = 0.4
-SECONDS = 60
+SECONDS = 42
 
 while get_clock() < SECONDS:
     left_light = colorLeft.reflected_light_intensity_pc

@@ -1,0 +1,242 @@
+"""Judging how the robot moved: displacement, moves, excursions, encounters and drawings, with runs made by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from driving import criterion, driven, judged, measured, passes, rest, spin, straight
+from service.grading.drawing import between, legs_of
+from service.grading.moves import moves_of
+from sim.recording import Pose
+
+WHITE, BLACK = (255, 255, 255), (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "good"),
+    [
+        ({"forward": [295, 305]}, True),
+        ({"forward": [0, 299]}, False),
+        ({"sideways": [-1, 1], "turn": [89, 91]}, True),
+        ({"turn": [-91, -89]}, False),
+        ({"turn_size": [90, 90]}, True),
+        ({"distance": [300, 300], "agrees_with_wheels": 0.01}, True),
+        ({"left_wheel": [600, 630]}, True),
+        ({"left_wheel": [1000, 1100]}, False),
+        ({"seconds": [0, 1]}, False),
+    ],
+)
+def test_displacement_from_start_to_end(keys: dict[str, Any], good: bool) -> None:
+    run = driven(straight(300), rest(), spin(90))
+    assert passes(criterion("displacement", **keys), run) is good
+
+
+def test_displacement_is_seen_from_how_the_robot_stood() -> None:
+    result = judged(criterion("displacement", forward=[90, 110]), driven(straight(100), start=Pose(500, 500, 90)))
+    assert result.marks == 4
+    assert measured(result, "displacement") == pytest.approx(100)
+
+
+def test_wheels_that_did_not_carry_the_robot_are_told() -> None:
+    there_and_back = driven(straight(200), rest(), straight(-200))
+    result = judged(criterion("displacement", agrees_with_wheels=0.05), there_and_back)
+    assert "400 mm that its left wheel's position stands for" in result.message
+
+
+def test_moves_are_parted_by_rests_and_by_kind() -> None:
+    run = driven(straight(100), rest(4), straight(50), rest(2), straight(50), spin(90), rest(), straight(-60))
+    made = moves_of(run)
+    assert [round(move.distance) for move in made] == [100, 100, 0, 60]
+    assert [round(move.turn) for move in made] == [0, 0, 90, 0]
+    assert made[3].forward == pytest.approx(-60)
+
+
+def test_a_short_slip_into_a_bend_is_no_move_of_its_own() -> None:
+    assert len(moves_of(driven(straight(50), (5.0, 1.0, 4), straight(50)))) == 1
+
+
+RIGHT_ANGLE = [
+    {"name": "driving", "forward": [50, 250]},
+    {"name": "the right angle", "turn_size": [85, 95], "distance": [0, 20]},
+]
+
+
+@pytest.mark.parametrize(
+    ("moves", "keys", "good"),
+    [
+        ((straight(100), rest(), spin(90)), {}, True),
+        ((straight(100), rest(), spin(-90)), {}, True),
+        ((straight(100), rest(), spin(30), rest(), spin(90)), {}, True),
+        ((straight(100), rest(), spin(30), rest(), spin(90)), {"only": True}, False),
+        ((spin(90), rest(), straight(100)), {}, False),
+        ((spin(90), rest(), straight(100)), {"in_order": False}, True),
+        ((straight(100), rest(), spin(111)), {}, False),
+        ((rest(),), {}, False),
+        ((), {}, False),
+    ],
+)
+def test_moves_in_order(moves: Any, keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("moves", moves=RIGHT_ANGLE, **keys), driven(*moves)) is good
+
+
+def test_a_missing_move_tells_what_came_instead_and_when() -> None:
+    result = judged(criterion("moves", moves=RIGHT_ANGLE, over="mean"), driven(straight(100), rest(), spin(111)))
+    assert result.marks == 2
+    assert (
+        "at 2.03 s: Expected the right angle: a move of 0 to 20 mm away from where it began, 85 to 95° of turn, "
+        "but the robot turned 111.0° left in 1.23 s." in result.message
+    )
+    assert measured(result, "move 1 forward") == pytest.approx(100)
+    none = judged(criterion("moves", moves=RIGHT_ANGLE), driven())
+    assert "the robot made no move at all" in none.message
+
+
+def there_and_back(*heights: float, back: float = 0.0) -> Any:
+    """Out by each height and back to ``back`` mm from where it went out."""
+    moves = []
+    for height in heights:
+        moves += [straight(height), rest(), straight(back - height), rest()]
+    return driven(*moves)
+
+
+@pytest.mark.parametrize(
+    ("heights", "back", "good"),
+    [
+        ((100, 200, 100), 0, True),
+        ((-100, -200, -100), 0, True),
+        ((100, 200, 100), 10, False),  # the third return is 30 mm off
+        ((100, 200, 105), 0, True),
+        ((100, 200, 150), 0, False),
+        ((40, 80, 40), 0, False),
+        ((100, 200), 0, False),
+        ((100, 200, 100, 200), 0, False),
+    ],
+)
+def test_excursions_in_proportion(heights: tuple[float, ...], back: float, good: bool) -> None:
+    run = there_and_back(*heights, back=back)
+    assert passes(criterion("excursions", heights=[1, 2, 1]), run) is good
+
+
+def test_an_excursion_without_a_return_is_told() -> None:
+    result = judged(
+        criterion("excursions", heights=[1, 1]), driven(straight(100), rest(), straight(-100), straight(60))
+    )
+    assert result.marks == 0
+    assert "Expected the robot to go out about" in result.message
+    still = judged(criterion("excursions", heights=[1, 1]), driven())
+    assert "it never did" in still.message
+
+
+@given(st.lists(st.sampled_from((1, 2, 3)), min_size=1, max_size=5), st.sampled_from((60, 100)))
+@settings(max_examples=30, deadline=None)
+def test_excursions_as_asked_pass_and_their_peaks_are_measured(heights: list[int], unit: int) -> None:
+    result = judged(criterion("excursions", heights=heights), there_and_back(*[unit * height for height in heights]))
+    assert result.marks == 4, result.message
+    assert [measured(result, f"peak {n}") for n in range(1, len(heights) + 1)] == pytest.approx(
+        [unit * height for height in heights]
+    )
+
+
+def seeing(dark: range, count: int) -> list[tuple[int, int, int]]:
+    return [BLACK if tick in dark else WHITE for tick in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("after", "good"),
+    [
+        ((straight(-20), rest(), spin(90)), True),
+        ((spin(90), straight(-20)), False),  # the other way round
+        ((straight(-20), rest(40)), False),
+        ((rest(120), straight(-20), spin(90)), False),  # too late
+    ],
+)
+def test_encounters_are_answered_in_order_and_in_time(after: Any, good: bool) -> None:
+    moves = (straight(100), *after)
+    count = sum(ticks for _, _, ticks in moves)
+    run = driven(*moves, rgb=seeing(range(18, 22), count))
+    asked = criterion("encounters", light="left", below=40, then=["reverse", "turn"], seconds=3)
+    assert passes(asked, run) is good
+
+
+def test_an_unanswered_encounter_is_pointed_at() -> None:
+    moves = (straight(100), straight(-20), spin(90), straight(100))
+    count = sum(ticks for _, _, ticks in moves)
+    rgb = [BLACK if tick in (18, 60) else WHITE for tick in range(count)]
+    result = judged(criterion("encounters", light="left", below=40, at_least=2, over="mean"), driven(*moves, rgb=rgb))
+    assert result.marks == 2
+    assert "at 2.03 s" in result.message
+    never = judged(criterion("encounters", light="left", below=40), driven(*moves))
+    assert "never fell below 40 %" in never.message
+
+
+def square(side: float, angle: float = 90, legs: int = 4) -> list[Any]:
+    return [part for _ in range(legs) for part in (straight(side), rest(), spin(angle), rest())]
+
+
+@pytest.mark.parametrize(
+    ("moves", "keys", "good"),
+    [
+        (square(200), {}, True),
+        (square(200, -90), {}, True),
+        (square(200, 99), {}, False),
+        (square(200, legs=3), {}, False),
+        (square(40), {}, False),
+        (square(200) + square(300), {}, False),
+        (square(200) + square(300), {"figures": 2, "growing": True}, True),
+        (square(300) + square(200), {"figures": 2, "growing": True}, False),
+        (square(200) + square(300), {"figures": 2, "sizes": [[150, 250], [150, 250]]}, False),
+        (square(200) + square(300), {"figures": 1, "at_least": True}, True),
+        ([straight(200), spin(90), straight(240), spin(90), straight(200), spin(90), straight(240)], {}, True),
+        ([straight(200), spin(90), straight(260), spin(90), straight(200), spin(90), straight(260)], {}, False),
+    ],
+)
+def test_squares(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("drawing", legs=4, closes=True, **keys), driven(*moves)) is good
+
+
+def test_what_is_wrong_with_a_drawing_is_told() -> None:
+    asked = criterion("drawing", legs=4, closes=True)
+    assert "no -p" in judged(asked, driven(*square(200), pen=())).message
+    assert "after leg 1 the robot turned 99.0°" in judged(asked, driven(*square(200, 99))).message
+    assert "Expected 4 straight legs, but the path has none." in judged(asked, driven()).message
+    open_square = [straight(200), spin(90), straight(200), spin(90), straight(200), spin(90), straight(160)]
+    gap = judged(criterion("drawing", legs=4, closes=True, equal_within=0.3), driven(*open_square))
+    assert "the end is 40 mm away" in gap.message
+    assert passes(criterion("drawing", legs=4, pen=False), driven(*square(200), pen=()))
+
+
+def test_only_what_the_pen_draws_are_legs() -> None:
+    moves = (straight(200), rest(), spin(90), rest(), straight(200))
+    lifted = driven(*moves, pen=((0, True), (45, False)))
+    assert [round(leg.length) for leg in legs_of(lifted, pen=True)] == [200]
+    assert [round(leg.length) for leg in legs_of(lifted, pen=False)] == [200, 200]
+
+
+@given(st.integers(3, 8), st.integers(60, 400), st.sampled_from((-1, 1)), st.integers(0, 359))
+@settings(max_examples=40, deadline=None)
+def test_regular_polygons_are_recognised_in_any_direction(sides: int, side: int, way: int, heading: int) -> None:
+    angle = 360 / sides
+    turn = (0.0, way * angle / 30, 30)
+    moves = [part for _ in range(sides) for part in ((side / 30, 0.0, 30), rest(), turn, rest())]
+    run = driven(*moves, start=Pose(1000, 500, heading))
+    assert passes(criterion("drawing", legs=sides, angle=angle, angle_within=0.1, closes=True, shortest=50), run)
+    legs = legs_of(run, pen=True)
+    assert [leg.length for leg in legs] == pytest.approx([side] * sides, abs=1e-6)
+    turned = sum(between(one.direction, other.direction) for one, other in zip(legs, [*legs[1:], legs[0]], strict=True))
+    assert turned == pytest.approx(way * 360, abs=1e-6)
+
+
+def test_spread_tells_each_level_of_noise() -> None:
+    asked = criterion("spread", x=200, y=800)
+    result = judged(asked, driven(straight(100)), driven(straight(140)), motor_noise=20)
+    assert result.marks == 4
+    assert result.message == (
+        "The robot ended at these distances from (200, 800): with motor noise 20 0 to 40 mm (mean 20, 2 runs)."
+    )
+    near = judged(criterion("spread", x=200, y=800, within=10), driven(straight(100)), driven(straight(140)))
+    assert near.marks == 2
+    assert "it ended 40 mm from it" in near.message

@@ -1,0 +1,373 @@
+"""Judging where the robot went: places, areas, lines, laps and circuits, with runs and geometry made by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from driving import along, criterion, driven, judged, measured, passes, rest, spin, straight
+from service.grading.areas import distance_to
+from service.grading.circuits import rounds
+from service.grading.courses import along as along_line
+from service.grading.courses import covered
+from service.grading.whereabouts import positions
+from sim.backgrounds.centrelines import centrelines
+from sim.recording import Pose, Touch
+from submissions.criteria.places import Area, Course
+
+coordinates = st.floats(-500, 500, allow_nan=False).map(lambda value: round(value, 3))
+points = st.tuples(coordinates, coordinates)
+
+
+# areas
+
+
+@given(points, st.floats(1, 300))
+@settings(deadline=None)
+def test_a_bar_without_length_is_a_circle(point: tuple[float, float], radius: float) -> None:
+    circle, bar = Area(circle=(3, 4, radius)), Area(bar=(3, 4, 3, 4, radius))
+    assert distance_to(circle, np.array([point])) == pytest.approx(distance_to(bar, np.array([point])))
+
+
+@given(points)
+@settings(deadline=None)
+def test_a_rectangle_is_a_polygon_whichever_way_round(point: tuple[float, float]) -> None:
+    rectangle = Area(rectangle=(-100, -50, 200, 80))
+    corners = ((-100, -50), (200, -50), (200, 80), (-100, 80))
+    here = np.array([point])
+    for turned in (corners, corners[::-1], corners[2:] + corners[:2]):
+        assert distance_to(Area(polygon=turned), here) == pytest.approx(distance_to(rectangle, here))
+    inside = -100 < point[0] < 200 and -50 < point[1] < 80
+    assert (distance_to(rectangle, here)[0] < 0) == inside
+
+
+@given(points, st.floats(0, 2 * math.pi))
+@settings(deadline=None)
+def test_distance_is_how_far_one_must_go_to_the_edge(point: tuple[float, float], direction: float) -> None:
+    shape = Area(polygon=((0, 0), (300, 40), (250, 260), (120, 90), (-60, 200)))
+    distance = float(distance_to(shape, np.array([point]))[0])
+    step = abs(distance) * 0.999
+    moved = np.array([[point[0] + step * math.cos(direction), point[1] + step * math.sin(direction)]])
+    assert float(distance_to(shape, moved)[0]) * distance >= 0
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {},
+        {"circle": [0, 0, 10], "rectangle": [0, 0, 1, 1]},
+        {"rectangle": [10, 0, 0, 10]},
+        {"circle": [0, 0, 0]},
+        {"bar": [0, 0, 1, 1, -1]},
+        {"polygon": [[0, 0], [1, 1]]},
+    ],
+)
+def test_what_is_no_area_is_refused(table: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match="expected"):
+        Area.model_validate(table)
+
+
+# visits, stays_inside, keeps_out, touches_nothing
+
+
+NEAR, FAR = {"name": "the near place", "circle": [300, 800, 30]}, {"name": "the far place", "circle": [600, 800, 30]}
+
+
+@pytest.mark.parametrize(
+    ("keys", "marks"),
+    [
+        ({"places": [NEAR, FAR]}, 4),
+        ({"places": [FAR, NEAR]}, 2),
+        ({"places": [FAR, NEAR], "in_order": False}, 4),
+        ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 1}, 4),
+        ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 2}, 2),
+        ({"places": [NEAR], "without_stopping": True}, 4),
+        ({"places": [{"circle": [500, 800, 30]}], "without_stopping": True}, 0),
+        ({"places": [{"circle": [630, 830, 5]}], "of": "left_light"}, 0),
+        ({"places": [{"circle": [630, 820, 5]}], "of": "left_light"}, 4),
+    ],
+)
+def test_visits(keys: dict[str, Any], marks: float) -> None:
+    run = driven(straight(400), rest(20), straight(100))
+    asked = criterion("visits", over="mean", **keys)
+    result = judged(asked, run)
+    assert float(result.marks) == pytest.approx(marks, abs=0.05), result.message
+
+
+def test_stopping_at_the_end_is_stopping() -> None:
+    asked = criterion("visits", places=[FAR], without_stopping=True)
+    assert "not to stop in the far place" in judged(asked, driven(straight(500))).message
+
+
+def test_leaving_an_area_is_told_with_where_and_how_far() -> None:
+    asked = criterion("stays_inside", areas=[{"name": "the loop", "rectangle": [0, 700, 400, 900]}])
+    assert passes(asked, driven(straight(300)))
+    result = judged(asked, driven(straight(350), straight(-200)))
+    assert "at 2.03 s: Expected the robot to stay in the loop, but it left it at (405, 800)" in result.message
+    assert measured(result, "farthest out") == pytest.approx(50)
+    assert measured(result, "greatest x") == pytest.approx(450)
+
+
+def test_standing_still_earns_nothing_where_driving_is_asked() -> None:
+    for check, area in (("stays_inside", [0, 0, 2362, 1143]), ("keeps_out", [0, 0, 1, 1])):
+        asked = criterion(check, areas=[{"rectangle": area}], drives=300)
+        assert passes(asked, driven(straight(150), straight(-150)))
+        assert "to drive 300 mm or more, but it drove only 0 mm" in judged(asked, driven(rest())).message
+
+
+def test_several_areas_are_one() -> None:
+    halves = [{"rectangle": [0, 700, 250, 900]}, {"rectangle": [250, 700, 500, 900]}]
+    assert passes(criterion("stays_inside", areas=halves), driven(straight(300)))
+    assert not passes(criterion("keeps_out", areas=halves[1:]), driven(straight(300)))
+
+
+def test_the_pen_may_be_lifted_over_a_bar() -> None:
+    asked = criterion("keeps_out", of="pen", areas=[{"name": "the bar", "bar": [300, 700, 300, 900, 20]}])
+    run = driven(straight(400))
+    assert "Expected the pen to keep out of the bar" in judged(asked, run).message
+    lifted = driven(straight(400), pen=((0, True), (20, False), (60, True)))
+    assert passes(asked, lifted)
+    assert "has no -p" in judged(asked, driven(straight(400), pen=())).message
+
+
+def test_touches() -> None:
+    touch = Touch(1.0, "an obstacle", Pose(120, 800, 0))
+    run = driven(straight(100), touches=(touch,))
+    assert "touch nothing, but it touched an obstacle" in judged(criterion("touches_nothing"), run).message
+    assert passes(criterion("touches_nothing", at_most=1), run)
+
+
+# closest
+
+
+@pytest.mark.parametrize(
+    ("moves", "keys", "good"),
+    [
+        ((straight(500),), {"distance": [0, 100]}, False),
+        ((straight(500),), {"distance": [90, 110]}, False),
+        ((straight(400), spin(90), straight(200)), {"distance": [0, 100]}, True),
+        ((spin(30), straight(500)), {"than_straight": "nearer", "first_turn": "towards"}, True),
+        ((spin(-30), straight(500)), {"than_straight": "farther", "first_turn": "away"}, True),
+        ((spin(-30), straight(500)), {"first_turn": "towards"}, False),
+        ((straight(500),), {"first_turn": "towards"}, False),
+        ((spin(1, 1), straight(500)), {"first_turn": "towards"}, False),
+    ],
+)
+def test_closest(moves: Any, keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("closest", x=500, y=1000, **keys), driven(*moves)) is good
+
+
+# circuits
+
+
+@given(st.integers(1, 4), st.sampled_from((-1, 1)), st.floats(0.05, 0.9), points, st.floats(20, 300))
+@settings(max_examples=50, deadline=None)
+def test_winding_of_circles(whole: int, way: int, part: float, centre: tuple[float, float], radius: float) -> None:
+    angles = np.linspace(0, way * (whole + part) * 2 * math.pi, 400)
+    path = np.column_stack([centre[0] + radius * np.cos(angles), centre[1] + radius * np.sin(angles)])
+    assert rounds(path, *centre)[-1] == pytest.approx(way * (whole + part))
+    assert abs(rounds(path, centre[0] + 2 * radius, centre[1])[-1]) < 0.5
+
+
+@given(st.lists(points, min_size=2, max_size=30))
+@settings(max_examples=50, deadline=None)
+def test_winding_of_a_path_there_and_back_is_nothing(path: list[tuple[float, float]]) -> None:
+    there_and_back = np.array(path + path[::-1])
+    assert rounds(there_and_back, 700, 700)[-1] == pytest.approx(0, abs=1e-9)
+
+
+def loop(side: float, turn: float = 90, rounds_of_it: int = 1) -> list[Any]:
+    corner = (turn / 30 * 0.5, turn / 30, 30)
+    return [part for _ in range(4 * rounds_of_it) for part in (straight(side / 2), straight(side / 2), corner)]
+
+
+@pytest.mark.parametrize(
+    ("moves", "keys", "good"),
+    [
+        (loop(300), {"times": [0.9, 1.1]}, True),
+        (loop(300), {"times": [0.9, 1.1], "direction": "clockwise"}, False),
+        (loop(300, rounds_of_it=2), {"times": [0.9, 1.1]}, False),
+        (loop(300, rounds_of_it=3), {"times": [1, 9], "gyro": [330, 390], "corners": 4}, True),
+        (loop(300, rounds_of_it=3), {"times": [1, 9], "corners": 3}, False),
+        (loop(300, rounds_of_it=3), {"times": [1, 9], "gyro": [0, 330]}, False),
+        ([(8.0, 1.5, 600)], {"times": [1, 9], "corners": 4}, False),  # a circle has no corners
+    ],
+)
+def test_circuits(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("circuits", x=250, y=950, **keys), driven(*moves)) is good
+
+
+# follows, laps
+
+
+def wavy(offset: float = 0.0, speed: float = 4.0) -> Any:
+    """A run up the line of the test floor at x 141, ``offset`` mm to its left."""
+    line = np.array(centrelines()["Line_Following_Test/141"])
+    lengths = np.concatenate([[0], np.hypot(*np.diff(line, axis=0).T)]).cumsum()
+    places = np.arange(60, lengths[-1], speed)
+    x, y = np.interp(places, lengths, line[:, 0]), np.interp(places, lengths, line[:, 1])
+    directions = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
+    path = np.column_stack([x - offset * np.sin(directions), y + offset * np.cos(directions)])
+    return along(path, np.degrees(directions))
+
+
+LINE = {"on": "Line_Following_Test/141"}
+
+
+@pytest.mark.parametrize(
+    ("run", "keys", "good"),
+    [
+        (wavy(), {"covers": 0.95, "within": 5, "at_most": 5}, True),
+        (wavy(30), {"covers": 0.9, "within": 40, "one_side": 0.95}, True),
+        (wavy(30), {"covers": 0.9, "within": 20}, False),
+        (wavy(60), {"within": 50}, False),
+        (driven(straight(1000), start=Pose(141, 60, 90)), {"covers": 0.9, "within": 20}, False),
+        (driven(straight(1000), start=Pose(1000, 60, 90)), {}, False),
+    ],
+)
+def test_following_a_line(run: Any, keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("follows", line=LINE, **keys), run) is good
+
+
+def test_going_back_and_forth_over_the_line_is_not_one_side() -> None:
+    line = {"points": [[0, 0], [1000, 0]]}
+    places = np.arange(0, 1000, 5.0)
+    weaving = along(np.column_stack([places, 20 * np.sin(places / 30)]), np.zeros(len(places)))
+    result = judged(criterion("follows", line=line, one_side=0.9), weaving)
+    assert "for 90% of the time" in result.message
+    assert measured(result, "share covered") == pytest.approx(0.995)
+
+
+def test_a_short_cut_does_not_cover_what_it_leaves_out() -> None:
+    hairpin = {"points": [[0, 0], [1000, 0], [1000, 300], [0, 300]]}
+    there, over, back = np.arange(0, 300, 5.0), np.arange(0, 300, 5.0), np.arange(300, 0, -5.0)
+    parts = ((there, 0 * there), (300 + 0 * over, over), (back, 300 + 0 * back))
+    path = np.concatenate([np.column_stack(part) for part in parts])
+    result = judged(criterion("follows", line=hairpin, over="mean"), along(path, np.zeros(len(path))))
+    assert measured(result, "share covered") < 0.2
+
+
+def test_driving_against_the_direction_covers_nothing() -> None:
+    ring = {"ellipse": [500, 500, 200, 200]}
+    angles = np.linspace(0, -2 * math.pi, 500)
+    circle = np.column_stack([500 + 200 * np.cos(angles), 500 + 200 * np.sin(angles)])
+    result = judged(criterion("follows", line=ring), along(circle, np.degrees(angles)))
+    assert measured(result, "share covered") < 0.05
+
+
+@given(st.floats(0.1, 1.0), st.floats(0, 40), st.integers(-1, 1))
+@settings(max_examples=25, deadline=None)
+def test_what_is_driven_of_a_circle_is_covered(part: float, off: float, way: int) -> None:
+    course = Course(ellipse=(0, 0, 300, 300))
+    angles = np.linspace(0, part * 2 * math.pi, 300)
+    radius = 300 + way * off
+    found = along_line(course, radius * np.column_stack([np.cos(angles), np.sin(angles)]), 50)
+    assert found is not None
+    assert covered(found, 50, 0, found.length) == pytest.approx(part, abs=0.01)
+    assert np.abs(found.offset).max() == pytest.approx(off if way else 0, abs=0.2)
+    assert found.length == pytest.approx(2 * math.pi * 300, rel=1e-3)
+
+
+def circling(laps: float, seconds_a_lap: float, off: float = 0.0) -> Any:
+    """Round a circle of 300 mm about (500, 500) anticlockwise, from just below the start line on its right."""
+    count = round(laps * seconds_a_lap * 30)
+    angles = -0.1 + np.linspace(0, laps * 2 * math.pi, count + 1)
+    radius = 300 + off * np.sin(angles / 2) ** 2
+    path = np.column_stack([500 + radius * np.cos(angles), 500 + radius * np.sin(angles)])
+    return along(path, np.degrees(angles) + 90)
+
+
+CIRCUIT = {"line": {"ellipse": [500, 500, 300, 300], "name": "the track"}, "start_line": [750, 500, 850, 500]}
+
+
+def test_laps_are_timed_between_crossings() -> None:
+    result = judged(criterion("laps", **CIRCUIT), circling(2.2, 10.5))
+    assert result.marks == 4, result.message
+    assert measured(result, "lap time") == pytest.approx(10.5, abs=0.001)
+    assert measured(result, "laps") == 2
+
+
+@pytest.mark.parametrize(
+    ("run", "keys", "good"),
+    [
+        (circling(1.1, 10), {}, True),
+        (circling(1.1, 10), {"laps": 2}, False),
+        (circling(0.9, 10), {}, False),
+        (circling(1.1, 10), {"seconds": [0, 9]}, False),
+        (circling(1.1, 10, off=80), {}, False),
+        (circling(1.1, 10, off=50), {}, True),
+        (circling(-1.1, -10), {}, False),
+        (driven(straight(500)), {}, False),
+    ],
+)
+def test_laps(run: Any, keys: dict[str, Any], good: bool) -> None:
+    assert passes(criterion("laps", **CIRCUIT, **keys), run) is good
+
+
+def test_rocking_on_the_start_line_is_no_lap() -> None:
+    angles = -0.1 + 0.2 * np.abs(np.sin(np.linspace(0, 20, 400)))
+    path = np.column_stack([500 + 300 * np.cos(angles), 500 + 300 * np.sin(angles)])
+    result = judged(criterion("laps", **CIRCUIT), along(path, np.full(400, 90.0)))
+    assert result.marks == 0
+    assert "crossed the start line" in result.message
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {},
+        {"on": "Line_Following_Test/9"},
+        {"points": [[0, 0]]},
+        {"points": [[0, 0], [0, 0]]},
+        {"ellipse": [0, 0, 10, 10], "arc": [0, 720]},
+        {"ellipse": [0, 0, 0, 10]},
+        {"on": "Thruxton_Circuit", "points": [[0, 0], [1, 1]]},
+    ],
+)
+def test_what_is_no_line_is_refused(table: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match="expected"):
+        Course.model_validate(table)
+
+
+def test_named_lines_start_where_the_robots_start() -> None:
+    starts = {name: line[0] for name, line in centrelines().items()}
+    for name in ("141", "440", "771", "1076", "1453", "1821"):
+        x, y = starts[f"Line_Following_Test/{name}"]
+        assert abs(x - int(name)) <= 2
+        assert round(y) == 46
+    assert Course(on="Thruxton_Circuit").length() == pytest.approx(3850, rel=0.01)
+    assert all(0 <= y <= 1143 for line in centrelines().values() for _, y in line)
+
+
+# hostile recordings
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        criterion("visits", places=[NEAR]),
+        criterion("stays_inside", areas=[{"circle": [100, 800, 1]}]),
+        criterion("keeps_out", areas=[NEAR]),
+        criterion("keeps_out", areas=[NEAR], of="pen"),
+        criterion("closest", x=0, y=0, distance=[0, 10]),
+        criterion("circuits", x=0, y=0, times=[1, 2]),
+        criterion("follows", line=LINE),
+        criterion("laps", **CIRCUIT),
+        criterion("drawing", legs=4),
+        criterion("moves", moves=[{"forward": [1, 2]}]),
+        criterion("excursions", heights=[1]),
+        criterion("encounters", below=40),
+        criterion("displacement", turn=[90, 90]),
+    ],
+    ids=lambda asked: asked.check,
+)
+def test_a_run_without_a_tick_is_judged(asked: Any) -> None:
+    result = judged(asked, driven())
+    assert result.message
+    assert len(positions(driven())) == 1

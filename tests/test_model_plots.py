@@ -1,0 +1,103 @@
+"""The plots and tables of a classifier's evaluation show what was measured, and come out the same each time."""
+
+from __future__ import annotations
+
+import io
+import itertools
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+from typer.testing import CliRunner
+
+from models import card, shapes
+from models.cards import Measured, Tally
+from models.evaluation import Answered, Evaluation
+from models.views import Shift, Viewer
+from service.models_commands import models_app
+from service.reports.curve_plot import Curve, Panel, draw_curves
+from service.reports.model_plots import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    """Each shape seen three times; two squares and a diamond are taken for something else."""
+    read = [[0, 5, 5], [1] * 3, [2] * 3, [3] * 3, [4] * 3, [5, 5, 1]]
+    with Viewer() as viewer:
+        seen = [
+            Answered(place, 16, viewer.look(place, Shift(noise=16), draw), read[place.label][draw])
+            for place, draw in itertools.product(shapes.places(), range(3))
+        ]
+    confusion = np.zeros((6, 6), int)
+    for each in seen:
+        confusion[each.place.label, each.answer] += 1
+    about = card("shapes")
+    table = tuple(tuple(int(count) for count in row) for row in confusion)
+    return Evaluation(about, Measured(Tally(15, 18), table, about.measured.curves), tuple(seen))
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for holder in (figure, *figure.axes) for text in holder.texts]
+
+
+def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -> None:
+    figure = draw_evaluation_confusion(evaluation)
+    low, high = Tally(15, 18).interval
+    assert f"accuracy 0.833, 95 % interval {low:.3f} to {high:.3f}, n = 18 pictures" in texts(figure)
+    bold = [text for text in figure.axes[0].texts if str(text.get_fontproperties().get_file()).endswith("-Bold.ttf")]
+    assert sorted(int(text.get_text()) for text in bold) == [1, 1, 2, 2, 3, 3, 3, 3]
+
+
+def test_misread_images_stand_beside_right_ones_each_kind_first(evaluation: Evaluation) -> None:
+    figure = draw_misread(evaluation)
+    shown = texts(figure)
+    assert "all 3 misread, of n = 18 pictures; 14 × 14 grey pixels" in shown
+    assert [text for text in shown if text.startswith("✗")] == [
+        "✗ read as diamond",
+        "✗ read as right facing triangle",
+        "✗ read as diamond",
+    ]
+    pictures = [np.asarray(image.get_array()) for image in figure.axes[0].images]
+    assert len(pictures) == 9
+    right = {each.grey.tobytes(): each.place.label for each in evaluation.answered if each.right}
+    assert [right.get(picture.tobytes()) for picture in pictures] == [None, 0, 5, None, 5, 1, None, 0, 5]
+
+
+def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: Evaluation) -> None:
+    figure = draw_robustness(evaluation)
+    assert [axes.get_xlabel() for axes in figure.axes] == [
+        "light noise, grey levels either way",
+        "offset in x, mm",
+        "offset in y, mm",
+        "heading, degrees",
+    ]
+    assert texts(figure).count("n = 6 to 120 pictures a point") == 4
+    line = figure.axes[1].lines[2]
+    assert line.get_xdata().tolist() == list(evaluation.measured.curves[1].values)
+
+
+def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation: Evaluation) -> None:
+    first, second = evaluation_plots(evaluation), evaluation_plots(evaluation)
+    assert first == second
+    assert set(first) == {"shapes-confusion.png", "shapes-misread.png", "shapes-robustness.png"}
+    for data in first.values():
+        with Image.open(io.BytesIO(data)) as picture:
+            assert picture.width == 1040
+
+
+def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
+    curve = Curve("x", (3.0,), (0.5,), (0.2,), (0.8,), (12,))
+    figure = draw_curves([Panel("delay", "seconds", (curve,), level=0.8)], "A curve")
+    assert "asked for: 0.8" in texts(figure)
+    assert "n = 12 pictures a point" in texts(figure)
+
+
+def test_the_list_has_every_model_with_its_interval() -> None:
+    done = CliRunner().invoke(models_app, ["list"])
+    assert done.exit_code == 0
+    accuracy = card("digits").measured.accuracy
+    low, high = accuracy.interval
+    (line,) = [line for line in done.output.splitlines() if line.startswith("digits ")]
+    for part in (f"{accuracy.share:.3f}", f"{low:.3f} to {high:.3f}", str(accuracy.n)):
+        assert part in line

@@ -1,0 +1,110 @@
+"""Pictures of recognition: confusion with precision and recall, what was misread, curves, and the track."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image as Picture
+
+import report_builders as build
+from service.grading.grade import Accuracy, CriterionResult, Grade, Sight, TrialResult
+from service.reports.confusion_plot import draw_confusion
+from service.reports.html import student_report
+from service.reports.misread_plot import draw_misread, misread
+from service.reports.plots import draw_all, plots_of
+from service.reports.track_plot import along_the_way, draw_track, taken, tracks, worst_track
+from sim.backgrounds import floor
+from sim.recording import Image, Pose
+
+
+def _texts(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.findobj(Text) if isinstance(text, Text) and text.get_text()]
+
+
+def _moving() -> Grade:
+    """Two trials of the line follower's that send a picture each half second; the second names one in two rightly."""
+    grade = build.line_follower_grade()
+    left = build.shape_grade().trials[0].recording.images[0].left
+    trials: list[TrialResult] = []
+    sights = []
+    for index, trial in enumerate(grade.trials):
+        ticks = trial.recording.ticks
+        images = tuple(
+            Image(row / 30, row, Pose(float(ticks.x[row]), float(ticks.y[row]), 0.0), left, left, 0, "square")
+            for row in range(10, 290, 15)
+        )
+        trials.append(replace(trial, recording=replace(trial.recording, images=images)))
+        answers = ("square", "square") if index == 0 else ("square", None)
+        sights += [Sight(image, "square", answers[n % 2], trial.scenario, index) for n, image in enumerate(images)]
+    result = replace(grade.criteria[0], sights=tuple(sights))
+    return replace(grade, trials=tuple(trials), criteria=(result, *grade.criteria[1:]))
+
+
+def test_recognition_has_its_plots() -> None:
+    kinds = [plot.kind for plot in plots_of(build.swept_grade()) if not plot.scenario]
+    assert kinds == ["confusion", "curves", "misread", "sights"]
+    assert [plot.kind for plot in plots_of(_moving()) if not plot.scenario] == ["track", "sights"]
+    for data in draw_all(build.swept_grade()).values():
+        assert 300 < Picture.open(io.BytesIO(data)).height < 2600
+
+
+def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
+    accuracy = Accuracy(0.5, 0.2, 0.8, 8, ("a", "b"), (("a", "a", 3), ("a", "b", 1), ("b", "b", 1), ("b", None, 3)))
+    result = CriterionResult("c", "C", build.shape_grade().marks, build.shape_grade().marks, "")
+    shown = _texts(draw_confusion(result, accuracy, "t"))
+    assert {"precision", "recall", ".75", ".25", ".50", "1"} <= set(shown)  # b: recall 1 of 4, precision 1 of 2
+    assert any("n = 8 pictures" in text for text in shown)
+
+
+def test_a_misread_picture_stands_beside_the_nearest_right_ones() -> None:
+    grade = build.shape_grade(wrong=4)
+    (found,) = misread(grade.criteria[0].sights)
+    assert (found.number, found.sight.truth, found.sight.answer) == (5, "upwards facing triangle", "diamond")
+    assert found.like_truth is None
+    assert found.like_answer is not None
+    assert found.like_answer.truth == "diamond"
+    shown = _texts(draw_misread([found], 6, "t"))
+    assert {"misread", "right, same truth", "right, same answer", "none", "5. ✗ wrong"} <= set(shown)
+    assert any("1 misread of n = 6 pictures" in text for text in shown)
+    # Of two right pictures of a class the nearer one is shown.
+    far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
+    (again,) = misread((far, *grade.criteria[0].sights))
+    assert again.like_answer is found.like_answer
+
+
+def test_a_track_shows_every_picture_and_the_share_along_the_way() -> None:
+    grade = _moving()
+    sights = grade.criteria[0].sights
+    assert tracks(sights, grade.trials) == (0, 1)
+    assert worst_track(sights, grade.trials) == 1
+    pictures = taken(sights, grade.trials, 1)
+    assert [item.right for item in pictures[:3]] == [True, False, True]
+    assert not pictures[1].answered
+    way = np.array([item.way for item in pictures])
+    assert (np.diff(way) > 0).all()
+    curve = along_the_way([*taken(sights, grade.trials, 0), *pictures])
+    assert sum(curve.n) == len(sights)
+    assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
+    shown = _texts(draw_track(sights, grade.trials, "t", floor("Simple_Shapes").picture))
+    assert {"x, mm", "y, mm", "way driven, mm", "share right"} <= set(shown)
+    assert any(f"of n = {len(sights)} pictures right, 2 trials" in text for text in shown)
+
+
+def test_standing_still_is_no_track() -> None:
+    grade = build.shape_grade()
+    assert tracks(grade.criteria[0].sights, grade.trials) == ()
+
+
+@pytest.mark.parametrize("make", [build.swept_grade, build.hostile_grade])
+def test_the_page_has_the_figures(make: object) -> None:
+    grade = make()  # type: ignore[operator]
+    page = student_report(grade, {})
+    assert "Class by class" in page
+    if make is build.swept_grade:
+        assert "Pictures sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page
+        assert "Mean confidence 0.90 when right (n = 5)." in page

@@ -1,0 +1,154 @@
+"""Hand-ins that collect data or train a model on it, run for real; what goes wrong gets a verdict and a sentence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from service.grading.collecting import pairs
+from service.grading.grade import Grade
+from service.grading.grader import check_parts, grade
+from service.grading.rig import Rig
+from sim.errors import UsageError
+from sim.recording import Recording, Verdict
+from submissions.assignment import Assignment
+from submissions.assignment_file import find_assignment
+from submissions.bundle import read_submission
+from submissions.example_folder import examples
+from submissions.submission import Cell, Notebook, Source, Submission
+
+NEAREST = """
+from sklearn.neighbors import KNeighborsClassifier
+def train(images, labels):
+    print(images.shape, images.dtype, images.min(), images.max(), sorted(set(labels))[0])
+    return KNeighborsClassifier(1).fit(images, labels)
+"""
+ROWS = """
+class Model:
+    def predict(self, rows):
+        {}
+def train(images, labels):
+    return Model()
+"""
+
+
+@pytest.fixture(scope="module")
+def training() -> Assignment:
+    """The catalogue's, with one trial a scenario and little to use."""
+    asked = find_assignment("train-a-recogniser")
+    scenarios = tuple(replace(scenario, trials=1) for scenario in asked.scenarios[:2])
+    limits = replace(asked.limits, responder_cpu=1.0, responder_memory_mb=512)
+    return replace(asked, scenarios=scenarios, criteria=asked.criteria[:1], limits=limits)
+
+
+def trained(rig: Rig, asked: Assignment, text: str) -> Grade:
+    return grade(Submission("s", None, Source("responder.py", text)), asked, rig=rig)
+
+
+def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(rig: Rig, training: Assignment) -> None:
+    result = trained(rig, training, NEAREST)
+    learnt, unseen = result.trials
+    assert result.verdict is Verdict.FINISHED
+    assert learnt.recording.messages == ()
+    assert learnt.recording.sheet != unseen.recording.sheet
+    assert "196) float64 0.0 1.0 diamond" in unseen.recording.responder_output
+    accuracy = result.accuracy
+    assert accuracy is not None
+    assert accuracy.value > 0.5
+    assert accuracy.counts is not None
+    assert accuracy.counts.sent == accuracy.counts.answered == 170
+    again = trained(rig, training, NEAREST)
+    assert [trial.recording.sha256 for trial in again.trials] == [trial.recording.sha256 for trial in result.trials]
+    other = trained(rig, training, NEAREST.replace("fit(images, labels)", "fit(images, labels[::-1])"))
+    assert other.trials[0].recording.sha256 == learnt.recording.sha256
+    assert other.trials[1].recording.sha256 != unseen.recording.sha256
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict", "sentence"),
+    [
+        ("def train(images, labels):\n    return 1 / 0", Verdict.RESPONDER_ERROR, "division by zero (line 2)"),
+        ("def train(images, labels):\n    return 3", Verdict.RESPONDER_ERROR, "returned int, which has no predict"),
+        ("def fit(images, labels): pass", Verdict.RESPONDER_ERROR, "there is no function called train"),
+        ("def train(images, labels)", Verdict.RESPONDER_ERROR, "SyntaxError: expected ':' (line 1)"),
+        ("def train(images, labels):\n    while True: pass", Verdict.CPU_LIMIT, "more than 1 seconds of CPU time"),
+        (
+            "def train(images, labels):\n    return bytearray(2 << 30)",
+            Verdict.MEMORY_LIMIT,
+            "asked for more memory than it may have (line 2)",
+        ),
+        (ROWS.format("return ['square']"), Verdict.RESPONDER_ERROR, "predict gave 1 answers for"),
+        (ROWS.format("raise KeyError('no')"), Verdict.RESPONDER_ERROR, "KeyError: 'no' (line 4)"),
+        (ROWS.format("return [0.5] * len(rows)"), Verdict.FINISHED, 'the answer names no label: "0.5"'),
+        (
+            ROWS.format("import json; json.dumps = lambda *a, **k: '[1'; return [rows] * len(rows)"),
+            Verdict.RESPONDER_ERROR,
+            "returned a value that cannot be read",
+        ),
+    ],
+)  # fmt: skip
+def test_what_goes_wrong_in_training_is_told(
+    rig: Rig, training: Assignment, text: str, verdict: Verdict, sentence: str
+) -> None:
+    result = trained(rig, training, text)
+    told = " ".join(found.message for found in result.criteria)
+    assert (result.verdict, result.marks) == (verdict, 0), told
+    assert sentence in told
+    assert result.trials[0].verdict is Verdict.FINISHED
+
+
+def test_the_labels_of_unseen_images_are_nowhere_in_the_child(rig: Rig, training: Assignment) -> None:
+    """Everything that a hand-in can find: its folder, and its process's memory while it names unseen images."""
+    text = """
+import gc, os, numpy
+def train(images, labels):
+    return Model(len(labels))
+class Model:
+    def __init__(self, count):
+        self.count = count
+    def predict(self, rows):
+        arrays = [a for a in gc.get_objects() if isinstance(a, (list, tuple)) and 3 < len(a) <= 400]
+        named = {len(a) for a in arrays if all(isinstance(x, str) and "triangle" in x for x in a)}
+        print(sorted(os.listdir(".")), [numpy.load("train.npz")["labels"].size == self.count], sorted(named))
+        return ["square"] * len(rows)
+"""
+    found = trained(rig, training, text).trials[1].recording.responder_output
+    assert found.splitlines()[0] == "['train.npz'] [True] []"
+
+
+def test_a_notebook_is_no_function_that_trains(training: Assignment) -> None:
+    notebook = Notebook("work.ipynb", (Cell(1, "def train(images, labels): pass"),))
+    with pytest.raises(UsageError, match=r"work.ipynb: is a notebook, expected responder.py with a function train"):
+        check_parts(Submission("s", notebook=notebook), training)
+
+
+def collected(rig: Rig, name: str) -> Recording:
+    asked = find_assignment("collect-shapes")
+    submission = read_submission(examples("collect-shapes") / name, asked=asked.parts)
+    return grade(submission, asked, rig=rig).trials[0].recording
+
+
+def test_pairs_of_the_log_know_what_they_show(rig: Rig) -> None:
+    recording = collected(rig, "reference")
+    found = pairs(recording, "log")
+    assert len(found) * 2 == len(recording.image_log)
+    assert pairs(recording, "sent") == []
+    usable = Counter(pair.label for pair in found if pair.label is not None)
+    assert len(usable) == 6
+    # Where a patch can be decoded at all it tells the truth, or the sensor is beside the shape.
+    assert all(pair.truth in (None, pair.decoded) for pair in found if pair.decoded is not None)
+    assert sum(usable.values()) < len(found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "marks"),
+    [({}, 4), ({"each": 4}, 4), ({"each": 50}, 0), ({"classes": ("square",)}, 4), ({"most_duplicates": 0.0}, 0)],
+)
+def test_what_is_asked_of_training_data(rig: Rig, changes: dict[str, Any], marks: int) -> None:
+    asked = find_assignment("collect-shapes")
+    criterion = asked.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
+    submission = read_submission(examples("collect-shapes") / "reference", asked=asked.parts)
+    assert grade(submission, replace(asked, criteria=(criterion,)), rig=rig).marks == marks
