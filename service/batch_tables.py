@@ -13,6 +13,7 @@ from rich.text import Text
 from service.store.audit import Entry
 from service.store.batches import BatchLine, JobLine
 from service.store.models import BatchState, JobState, Standing
+from service.store.policies import in_days
 from service.store.regrades import Change, CriterionChange
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
@@ -88,7 +89,7 @@ def remarks(line: JobLine) -> list[str]:
     """What else is to be known of a grade, beside its marks."""
     told = {
         f"same as {line.copied_from}": line.copied_from is not None,
-        f"{line.days_late} days late": line.days_late > 0,
+        f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
         "suspect": line.suspect is not None,
         "published": line.published_at is not None,

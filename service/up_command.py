@@ -61,6 +61,7 @@ def serve(host: Host = "127.0.0.1", port: Port = 8470) -> None:
     from service.web.server import serve_on
 
     settings = load_settings()
+    open_store(settings).close()
     with listen(host, port) as listening:
         print(f"robomark answers on {address(listening)}; Ctrl-C ends it", flush=True)
         try:

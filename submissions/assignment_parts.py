@@ -90,6 +90,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         given_parts=MappingProxyType(given_parts),
         version=_version(files, given),
         training=training,
+        secret=head.secret,
     )
     if sum(1 for _ in assignment.trials()) > _MAX_TRIALS:
         problems.add(("scenario",), f"the scenarios ask for too many trials, expected at most {_MAX_TRIALS} in all")

@@ -40,6 +40,7 @@ class HeadTable(Table):
     given: tuple[str, ...] = ()
     given_models: dict[str, str] = Field(default_factory=dict)
     aliases: dict[str, tuple[str, ...]] = Field(default_factory=dict)  # of labels, for every classification
+    secret: str = Field(default="", max_length=200)  # decides the seeds of scenarios that are not visible
 
 
 class WorldTable(Table):

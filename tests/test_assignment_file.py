@@ -316,7 +316,7 @@ def test_assignment_is_found_by_id_and_by_path(tmp_path: Path) -> None:
     assert find_assignment(str(folder / "assignment.toml")).id == "a"
     with pytest.raises(UsageError, match='did you mean "echo-responder"'):
         find_assignment("echo-respnder")
-    with pytest.raises(UsageError, match="the catalogue has .*echo-responder"):
+    with pytest.raises(UsageError, match=r"the catalogue has .*echo-responder"):
         find_assignment("zzz")
 
 

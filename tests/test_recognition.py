@@ -26,6 +26,7 @@ from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
 from submissions.criteria import SCHEMAS, Criterion
+from submissions.sweep import Sweep
 
 START = Pose(100, 800, 0)
 HEAD = """
@@ -350,6 +351,20 @@ def test_precision_and_recall_of_each_class() -> None:
     assert (scores["square"].precision, scores["square"].recall) == (1.0, 0.5)
     assert (scores["diamond"].precision, scores["diamond"].recall) == (0.5, 0.5)
     assert (scores["upwards facing triangle"].precision, scores["upwards facing triangle"].recall) == (None, None)
+
+
+def test_the_levels_of_a_hidden_sweep_are_not_told() -> None:
+    scenario = Scenario("s", (START,), sweep=Sweep(light_noise=(0, 64)))
+    criterion = asked("robustness", along="light_noise")
+    assignment = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), (scenario,), (criterion,))
+    for visibility in ("visible", "hidden"):
+        trials = tuple(
+            TrialResult("s", n, 1, 64.0 * n, 0.0, visibility, talk(("square", "square")), (("light_noise", 64.0 * n),))
+            for n in range(2)
+        )
+        (result,) = judge(assignment, trials)
+        assert result.marks == 4
+        assert ("64" in result.message) is (visibility == "visible")
 
 
 def test_a_student_sees_no_curve_of_hidden_trials() -> None:

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -18,7 +19,7 @@ from service.grading.sweeps import area, part_above, range_above
 from service.store.plain import from_plain, to_plain
 from sim.recording import Pose
 from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
-from submissions.assignment_file import find_assignment
+from submissions.assignment_file import find_assignment, read_assignment
 from submissions.bundle import read_submission
 from submissions.criteria.classification import Robustness
 from submissions.example_folder import examples
@@ -106,6 +107,28 @@ def test_a_stored_assignment_keeps_its_sweep() -> None:
     back = from_plain(Assignment, to_plain(asked))
     assert list(back.trials()) == list(asked.trials())
     assert back.criteria == asked.criteria
+
+
+def test_a_secret_decides_the_seeds_of_what_is_hidden_and_of_nothing_else(tmp_path: Path) -> None:
+    text = """secret = "{}"
+id = "a"
+title = "A"
+[[scenario]]
+id = "shown"
+[[scenario]]
+id = "hidden"
+visibility = "hidden"
+[[criterion]]
+title = "Ends"
+marks = 1
+check = "finishes"
+"""
+    seeds = []
+    for secret in ("", "one", "two"):
+        (tmp_path / "assignment.toml").write_text(text.format(secret))
+        seeds.append([trial.seed for trial in read_assignment(tmp_path).trials()])
+    assert len({shown for shown, _ in seeds}) == 1
+    assert len({hidden for _, hidden in seeds}) == 3
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,8 @@ def judge_recognition(
         curve = curve_along(criterion.along, found.namings, by_index)
         share = share_of_robustness(criterion, curve)
         curves = (replace(curve, asked=criterion.level), *(other for other in curves if other.along != criterion.along))
-        words = _robustness_words(criterion, curve)
+        shown = all(trial.visibility == "visible" for _, trial in trials)
+        words = _robustness_words(criterion, curve) if shown else f" Along {CONDITIONS[criterion.along].words}."
     else:
         share = _share(criterion, found)
         words = _what_marks_need(criterion, found) if share < 1 else ""

@@ -19,7 +19,7 @@ from service.settings import Settings
 from service.store.engine import Store
 from service.store.jobs import Retry
 from service.store.models import Lane
-from service.store.sweep import due_plots, note_nudges, take_back_lost, wanting_nudges
+from service.store.sweep import due_plots, forget_nudges, note_nudges, take_back_lost, wanting_nudges
 
 _log = structlog.get_logger(__name__)
 #: What a broker that is not there can raise.
@@ -36,8 +36,12 @@ class Nudger:
 
     def grade(self, lane: Lane, count: int = 1) -> None:
         """Nudge for ``count`` jobs of a lane that were just taken in."""
-        if self._publish(GRADE_TASK, lane.value, count):
-            note_nudges(self.store, lane, count)
+        if count <= 0:
+            return
+        # Noted first: a claim passes over a row that is being written to, and the nudge would have been for nothing.
+        noted = note_nudges(self.store, lane, count)
+        if not self._publish(GRADE_TASK, lane.value, count):
+            forget_nudges(self.store, noted)
 
     def plot(self, count: int = 1) -> None:
         """Nudge for the plots of ``count`` jobs."""

@@ -220,13 +220,18 @@ def _trial_line(trial: TrialResult) -> TrialLine:
         scenario=one_line(trial.scenario, 60),
         index=trial.index + 1,
         start=f"{start.x:.0f}, {start.y:.0f}, {start.heading:.0f}°",
-        noise=f"{trial.light_noise:g} / {trial.motor_noise:g}",
+        noise=f"{trial.light_noise:g} / {trial.motor_noise:g}{_channel_words(trial)}",
         seed=str(trial.seed),
         seconds=f"{trial.recording.end_t:.2f}",
         words=verdict_words(trial.verdict),
         sha256=trial.recording.sha256[:12],
         visibility=trial.visibility,
     )
+
+
+def _channel_words(trial: TrialResult) -> str:
+    """What the channel was swept to; offsets and noise have columns of their own."""
+    return "".join(f"; {condition} {level:g}" for condition, level in trial.sweep if condition in ("loss", "delay"))
 
 
 def _entry(t: float, kind: str, text: str) -> Entry:

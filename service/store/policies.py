@@ -58,24 +58,29 @@ def limits(session: Session, enrolment_id: int, assignment: str) -> Limits:
     return replace(policy, due_at=due_at, attempts=attempts)
 
 
+def in_days(count: int) -> str:
+    """A number of days in words."""
+    return "1 day" if count == 1 else f"{count} days"
+
+
 def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, handed_in_at: datetime | None) -> Ruling:
     """What the policy says of a hand-in that comes in now; a moment of handing in that nobody knows is in time."""
     allowed = limits(session, enrolment_id, assignment)
     earlier = _counted(session, enrolment_id, assignment, sha256)
     if allowed.attempts is not None and len(earlier) >= allowed.attempts:
-        return Ruling(over=f"attempt {len(earlier) + 1}, where {allowed.attempts} are allowed")
+        return Ruling(over=f"attempt {len(earlier) + 1}, allowed: {allowed.attempts}")
     if handed_in_at is None:
         return Ruling()
     days_late = 0
     if allowed.due_at is not None and handed_in_at > allowed.due_at:
         days_late = math.ceil((handed_in_at - allowed.due_at) / timedelta(days=1))
         if days_late > allowed.late_days:
-            return Ruling(days_late, f"{days_late} days late, where {allowed.late_days} are allowed")
+            return Ruling(days_late, f"{in_days(days_late)} late, allowed: {allowed.late_days}")
     since = [handed_in_at - when for when in earlier if when <= handed_in_at]
     if since and min(since).total_seconds() < allowed.cool_down_seconds:
         minutes = math.floor(min(since).total_seconds() / 60)
         asked = math.ceil(allowed.cool_down_seconds / 60)
-        return Ruling(days_late, f"handed in {minutes} minutes after the one before, where {asked} are asked for")
+        return Ruling(days_late, f"handed in {minutes} min after the one before, asked for: {asked} min")
     return Ruling(days_late)
 
 

@@ -5,17 +5,22 @@ Publishes nothing; it says how many nudges are wanting.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 from sqlalchemy import func, or_, select, update
+from sqlalchemy.orm import Session
 
 from service.store.clock import mend
 from service.store.engine import Store, now
 from service.store.jobs import Retry, after_fault
 from service.store.models import Job, JobState, Lane, PlotState
 from service.store.turns import claimable
+
+
+#: Databases bound how many values one statement may carry.
+_AT_ONCE = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +58,8 @@ def wanting_nudges(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]
         return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
 
 
-def note_nudges(store: Store, lane: Lane, count: int) -> None:
-    """Remember that the ``count`` longest unnudged jobs of a lane were nudged now."""
+def note_nudges(store: Store, lane: Lane, count: int) -> Sequence[str]:
+    """Remember that the ``count`` longest unnudged jobs of a lane were nudged now. Returns their ids."""
     with store.transaction() as session:
         at = now(session)
         oldest = (
@@ -63,10 +68,15 @@ def note_nudges(store: Store, lane: Lane, count: int) -> None:
             .order_by(func.coalesce(Job.nudged_at, Job.queued_at), Job.id)
             .limit(count)
         )
-        session.execute(
-            update(Job).where(Job.id.in_(oldest)).values(nudged_at=at),
-            execution_options={"synchronize_session": False},
-        )
+        ids = session.scalars(oldest).all()
+        _set_nudged(session, ids, at)
+        return ids
+
+
+def forget_nudges(store: Store, ids: Sequence[str]) -> None:
+    """These were not nudged after all."""
+    with store.transaction() as session:
+        _set_nudged(session, ids, None)
 
 
 def due_plots(store: Store) -> int:
@@ -74,3 +84,10 @@ def due_plots(store: Store) -> int:
     with store.reading() as session:
         due = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
         return session.scalar(select(func.count()).select_from(Job).where(*due)) or 0
+
+
+def _set_nudged(session: Session, ids: Sequence[str], at: datetime | None) -> None:
+    for start in range(0, len(ids), _AT_ONCE):
+        some = (Job.id.in_(ids[start : start + _AT_ONCE]), Job.state == JobState.QUEUED)
+        options = {"synchronize_session": False}
+        session.execute(update(Job).where(*some).values(nudged_at=at), execution_options=options)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_serializer, field_validator, model_validator
 
 from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
 from submissions.criteria.parts import Table, Zone, zone_with_room
@@ -42,6 +42,13 @@ class Reports(CriterionBase):
         if rows and all(isinstance(row, list | tuple) and row and all(map(_entry, row)) for row in rows):
             return tuple(tuple(row) for row in rows)
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
+
+    @field_serializer("expected")
+    def _plain_rows(
+        self, value: Literal["label"] | tuple[tuple[float | str, ...], ...]
+    ) -> str | list[list[int | float | str]]:
+        # Pydantic's own takes neither the whole numbers nor the nesting.
+        return value if isinstance(value, str) else [list(row) for row in value]
 
     @field_validator("among")
     @classmethod

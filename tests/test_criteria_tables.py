@@ -1,0 +1,54 @@
+"""Mistakes in the tables of criteria about motion and paths are named with what was expected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from submissions.assignment_tables import read_table
+from submissions.criteria import SCHEMAS
+
+AREA = {"rectangle": [0, 0, 10, 10]}
+
+
+@pytest.mark.parametrize(
+    ("check", "keys", "place", "sentence"),
+    [
+        ("moves", {"moves": [{"foward": [1, 2]}]}, ("moves", 0, "foward"), 'did you mean "forward"?'),
+        ("moves", {"moves": [{"name": "a turn"}]}, ("moves", 0), "moves[0] asks for nothing, expected one of forward"),
+        ("moves", {"moves": []}, ("moves",), "moves has too few entries, expected at least 1"),
+        ("moves", {"moves": [{"turn": [90]}]}, ("moves", 0, "turn"), "too few numbers, expected [least, most]"),
+        ("moves", {"moves": [{"turn": [95, 85]}]}, ("moves", 0, "turn"), "a range with nothing in it"),
+        ("displacement", {}, (), "asks for nothing, expected one of forward"),
+        ("displacement", {"forward": "far"}, ("forward",), 'forward is "far", expected a list'),
+        ("excursions", {"heights": [1, -1]}, ("heights",), "expected proportions like [1, 2, 1]"),
+        ("encounters", {}, (), "below is missing"),
+        ("encounters", {"below": 40, "then": ["jump"]}, ("then", 0), 'expected "reverse", "turn" or "stop"'),
+        ("drawing", {"legs": 4, "figures": 2, "sizes": [[1, 2]]}, (), "has 1 sizes for 2 figures"),
+        ("visits", {"places": [AREA], "at_least": 2}, (), "has at_least = 2 of 1 places"),
+        ("visits", {"places": [{"rectangel": [0, 0, 1, 1]}]}, ("places", 0, "rectangel"), 'did you mean "rectangle"?'),
+        ("visits", {"places": [{"circle": [0, 0]}]}, ("places", 0, "circle"), "expected [x, y, radius]"),
+        ("keeps_out", {"areas": [AREA], "of": "nose"}, ("of",), 'expected "robot", "pen"'),
+        ("closest", {"x": 1, "y": 2}, (), "asks for nothing, expected one of distance"),
+        ("circuits", {"x": 1, "y": 2, "times": [0.5, 1], "gyro": [330, 390]}, (), "expected times to begin at 1"),
+        ("follows", {"line": {"on": "Loop"}}, ("line", "on"), 'expected one of "Line_Following_Test/141"'),
+        ("follows", {"line": {"on": "Thruxton_Circuit"}, "at_most": 10}, (), "expected at_most >= within"),
+        (
+            "laps",
+            {"line": {"points": [[0, 0], [1, 1]]}, "start_line": [0, 0, 1, 1]},
+            (),
+            "expected a closed one (closed = true)",
+        ),
+        ("pose", {"areas": [{"bar": [0, 0, 1, 1]}]}, ("areas", 0, "bar"), "expected [x1, y1, x2, y2, radius]"),
+        ("pose", {}, (), "expected x and y, heading, zone or areas"),
+    ],
+)
+def test_a_mistake_is_named_where_it_is(
+    check: str, keys: dict[str, Any], place: tuple[str | int, ...], sentence: str
+) -> None:
+    found = read_table(SCHEMAS[check], {"title": "A", "marks": 1, "check": check, **keys})
+    assert isinstance(found, list)
+    (problem,) = found
+    assert problem.path == place
+    assert sentence in problem.sentence
