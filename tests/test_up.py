@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -17,6 +18,7 @@ from sqlalchemy import func, select
 
 from builders import accept_one, hand_in, settings_in
 from processes import COMMAND, alive, command_line, descendants, robomark, until
+from service.command_line import main
 from service.queue.broker import broker_answers
 from service.queue.worker import worker_lives
 from service.settings import Settings
@@ -24,6 +26,8 @@ from service.store import phases
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.models import Job, JobState, PlotState
+from service.web.listening import listen
+from sim.errors import UsageError
 
 SPIN = "print('begun')\nwhile True:\n    pass\n"
 
@@ -169,12 +173,9 @@ def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
             "walls": False,
         }
         assert _metrics(address)["robomark_workers",] == 0
-        port = address.rpartition(":")[2]
-        other = subprocess.run(
-            [*COMMAND, "serve", "--port", port], env=os.environ | _environment(settings), capture_output=True, text=True
-        )
-        assert other.returncode == 2
-        assert "Address already in use" in other.stderr
+        host, _, port = address.removeprefix("http://").partition(":")
+        with pytest.raises(UsageError, match="Address already in use"):
+            listen(host, int(port))
         settings.home.joinpath("robomark.db").unlink()
         assert _get(f"{address}/metrics")[0] == 503
         assert _get(f"{address}/health/ready")[0] == 503
@@ -186,8 +187,12 @@ def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "arguments", [("up", "--workers", "0"), ("serve", "--port", "70000"), ("serve", "--host", "a b")]
 )
-def test_what_cannot_be_served_is_said(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    ended = subprocess.run(
-        [*COMMAND, *arguments], env=os.environ | {"ROBOMARK_HOME": str(tmp_path)}, capture_output=True, text=True
-    )
-    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+def test_what_cannot_be_served_is_said(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROBOMARK_HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["robomark", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    shown = capsys.readouterr()
+    assert (ended.value.code, shown.out, shown.err.count("\n")) == (2, "", 1)

@@ -18,7 +18,6 @@ from service.store.jobs import Retry, after_fault
 from service.store.models import Job, JobState, Lane, PlotState
 from service.store.turns import claimable
 
-
 #: Databases bound how many values one statement may carry.
 _AT_ONCE = 500
 
