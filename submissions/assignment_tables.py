@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar, get_args
@@ -65,15 +66,15 @@ class WorldTable(Table):
         if not isinstance(value, str):
             return _as_tuples(value)
         if value not in OBSTACLE_PRESETS:
-            presets = listed(OBSTACLE_PRESETS)
-            raise ValueError(f"names no set of obstacles, expected {presets} or a list of [x, y, width, height]")
+            known = f"{listed(OBSTACLE_PRESETS)} or a list of [x, y, width, height]"
+            raise ValueError(f'is "{value[:60]}", expected {known}{did_you_mean(value, OBSTACLE_PRESETS)}')
         return OBSTACLE_PRESETS[value]
 
     @field_validator("robot")
     @classmethod
     def _known_robot(cls, value: str) -> str:
         if value not in ROBOTS:
-            raise ValueError(f"names no robot, expected {listed(ROBOTS)}")
+            raise ValueError(f'is "{value[:60]}", expected {listed(ROBOTS)}{did_you_mean(value, ROBOTS)}')
         return value
 
 
@@ -138,7 +139,9 @@ class ScenarioTable(Table):
     @field_validator("light_noise", "motor_noise", mode="before")
     @classmethod
     def _one_or_many(cls, value: object) -> object:
-        return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else _as_tuples(value)
+        if isinstance(value, str | bool):
+            raise ValueError(f"is {_short(value)}, expected a number or a list of numbers")
+        return (value,) if isinstance(value, int | float) else _as_tuples(value)
 
     @field_validator("start_jitter")
     @classmethod
@@ -266,8 +269,10 @@ def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
         return TableProblem(path[:-1], f"{name} is missing, expected {name} = ...")
     if kind in ("value_error", "assertion_error"):
         sentence = details["msg"].partition(", ")[2]
-        return TableProblem(path, f"{_called(path)} {sentence}" if path else sentence)
+        return TableProblem(path or _key_in(sentence, details["input"]), f"{_called(path)} {sentence}")
     value = _short(details["input"])
+    if kind == "tuple_type" and isinstance(path[-1], int) and path[0] == "poses":
+        return TableProblem(path, f"{_called(path)} is {value}, expected [x, y, heading], so that poses is [[...], ...]")
     if kind in _TYPES:
         return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
     if kind == "literal_error":
@@ -287,6 +292,12 @@ def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     if kind == "string_too_long":
         return TableProblem(path, f"{_called(path)} is too long, expected at most {context['max_length']} characters")
     return TableProblem(path, f"{_called(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
+
+
+def _key_in(sentence: str, table: object) -> tuple[str, ...]:
+    """The key of the table that a sentence about the whole table names, to point at its line; none if it names none."""
+    words = re.findall(r"\w+", sentence.partition(", expected")[0])
+    return tuple([word for word in words if isinstance(table, dict) and word in table][:1])
 
 
 def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
@@ -326,5 +337,7 @@ def _shape(path: tuple[str | int, ...]) -> str:
 
 
 def _short(value: object) -> str:
+    if isinstance(value, dict) and value.keys() == _foreign("").keys():
+        return str(value["date"])
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "..."

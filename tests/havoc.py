@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import random
 import resource
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -291,16 +292,16 @@ class Campaign:
 
 @contextmanager
 def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
-    """A disk of its own at ``folder``, for those who may mount one; None for others."""
+    """A disk of its own at ``folder``, for those who may mount one; None for others. The folder goes at the end."""
     folder.mkdir(exist_ok=True)
     mount = ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m,mode=755", "robomark", str(folder)]
-    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        yield None
-        return
+    mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
     try:
-        yield folder
+        yield folder if mounted else None
     finally:
-        subprocess.run(["umount", "--lazy", str(folder)], capture_output=True, check=False)
+        if mounted:
+            subprocess.run(["umount", "--lazy", str(folder)], capture_output=True, check=False)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _tally(havoc: Havoc, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float) -> Tally:

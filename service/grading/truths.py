@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from service.grading.grade import TrialResult
-from service.grading.patches import GREYS, decoded
+from service.grading.patches import decoded
 from service.grading.places import part_at
 from sim.backgrounds import label_names
 from submissions.assignment import Assignment
@@ -42,9 +42,8 @@ def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[st
     """All that can be named: as the criterion lists it, else what the floor, the truths and the aliases have."""
     if criterion.labels:
         return criterion.labels
-    on_floor = label_names(assignment.world.background) if criterion.truth in ("label", "grey") else ()
-    if isinstance(criterion.truth, tuple):
-        on_floor = label_names(assignment.world.background)
+    # The instructor's own places have labels of their own; everything else may be what the floor has.
+    on_floor = () if criterion.truth == "places" else label_names(assignment.world.background)
     listed = criterion.truth if isinstance(criterion.truth, tuple) else ()
     placed = tuple(label for _, _, label in _places(criterion))
     return tuple(dict.fromkeys([*on_floor, *listed, *placed, *truths, *criterion.aliases]))
@@ -99,8 +98,3 @@ def _places(criterion: Recognition) -> Sequence[LabelledPlace]:
 def _nearest(places: Sequence[LabelledPlace], where: tuple[float, float], within: float) -> str | None:
     near = min(places, key=lambda place: math.dist(place[:2], where), default=None)
     return near[2] if near is not None and math.dist(near[:2], where) <= within else None
-
-
-def has_greys(background: str) -> bool:
-    """Whether the floor of that name has label patches that can be decoded."""
-    return background in GREYS
