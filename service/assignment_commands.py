@@ -34,12 +34,14 @@ def list_assignments() -> None:
     """The assignments of the catalogue."""
     table = Table("section", "id", "title", "marks", "trials", box=None, pad_edge=False)
     table.columns[3].justify = table.columns[4].justify = "right"
+    table.columns[1].no_wrap = True
+    table.columns[1].min_width = max(map(len, catalogue()))
     for name in catalogue():
         assignment = find_assignment(name)
         trials = sum(1 for _ in assignment.trials())
         title = Text(one_line(assignment.title))
         table.add_row(assignment.section, assignment.id, title, f"{assignment.max_marks:g}", str(trials))
-    Console().print(table)
+    _console().print(table)
 
 
 def _cell(which: str) -> str:

@@ -22,6 +22,7 @@ def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
     )
     for index in (2, 3, 5):
         table.columns[index].justify = "right"
+    table.columns[1].overflow = "fold"
     for each in checked:
         table.add_row(
             each.assignment.section,

@@ -135,12 +135,16 @@ class CachedCamera:
 
     def __init__(self, picture: Bytes) -> None:
         """``picture`` has shape (1143, 2362, 3), row 0 at the top."""
-        self._camera = BulletCamera(picture)
+        self._picture = picture
+        self._camera: BulletCamera | None = None
         self._pixels: dict[tuple[int, int, int], Bytes] = {}
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
     def close(self) -> None:
-        self._camera.close()
+        """Give back PyBullet's 60 MB; the tiles stay, and a new one brings PyBullet back."""
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
 
     def window(self, column: int, row: int, side: int) -> Bytes:
         """RGB, shape (side, side, 3), top row first; black outside the floor."""
@@ -165,6 +169,8 @@ class CachedCamera:
         key = (tile_column, tile_row, side)
         tile = self._pixels.get(key)
         if tile is None:
+            if self._camera is None:
+                self._camera = BulletCamera(self._picture)
             tile = self._pixels[key] = self._camera.window(tile_column * _TILE, tile_row * _TILE, _TILE + side)
         return tile
 
@@ -180,25 +186,30 @@ def _disc_sums(tile: Bytes, side: int) -> memoryview:
             first, last = int(columns[0]), int(columns[-1]) + 1
             rows = running[row : row + _TILE]
             total += rows[:, last : last + _TILE] - rows[:, first : first + _TILE]
-    return np.ascontiguousarray(total).data
+    return total.astype(np.int32).data
 
 
 class Cameras:
-    """A few cached cameras, one a picture, the least recently used closed first."""
+    """A few cached cameras, one a picture. Only the one used last keeps PyBullet; the oldest is dropped."""
 
-    def __init__(self, most: int = 4) -> None:
+    def __init__(self, most: int = 3) -> None:
+        """The tiles of each grow to 50 MB, once a robot has been everywhere on its floor."""
         self._most = most
         # Keyed by identity: a picture that is held here cannot share its id with another.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
     def camera(self, picture: Bytes) -> CachedCamera:
         """The camera over ``picture``, which must not change afterwards."""
-        held = self._cameras.pop(id(picture), None) or (picture, CachedCamera(picture))
+        held = self._cameras.pop(id(picture), None)
+        self.close()
+        if held is None:
+            while len(self._cameras) >= self._most:
+                self._cameras.popitem(last=False)
+            held = picture, CachedCamera(picture)
         self._cameras[id(picture)] = held
-        while len(self._cameras) > self._most:
-            self._cameras.popitem(last=False)[1][1].close()
         return held[1]
 
     def close(self) -> None:
-        while self._cameras:
-            self._cameras.popitem()[1][1].close()
+        """Give back PyBullet's memory."""
+        for _, camera in self._cameras.values():
+            camera.close()

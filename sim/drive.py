@@ -52,11 +52,15 @@ class Wheel:
             self.state = "running"
 
     def change_speed(self, most: float, noise: float) -> None:
-        """Move the speed towards its set point. Only speeds that are not negative are rounded, capped and noisy."""
+        """Move the speed towards its set point. Only speeds that are not negative are rounded and noisy.
+
+        The original does not cap negative speeds either; a program that asks for more than a motor can do, past the
+        brick's own checks, would win every race there.
+        """
         if self.speed < self.speed_sp:
             self.speed = min(self.speed + most, self.speed_sp)
         elif self.speed > self.speed_sp:
-            self.speed = max(self.speed - most, self.speed_sp)
+            self.speed = max(self.speed - most, self.speed_sp, -MAX_SPEED)
         noisy = self.speed + noise
         if noisy >= 0:
             self.speed = min(round_half_up(noisy), MAX_SPEED)

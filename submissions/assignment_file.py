@@ -26,6 +26,17 @@ _ASIDE = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
+#: What the usual mistakes come to, by how ``tomllib`` begins its sentence.
+_PLAINER = MappingProxyType(
+    {
+        "invalid value": ": texts stand in quotes, numbers do not",
+        "cannot overwrite": "; this key is given twice in its table",
+        "cannot declare": "; this table is there already",
+        "illegal character": "; is a closing quote missing?",
+        "unclosed array": "; is a comma or a ] missing?",
+        "expected newline": "; is there a quote or a comma too many?",
+    }
+)
 
 
 class AssignmentProblems(AssignmentError):
@@ -66,7 +77,7 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         path = path.parent
     if path.is_dir():
         return path
-    hint = did_you_mean(name, ids) or f"; the catalogue has {', '.join(ids)}"
+    hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
     raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}.")
 
 
@@ -79,7 +90,7 @@ def read_assignment(folder: Path) -> Assignment:
     if not (folder / FILE_NAME).is_file():
         raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
     files = _folder_files(folder)
-    text, document = _parse(files[FILE_NAME], where)
+    text, document = parse(files[FILE_NAME], where)
     problems = Problems(where, find_lines(text))
     assignment = build_assignment(document, files, problems)
     if assignment is None or problems.found:
@@ -91,7 +102,8 @@ def _catalogue_folder() -> Path:
     return Path(str(resources.files("submissions"))) / "catalogue"
 
 
-def _parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
+def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
+    """The text of a TOML file and what it says. Raises AssignmentProblems, with ``where`` and the line."""
     if len(data) > _MAX_TOML_BYTES:
         raise AssignmentProblems((f"{where}:1: the file is too large, expected at most 1 MB",))
     try:
@@ -114,7 +126,8 @@ def _syntax_problem(message: str, where: str, text: str) -> str:
         line, column = int(match["line"]), f" (column {match['column']})"
     else:
         line, column = text.count("\n") + 1, " (at the end)"
-    return f"{where}:{line}: {what[:1].lower()}{what[1:]}{column}, expected TOML"
+    hint = next((words for begin, words in _PLAINER.items() if what.lower().startswith(begin)), "")
+    return f"{where}:{line}: {what[:1].lower()}{what[1:]}{column}, expected TOML{hint}"
 
 
 def _folder_files(folder: Path) -> Mapping[str, bytes]:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from sim.backgrounds import HEIGHT, WIDTH, Floor, floor, floor_from_picture, names
+from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_picture, names
 from sim.errors import UsageError
 from sim.recording import Pose
 from sim.robot import usual_robot
@@ -33,9 +33,9 @@ from submissions.assignment_tables import (
     read_table,
 )
 from submissions.code_parts import check_code, check_ranks, check_sources, runs_no_robot
-from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies
+from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies, Reports
 from submissions.problems import Problems
-from submissions.recognition_parts import check_recognition, checked_training, completed
+from submissions.recognition_parts import check_recognition, check_reports, checked_training, completed
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 from submissions.toml_lines import Path as Place
@@ -61,7 +61,8 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world_table = _table(WorldTable, document.get("world", {}), ("world",), problems)
     parts = _table(PartsTable, document.get("parts", {}), ("parts",), problems)
     limits = _table(LimitsTable, document.get("limits", {}), ("limits",), problems)
-    world, ground = _world(world_table, files, problems) if world_table else (None, None)
+    ground = _ground(world_table or _background_alone(document), files, problems)
+    world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
     aliases = head.aliases if head else {}
@@ -116,28 +117,38 @@ def _table(schema: type[T], table: object, place: Place, problems: Problems) -> 
     return None
 
 
-def _world(table: WorldTable, files: Files, problems: Problems) -> tuple[WorldSpec | None, Floor | None]:
+def _background_alone(document: Mapping[str, object]) -> WorldTable:
+    """A world with the background of a table that has other mistakes, so that this one is looked at as well."""
+    world = document.get("world")
+    name = world.get("background") if isinstance(world, dict) else None
+    return WorldTable(background=name) if isinstance(name, str) else WorldTable()
+
+
+def _ground(table: WorldTable, files: Files, problems: Problems) -> Floor | None:
     name = table.background
-    picture = None
+    place = ("world", "background")
     try:
         if name in names():
-            ground = floor(name, labels=table.labels)
-        elif name.lower().endswith(_PICTURE_SUFFIXES):
-            if name not in files:
-                problems.add(("world", "background"), f'background is "{name}", expected a picture beside this file')
-                return None, None
-            picture = files[name]
-            ground = floor_from_picture(name, picture)
-        else:
-            hint = did_you_mean(name, names()) or f"; there are {', '.join(names())}"
-            problems.add(
-                ("world", "background"),
-                f'background is "{name[:60]}", expected a background or a picture (.png, .jpg) beside this file{hint}',
-            )
-            return None, None
+            return floor(name, labels=table.labels)
+        if name.lower().endswith(_PICTURE_SUFFIXES) and name in files:
+            return floor_from_picture(name, files[name])
     except UsageError as error:
-        problems.add(("world", "background"), f"{str(error).rstrip('.')}, expected a picture that can be used")
-        return None, None
+        problems.add(place, f"{str(error).rstrip('.')}, expected a picture that can be used")
+        return None
+    if name.lower().endswith(_PICTURE_SUFFIXES):
+        problems.add(place, f'background is "{name[:60]}", expected a picture beside this file')
+        return None
+    hint = did_you_mean(name, names()) or f"; there are {', '.join(names())}"
+    problems.add(
+        place, f'background is "{name[:60]}", expected a background or a picture (.png, .jpg) beside this file{hint}'
+    )
+    return None
+
+
+def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -> WorldSpec:
+    name = table.background
+    if "sheet" in table.model_fields_set and name not in SEEDED:
+        problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {listed(SEEDED)}")
     obstacles = table.obstacles if "obstacles" in table.model_fields_set else ground.obstacles
     for number, (x, y, width, height) in enumerate(obstacles):
         if width <= 0 or height <= 0 or not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
@@ -146,9 +157,9 @@ def _world(table: WorldTable, files: Files, problems: Problems) -> tuple[WorldSp
                 f"obstacles[{number}] is not on the floor, expected [x, y, width, height] within {WIDTH} x {HEIGHT} mm",
             )
     robot = table.robot if "robot" in table.model_fields_set else usual_robot(name)
-    world = WorldSpec(
+    return WorldSpec(
         name,
-        picture,
+        files.get(name) if name not in names() else None,
         labels=table.labels,
         obstacles=obstacles,
         robot=robot,
@@ -156,7 +167,6 @@ def _world(table: WorldTable, files: Files, problems: Problems) -> tuple[WorldSp
         drive=table.drive,
         sheet=_sheet(table),
     )
-    return world, ground
 
 
 def _sheet(table: WorldTable) -> int | None:
@@ -259,6 +269,8 @@ def _check_criterion(
     )
     if needs_responder and parts is not None and parts.responder == "none":
         problems.add((*place, "check"), 'check needs a responder, but parts has responder = "none", expected one')
+    if isinstance(criterion, Reports):
+        check_reports(criterion, scenarios, place, problems)
     if isinstance(criterion, Recognition):
         check_recognition(criterion, scenarios, ground, place, problems)
 

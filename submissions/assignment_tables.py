@@ -136,6 +136,13 @@ class ScenarioTable(Table):
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
+    @field_validator("poses", mode="before")
+    @classmethod
+    def _list_of_poses(cls, value: object) -> object:
+        if isinstance(value, list) and value and all(isinstance(entry, int | float) for entry in value):
+            raise ValueError("is a single pose, expected a list of them: [[x, y, heading], ...]")
+        return _as_tuples(value)
+
     @field_validator("light_noise", "motor_noise", mode="before")
     @classmethod
     def _one_or_many(cls, value: object) -> object:
@@ -189,7 +196,7 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
     except ValidationError as error:
         found = error.errors(include_url=False)
         places = [details["loc"] for details in found]
-        return [_problem(schema, details) for details in found if not _follows(details, places)]
+        return [problem_of(schema, details) for details in found if not _follows(details, places)]
 
 
 def _follows(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
@@ -255,7 +262,8 @@ _RANGES = ("forward", "sideways", "distance", "turn", "turn_size", "seconds", "l
            "gyro", "sizes")  # fmt: skip
 
 
-def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
+def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
+    """One of pydantic's errors in our words, with its place in the table of that schema."""
     path = tuple(part for part in details["loc"])
     name = str(path[-1]) if path else ""
     context: Mapping[str, Any] = details.get("ctx", {})
@@ -271,8 +279,6 @@ def _problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
         sentence = details["msg"].partition(", ")[2]
         return TableProblem(path or _key_in(sentence, details["input"]), f"{_called(path)} {sentence}")
     value = _short(details["input"])
-    if kind == "tuple_type" and isinstance(path[-1], int) and path[0] == "poses":
-        return TableProblem(path, f"{_called(path)} is {value}, expected [x, y, heading], so that poses is [[...], ...]")
     if kind in _TYPES:
         return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
     if kind == "literal_error":

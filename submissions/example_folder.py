@@ -5,15 +5,18 @@ They are hand-ins like any other: nothing here reads or grades them.
 
 from __future__ import annotations
 
-import tomllib
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from sim.errors import AssignmentError, UsageError
-from submissions.assignment_file import assignment_folder
+from sim.errors import UsageError
+from sim.recording import Verdict
+from submissions.assignment_file import AssignmentProblems, assignment_folder, parse
+from submissions.assignment_tables import problem_of
+from submissions.problems import Problems
+from submissions.toml_lines import find_lines
 
 EXAMPLES = "examples"
 EXPECTED = "expected.toml"
@@ -29,7 +32,7 @@ class Expectation(_Table):
     """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks."""
 
     marks: Annotated[Decimal, BeforeValidator(str)]
-    verdict: str = "finished"
+    verdict: Verdict = Verdict.FINISHED
     loses: tuple[str, ...] | None = None
     feedback: tuple[str, ...] = ()  # each must be in what the student is told
 
@@ -61,19 +64,21 @@ def examples(assignment: str) -> Path:
 def expected(assignment: str) -> Expected:
     """What the examples of an assignment must get; empty without the file.
 
-    Raises AssignmentError where the file cannot be used.
+    Raises AssignmentProblems, with all mistakes, where the file cannot be used.
     """
     path = assignment_folder(assignment) / EXPECTED
     if not path.is_file():
         return Expected(examples={})
     where = f"{path.parent.name}/{path.name}"
     try:
-        document = tomllib.loads(path.read_text("utf-8-sig"))
+        text, document = parse(path.read_bytes(), where)
         original = document.pop("original", [])
         return Expected.model_validate({"examples": document, "original": original})
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AssignmentError(f"{where}: {error}, expected TOML") from error
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise AssignmentError(f"{where}: {place}: {first['msg']}") from error
+        problems = Problems(where, find_lines(text))
+        for details in error.errors(include_url=False):
+            part, which, *rest = (*details["loc"], "", "")
+            schema, place = (OriginalFigure, (part, which)) if part == "original" else (Expectation, (which,))
+            problem = problem_of(schema, {**details, "loc": tuple(each for each in rest if each != "")})
+            problems.add((*place, *problem.path), problem.sentence)
+        raise AssignmentProblems(problems.sorted()) from error

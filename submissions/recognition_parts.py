@@ -12,6 +12,7 @@ from sim.errors import UsageError
 from submissions.assignment import Scenario, Training
 from submissions.assignment_tables import TrainingTable, did_you_mean
 from submissions.criteria.classification import Recognition, Robustness
+from submissions.criteria.reporting import Reports
 from submissions.problems import Problems
 from submissions.toml_lines import Path as Place
 from submissions.truth_file import read_places
@@ -73,6 +74,20 @@ def check_recognition(
             f'along is "{criterion.along}", but no scenario of the criterion is swept over it, '
             f"expected [scenario.sweep] with {criterion.along} = [...]",
         )
+
+
+def check_reports(criterion: Reports, scenarios: Sequence[Scenario | None], place: Place, problems: Problems) -> None:
+    """What is to be reported: one list for all poses, or one for each pose of every scenario that is looked at."""
+    if criterion.expected == "label" or len(criterion.expected) == 1:
+        return
+    for scenario in scenarios:
+        looked_at = scenario is not None and (not criterion.scenarios or scenario.id in criterion.scenarios)
+        if scenario is not None and looked_at and len(criterion.expected) != len(scenario.poses):
+            problems.add(
+                (*place, "expected"),
+                f"expected has {len(criterion.expected)} lists for the {len(scenario.poses)} poses of scenario "
+                f'"{scenario.id}", expected one list for each pose, or one for all',
+            )
 
 
 def checked_training(

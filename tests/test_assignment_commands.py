@@ -11,7 +11,7 @@ from command import robomark
 from service.grading.example_check import Figure, check_examples
 from service.grading.rig import Rig
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment_file import find_assignment, read_assignment
+from submissions.assignment_file import AssignmentProblems, catalogue, find_assignment, read_assignment
 from submissions.assignment_folder import export_for_students, export_whole, write_new
 from submissions.example_folder import OriginalFigure, expected
 
@@ -42,6 +42,10 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, rig: Rig) -
         ('[reference]\nmarks = "6"\nverdict = "time_limit"\n', "reference: ended as finished, expected time_limit"),
         ('[reference]\nmarks = "6"\nfeedback = ["Bravo"]\n', 'reference: was not told "Bravo", but'),
         ('[reference]\nmarks = "6"\n[other]\nmarks = "1"\n', "other: is expected, but is no example"),
+        (
+            '[reference]\nmarks = "6"\n[stops-short]\nmarks = "3"\nloses = ["stop"]\n',
+            'stops-short: expected.toml says it loses "stop", expected the id of a criterion: finishes, says, stops',
+        ),
         ("", "stops-short: has no table in expected.toml"),
         (
             '[reference]\nmarks = "6"\n[[original]]\nmeasure = "height"\nvalue = 3\n',
@@ -59,8 +63,33 @@ def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Pa
 def test_expectations_that_cannot_be_read_are_refused(text: str, tmp_path: Path) -> None:
     write_new(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(text)
-    with pytest.raises(AssignmentError, match=r"^task/expected\.toml: "):
+    with pytest.raises(AssignmentError, match=r"^task/expected\.toml:[12]: "):
         expected(str(tmp_path / "task"))
+
+
+def test_all_mistakes_in_expectations_are_named_with_their_lines(tmp_path: Path) -> None:
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "expected.toml").write_text(
+        '[reference]\nmark = "6"\n[other]\nmarks = "many"\nverdict = "fine"\n[[original]]\nmeasure = "a"\nvalue = "x"\n'
+    )
+    with pytest.raises(AssignmentProblems) as refused:
+        expected(str(tmp_path / "task"))
+    begins = ["1: marks is missing", '2: "mark" is not a key', "4: marks is ", "5: verdict is ", "8: value is "]
+    assert len(refused.value.problems) == len(begins)
+    for problem, begin in zip(refused.value.problems, begins, strict=True):
+        assert problem.startswith(f"task/expected.toml:{begin}")
+
+
+def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, rig: Rig) -> None:
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("tank_drvie.off()\n")
+    problems = check_examples(str(tmp_path / "task"), rig=rig).problems
+    assert any("NameError: name 'tank_drvie' is not defined (line 1)" in problem for problem in problems)
+
+
+def test_ids_are_listed_whole_on_a_narrow_screen(tmp_path: Path) -> None:
+    listed = robomark("assignments", "list").stdout
+    assert all(name in listed for name in catalogue())
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from submissions.assignment import Assignment, Limits, Parts, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.magics import split_program
-from submissions.plain_cells import python_of
+from submissions.plain_cells import modules_of, python_of
 from submissions.submission import Cell, Notebook, Source, Submission
 
 LIMITS = ChildLimits(1.0, 256 << 20)
@@ -100,7 +100,10 @@ def test_rules_on_the_text(facts: SourceFacts, rules: dict[str, Any], holds: boo
 def test_rule_that_is_broken_is_told_with_its_line(facts: SourceFacts) -> None:
     rules = criterion("source", avoids=["while", "say()"], uses=["for"])
     outcome = judge_source(rules, facts, split_program(PROGRAM)[0])  # type: ignore[arg-type]
-    assert outcome.message == "Expected your program to do without a while loop, but line 11 has it."
+    assert outcome.message == (
+        "Expected your program to do without a while loop, but line 11 has it. "
+        "Expected your program to do without say(), but line 10 has it."
+    )
     assert outcome.score == pytest.approx(1 / 3)
 
 
@@ -136,6 +139,65 @@ def test_what_is_avoided_cannot_be_hidden_behind_many_names(rig: Rig) -> None:
     assert "too many names to be sure" in outcome.message
 
 
+LONG = "robot_" * 12
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "line"),
+    [
+        ("say()", "from ev3dev2_glue import say as speak\nspeak('x')", 1),
+        ("say()", "x = 1\nspeak = say\nspeak('x')", 2),
+        ("say()", "list(map(say, 'abc'))", 1),
+        ("say()", "@say\ndef f(): pass", 1),
+        ("say()", "say.__call__('x')", 1),
+        ("say()", "globals()['say']('x')", 1),
+        ("say()", "getattr(ev3dev2_glue, 'say')('x')", 1),
+        ("on_for_*()", f"{LONG} = tank_drive\n{LONG}.on_for_seconds(1, 2, 3)", 2),
+        ("on_for_*()", "go = tank_drive.on_for_seconds\ngo(1, 2, 3)", 1),
+        ("eval", "x = 1\ny = __builtins__.eval('1')", 2),
+        ("import sklearn", "import importlib\nimportlib.import_module('sklearn.svm')", 2),
+        ("import sklearn", "__import__('sklearn')", 1),
+        ("import sklearn", "import sys\nsys.modules['sklearn.svm'].SVC()", 2),
+        ("try", "try:\n    f()\nexcept* OSError:\n    pass", 1),
+        ("sum()", "sum = 0\nfor i in x:\n    sum += i\nprint(sum)", None),
+        ("say()", "print('say')\nstay = lambda say: say + 1", None),
+        ("on_for_*()", "tank_drive.on(3, 3)", None),
+    ],
+)
+def test_another_name_does_not_hide_what_is_avoided(rule: str, text: str, line: int | None, rig: Rig) -> None:
+    outcome = judge_source(criterion("source", avoids=[rule]), facts_of(text, rig), split_program("")[0])  # type: ignore[arg-type]
+    assert outcome.passed is (line is None), outcome.message
+    assert line is None or f"line {line} has it" in outcome.message
+
+
+def test_what_a_text_cannot_show_is_told_to_whoever_wants_to_look(rig: Rig) -> None:
+    found = facts_of("x = 1\nexec('s' + 'ay(1)')", rig)
+    outcome = judge_source(criterion("source", avoids=["say()"]), found, split_program("")[0])  # type: ignore[arg-type]
+    assert outcome.passed
+    assert "Line 2 has exec, which can do more than its text shows." in outcome.message
+
+
+@pytest.mark.parametrize(
+    ("helper", "words"),
+    [
+        ("import math\nfrom sklearn import svm", "line 2 of helper.py has it"),
+        ("x = 1\n" * 60_000, "helper.py has too many names to be sure"),
+        ("print 'this was never Python 3'", ""),
+        ("import math", ""),
+    ],
+)
+def test_files_beside_the_responder_are_read_too(helper: str, words: str, rig: Rig) -> None:
+    rules = criterion("source", part="responder", avoids=["import sklearn"])
+    submission = Submission(
+        "ada",
+        responder=Source("responder.py", "import helper\ndef responder(text): return text"),
+        files={"helper.py": helper.encode(), "notes.txt": b"import sklearn"},
+    )
+    result = grade(submission, without_robot(rules), rig=rig).criteria[0]
+    assert result.marks == (0 if words else 4), result.message
+    assert words in result.message
+
+
 @pytest.mark.parametrize(
     "told",
     [None, 3, [], {"error": None}, {"error": {"line": "x"}}, {"calls": {"say": "x"}}, {"calls": [[1, 2, 3], "ab"]}],
@@ -151,12 +213,16 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
         "import re\n%matplotlib inline",
         "if re:\n    !ls\n",
         "%%writefile a\nx",
+        "%%capture out\nimport math\n%time import json",
+        "%%writefile -a helper.py\nimport pickle",
     )
     notebook = Notebook("a.ipynb", tuple(Cell(number, text) for number, text in enumerate(cells, 1)))
     text = python_of(notebook)
     compile(text, "a", "exec")
     assert "say" not in text
     assert "import re" in text
+    assert "import math\nimport json" in text
+    assert modules_of(Submission("ada", notebook=notebook)) == (Source("helper.py", "import pickle"),)
 
 
 # what functions return
@@ -216,7 +282,7 @@ def test_entries_of_a_list_are_marked_one_by_one(rig: Rig) -> None:
 def test_first_wrong_call_is_told(rig: Rig) -> None:
     calls = [{"arguments": [2], "returns": 4}, {"arguments": [3], "returns": 9}]
     result = graded("def f(x): return x + x", rig, criterion("functions", function="f", calls=calls))
-    assert result.criteria[0].message == 'Expected f(3) to return "9", but it returned "6" (1 of 2 calls right).'
+    assert result.criteria[0].message == "Expected f(3) to return 9, but it returned 6 (1 of 2 calls right)."
     assert result.walls.startswith("Landlock")
 
 

@@ -168,7 +168,10 @@ def test_reached_part_of_an_order_counts_with_mean() -> None:
     cut = recorded(spoken=lines("1", "2", "3"), verdict=Verdict.TIME_LIMIT)
     result = judged(asked, cut)
     assert result.marks == 3
-    assert '"4" did not come after "3" (3 of 4 found). The run ended early, at 3.00 s.' in result.message
+    assert (
+        '"4" did not come after "3" (3 of 4 found). The program was still running when the time was up, at 3 s.'
+        in result.message
+    )
     assert result.evidence[0].t == 2.0
     assert result.evidence[0].pose == Pose(160, 800, 0)
 

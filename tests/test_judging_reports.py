@@ -273,6 +273,43 @@ def test_series_of_the_datalog(keys: dict[str, Any], values: list[float], marks:
     assert result.marks == marks, result.message
 
 
+@pytest.mark.parametrize(
+    ("instrument", "value", "genuine"),
+    [
+        ("left light", 51, True),
+        ("left light", 20, True),
+        ("left light", 40, True),
+        ("left light", 100, False),
+        ("right light", 100, True),
+        ("right light", 51, False),
+        ("gyro", 0, True),
+        ("gyro", 90, False),
+        ("left wheel", 360, False),
+        ("ultrasonic", 50, False),
+    ],
+)
+def test_only_what_was_read_counts_as_measured(instrument: str, value: float, genuine: bool) -> None:
+    """The left sensor is over (51, 102, 153): 20, 40 and 60 percent."""
+    asked = criterion("datalog", series="Light_left", measured=instrument, at_least=2)
+    recording = recorded(rgb=(51, 102, 153), datalog=series(value, value))
+    result = judged(asked, recording)
+    assert result.marks == (4 if genuine else 0), result.message
+    assert genuine or "none of 2 samples is" in result.message
+    motionless = replace(recording, ticks=recorded(seconds=0).ticks)
+    assert judged(asked, motionless).marks == 0
+
+
+def test_a_reading_must_be_fresh_when_it_is_printed() -> None:
+    """The light is white for a second, then black."""
+    ticks = recorded(seconds=4).ticks
+    ticks.left_sums[30:] = 0
+    recording = recorded(
+        seconds=4, ticks=ticks, datalog=tuple(Datum(t, "L", 100.0, t) for t in (0.0, 1.0, 1.4, 2.0, 3.0))
+    )
+    result = judged(criterion("datalog", series="L", measured="left light"), recording)
+    assert result.evidence[0].measures[0].value == 3
+
+
 def test_one_series_dips_below_another_and_samples_have_times() -> None:
     both = series(50, 20, name="Light_right") + series(50, 30)
     assert judged(criterion("datalog", series="Light_right", dips_below="Light_left"), recorded(datalog=both)).marks

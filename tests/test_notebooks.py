@@ -322,6 +322,20 @@ def test_a_responder_sees_what_the_robot_has_logged_so_far(tmp_path: Path, rig: 
 
 
 @pytest.mark.parametrize(
+    ("cells", "note"),
+    [
+        ([RESPONDER, PROGRAM, "x = 1"], "the robot program in cell 2 of {name} is marked"),
+        (
+            [RESPONDER, PROGRAM, "%sim_magic -R -x 200"],
+            "the robot program in cell 2 of {name} is marked, as it is run again by cell 3",
+        ),
+    ],
+)
+def test_the_report_says_which_cell_is_marked(tmp_path: Path, rig: Rig, cells: list[str], note: str) -> None:
+    assert graded(tmp_path, rig, cells).notes[0] == note.format(name="ada.ipynb")
+
+
+@pytest.mark.parametrize(
     ("cell", "note"),
     [
         ("!ls -l", "cell 2, line 1: !ls -l was refused: programs here may not start other programs"),
@@ -460,6 +474,20 @@ def test_a_responder_may_call_magics_but_no_second_robot(tmp_path: Path, rig: Ri
     assert (answers(recording), recording.verdict) == (["ok"], Verdict.FINISHED)
     assert "cell 1, line 2: %sim_magic was skipped: the robot is still running" in result.notes
     assert recording.responder_output.endswith("hi\n")
+
+
+def test_the_program_whose_text_is_marked_is_the_one_that_is_run(tmp_path: Path, rig: Rig) -> None:
+    """A notebook changes what its own magics hand over."""
+    swap = (
+        "shell = type(get_ipython())\nreal = shell.run_cell_magic\n"
+        "shell.run_cell_magic = lambda self, name, line, cell: real(self, name, line, 'tank_drive.on(50, 50)')"
+    )
+    cells = [swap, "%%sim_magic_preloaded -R\nprint('as it stands')", RESPONDER]
+    rule = '[[criterion]]\ntitle = "T"\nmarks = 1\ncheck = "source"\navoids = ["on()"]\n'
+    assignment(tmp_path)
+    (tmp_path / "assignment.toml").write_text((tmp_path / "assignment.toml").read_text() + rule)
+    result = grade(read_submission(notebook(tmp_path / "a.ipynb", cells)), read_assignment(tmp_path), rig=rig)
+    assert [line.text for line in result.trials[0].recording.printed] == ["as it stands"]
 
 
 def test_forged_frames_end_the_notebook(tmp_path: Path, rig: Rig) -> None:

@@ -345,6 +345,20 @@ def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
     assert "pictures of 2 patterns, and 4 were expected" in result.message
 
 
+def test_pictures_taken_elsewhere_do_not_count_near_the_start() -> None:
+    """A robot may not drive on to something that is easier to name."""
+    moved = talk(("square", None), ("diamond", None), ("circle", "circle"))
+    stayed = talk(("square", None), ("circle", "circle"))
+    assert judged(asked(pictures="last"), moved).marks == 4
+    for recording in (moved, stayed):
+        result = judged(asked(pictures="last", near_start=20), recording)
+        assert result.marks == 0
+        assert 'The picture showed "square"' in result.message
+    left = judged(asked(near_start=20), replace(moved, images=moved.images[1:]))
+    assert (left.marks, accuracy(left).n) == (0, 1)
+    assert "the robot sent none from within 20 mm of where it started" in left.message
+
+
 def test_precision_and_recall_of_each_class() -> None:
     said = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
     scores = {score.label: score for score in class_scores(accuracy(judged(asked(), talk(*said))))}

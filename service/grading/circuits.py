@@ -19,6 +19,8 @@ from submissions.criteria.path import Circuits
 _SMOOTH = 31
 #: Going straight on for so many rows (0.5 s) parts two corners.
 _LASTING = 15
+#: An upper bound of so many rounds is none.
+_NO_BOUND = 100
 #: A lesser change of heading is no corner, degrees.
 _CORNER = 30.0
 
@@ -31,6 +33,8 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     point, end = f"({criterion.x:g}, {criterion.y:g})", (recording.end_t, recording.end)
     low, high = criterion.times
     wanted = f"{low:g} times" if low == high else f"{low:g} to {high:g} times"
+    if high >= _NO_BOUND:
+        wanted = "at least once" if low == 1 else f"at least {low:g} times"
     if criterion.direction != "either" and times >= 0.5:
         went = "anticlockwise" if round_it[-1] > 0 else "clockwise"
         if went != criterion.direction:

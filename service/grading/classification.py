@@ -129,6 +129,8 @@ def _that_count(
     if not counted and criterion.patterns <= 1:
         truth = missing_truth(criterion, assignment, trial)
         sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
+        if criterion.near_start is not None and trial.recording.images:
+            sent += f" from within {criterion.near_start:g} mm of where it started"
         return [Naming(index, None, finder.canonical(truth), None, sent)]
     words = f"the robot sent pictures of {len(counted)} patterns, and {criterion.patterns} were expected"
     lacking = Naming(index, None, NO_PICTURE, None, words)

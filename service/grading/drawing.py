@@ -89,11 +89,10 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     score = Fraction(right, criterion.figures)
     if not enough:
         lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
-        told = f"{len(legs)} ({lengths} mm)" if legs else "none"
+        told = f"{len(legs)}, of {lengths} mm" if legs else "none"
         row = legs[min(wanted, len(legs)) - 1].last if legs else 0
         return failed(
-            f"Expected {wanted} straight legs{' or more whole figures' if criterion.at_least else ''}, "
-            f"but the path has {told}.",
+            f"Expected {_figures_words(criterion)}, but the path has {told}.",
             *place_at(recording, row),
             score=score / 2,
             measures=measures,
@@ -122,6 +121,14 @@ class _Problem:
 
     words: str
     row: int
+
+
+def _figures_words(criterion: Drawing) -> str:
+    legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
+    least = "at least " if criterion.at_least else ""
+    if criterion.figures == 1:
+        return f"{least}one figure of {legs}" if least else legs
+    return f"{least}{criterion.figures} figures of {legs} ({criterion.figures * criterion.legs} in all)"
 
 
 def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:

@@ -12,7 +12,7 @@ import numpy as np
 from service.grading.areas import distance_to
 from service.grading.grade import Measure, TrialResult
 from service.grading.outcome import Outcome, cut, failed, fault_words, passed
-from sim.recording import Recording
+from sim.recording import Fault, Recording, Verdict
 from submissions.criteria import EndPose, Finishes
 
 
@@ -22,7 +22,7 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     measures = (Measure("time", recording.end_t, "s"),)
     if fault is not None:
         return failed(
-            f"Expected the program to end by itself, but after {fault.t:.2f} s: {fault_words(fault)}.",
+            f"Expected the program to end by itself, but {_ended(fault)}.",
             fault.t,
             recording.end,
             measures=measures,
@@ -37,6 +37,12 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     return passed(
         f"The program ended by itself after {recording.end_t:.2f} s.", recording.end_t, recording.end, measures
     )
+
+
+def _ended(fault: Fault) -> str:
+    if fault.verdict is Verdict.TIME_LIMIT:
+        return fault_words(fault)
+    return f"after {fault.t:.2f} s: {fault_words(fault)}"
 
 
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:

@@ -12,6 +12,7 @@ from decimal import Decimal
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
+from service.grading.outcome import fault_words
 from service.grading.rig import Rig
 from sim.errors import UsageError
 from submissions.assignment import Assignment
@@ -118,16 +119,27 @@ def _usual(name: str, assignment: Assignment) -> Expectation | None:
 def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | None) -> list[str]:
     if wanted is None:
         return ["has no table in expected.toml"]
-    found = []
+    known = {result.id for result in graded.criteria}
+    found = [
+        f'expected.toml says it loses "{name}", expected the id of a criterion: {", ".join(sorted(known))}'
+        for name in wanted.loses or ()
+        if name not in known
+    ]
     told = "\n".join(result.message for result in graded.criteria)
     if graded.marks != wanted.marks:
         found.append(f"got {graded.marks} marks, expected {wanted.marks}; {_lost_words(graded)}")
     if graded.verdict != wanted.verdict:
-        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}")
+        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}{_fault(graded)}")
     if wanted.loses is not None and set(lost) != set(wanted.loses):
         found.append(f"lost marks in {', '.join(lost) or 'nothing'}, expected {', '.join(wanted.loses) or 'nothing'}")
     found += [f'was not told "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
     return found
+
+
+def _fault(graded: Grade) -> str:
+    """What went wrong first, as far as somebody said."""
+    faults = [fault for trial in graded.trials for fault in trial.recording.faults]
+    return f"; {fault_words(faults[0])}" if faults else ""
 
 
 def _lost_words(graded: Grade) -> str:

@@ -39,17 +39,19 @@ class HandedIn:
     responder: Source | None = None
     flags: Flags = field(default_factory=Flags)
     files: Mapping[str, bytes] = field(default_factory=dict)
+    modules: tuple[Source, ...] = ()  # other Python files of the hand-in's own, which the responder may import
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """``called`` is by the id of a criterion, ``checks`` by that and the place of the trial."""
+    """``called`` is by the id of a criterion, ``checks`` by that and the place of the trial, ``modules`` by name."""
 
     facts: Mapping[str, SourceFacts] = field(default_factory=dict)
     flags: Flags = field(default_factory=Flags)
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Outcome] = field(default_factory=dict)
     walls: str = ""
+    modules: Mapping[str, SourceFacts] = field(default_factory=dict)
 
 
 class Caller(Protocol):
@@ -81,6 +83,8 @@ def look_at(
     sources = {"program": handed_in.program, "responder": handed_in.responder}
     parts: set[str] = {criterion.part for criterion in assignment.criteria if isinstance(criterion, SourceRules)}
     facts = {part: _facts(source, caller, pulse) for part in sorted(parts) if (source := sources[part]) is not None}
+    reads_modules = "responder" in facts
+    modules = {each.name: _facts(each, caller, pulse) for each in handed_in.modules} if reads_modules else {}
     called: dict[str, Called] = {}
     checks: dict[tuple[str, int], Outcome] = {}
     for criterion in assignment.criteria:
@@ -91,7 +95,12 @@ def look_at(
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
                     checks[criterion.id, place] = _check(criterion, trial, assignment, caller, pulse)
     walls = next((each.walls for each in called.values()), "")
-    return Findings(facts, handed_in.flags, called, checks, walls)
+    return Findings(facts, handed_in.flags, called, checks, walls, modules)
+
+
+def reads_program(assignment: Assignment) -> bool:
+    """Whether the text of the robot program is marked."""
+    return any(isinstance(each, SourceRules) and each.part == "program" for each in assignment.criteria)
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def _compare(criterion: Functions, call: ExpectedCall, gave: Returned) -> tuple[
         value = at_path(parsed(value), criterion.path) if isinstance(value, str) else NOTHING
         if value is NOTHING:
             return Fraction(0), f"there is nothing at {criterion.path} in {quoted(as_text(gave.value))}"
-    what = f"it returned {quoted(as_text(value))}"
+    what = f"it returned {_shown(value)}"
     if criterion.each:
         return _entries_right(criterion, call.returns, value), what
     wanted = call.one_of or (call.returns,)
@@ -129,4 +129,10 @@ def _call_words(criterion: Functions, call: ExpectedCall) -> str:
 
 
 def _wanted(call: ExpectedCall) -> str:
-    return " or ".join(quoted(as_text(value)) for value in call.one_of or (call.returns,))
+    return " or ".join(map(_shown, call.one_of or (call.returns,)))
+
+
+def _shown(value: Any) -> str:
+    """Texts in quotes, all else as it is, shortened."""
+    told = quoted(as_text(value))
+    return told if isinstance(value, str) else told[1:-1]

@@ -15,7 +15,7 @@ from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
 from responders.sandbox.running_child import ChildLimits
-from service.grading.findings import HandedIn, look_at
+from service.grading.findings import HandedIn, look_at, reads_program
 from service.grading.grade import Grade, TrialResult
 from service.grading.judge import judge
 from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
@@ -31,7 +31,7 @@ from sim.world import Noise
 from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
-from submissions.plain_cells import python_of
+from submissions.plain_cells import modules_of, python_of
 from submissions.submission import Notebook, Source, Submission
 
 _MEGABYTE = 1 << 20
@@ -140,7 +140,7 @@ def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
     responder = parts.responder
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
-    return HandedIn(parts.program, responder, parts.flags, parts.files)
+    return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission))
 
 
 class _Watch:
@@ -190,11 +190,15 @@ def _notebook_parts(submission: Submission, notebook: Notebook, assignment: Assi
         given = Source(asked.program, assignment.given_parts[asked.program])
         flags, text, notes = _flags(given.text, assignment)
         return _Parts(Source(given.name, text), flags, None, files, notes, notebook)
-    cell = program_of(notebook, marked_site(notebook, asked.cell))
+    site = marked_site(notebook, asked.cell)
+    cell = program_of(notebook, site)
     flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
         # A line that cannot be read is told by the play, which may come to another cell.
         notes = tuple(note for note in notes if not note.startswith(_IGNORED))
+        if cell is not None:
+            again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
+            notes = (f"the robot program in cell {cell.number} of {notebook.name} is marked{again}", *notes)
         return _Parts(Source(notebook.name, text), flags, None, files, notes, notebook, asked.cell)
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
@@ -251,7 +255,8 @@ def _recording(
     if parts.notebook is not None:
         child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE)
         hand_in = NotebookHandIn(parts.notebook, parts.files, child_limits, limits.output_bytes)
-        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell), rig, pulse)
+        as_read = parts.marked_cell is not None and reads_program(assignment)
+        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, pulse)
     recording = rig.run(order, obstacles, pulse)
     if parts.program_cell is None:
         return recording

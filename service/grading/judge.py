@@ -177,7 +177,8 @@ def _judge_one(
 def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> CriterionResult:
     """For what is looked at once a hand-in: no trial is its evidence."""
     if isinstance(criterion, SourceRules):
-        outcome = judge_source(criterion, findings.facts.get(criterion.part), findings.flags)
+        modules = findings.modules if criterion.part == "responder" else {}
+        outcome = judge_source(criterion, findings.facts.get(criterion.part), findings.flags, modules)
     else:
         outcome = judge_functions(criterion, findings.called.get(criterion.id))
     share = Fraction(outcome.passed) if criterion.over == "all" else outcome.score

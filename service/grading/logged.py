@@ -1,6 +1,6 @@
 """Judging what a program logs: series of the datalog, and images.
 
-Values and images are the simulator's own records; what a program prints about them is judged elsewhere.
+Images are the simulator's own records; values are what the program printed, and ``measured.py`` tells which were read.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.measured import measured_only
 from service.grading.outcome import Outcome, failed, passed, pose_at
 from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask
@@ -26,10 +27,15 @@ Check = tuple[Fraction, str]  # the part of it that was reached, and what to say
 
 def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     recording = trial.recording
-    samples = [datum for datum in recording.datalog if datum.name == criterion.series]
-    values = [datum.value for datum in samples]
     name = criterion.series
+    logged = [datum for datum in recording.datalog if datum.name == name]
+    samples = logged if criterion.measured is None else measured_only(logged, criterion.measured, recording)
+    values = [datum.value for datum in samples]
     measures = (Measure("samples", float(len(values))), *_extremes(values))
+    if logged and not values:
+        return failed(
+            f"Expected {name} to be what the {criterion.measured} read, but none of {len(logged)} samples is."
+        )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
         return failed(f'Expected the program to log {name}, but the datalog has none (print "{name}: 42").')
     checks = _datalog_checks(criterion, samples, recording)
@@ -43,6 +49,14 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     )
 
 
+def _images(count: int) -> str:
+    return f"{count or 'no'} image{'' if count == 1 else 's'}"
+
+
+def _there(count: int) -> str:
+    return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
+
+
 def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     log = recording.image_log
@@ -51,7 +65,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         got = sum(entry[0] == side for entry in log)
         if count is not None:
             checks.append(
-                (got == count, f"Expected {count} images of the {side} sensor to be logged, but there are {got}")
+                (got == count, f"Expected {_images(count)} of the {side} sensor to be logged, but {_there(got)}")
             )
     if criterion.pairs:
         sides = [entry[0] for entry in log]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.moves import Move, measures_of, misses, move_between, moves_of, shown
+from service.grading.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.outcome import Outcome, failed, passed
 from service.grading.whereabouts import place_at, positions, robot_of, standing, stretches, times, travel
 from sim.recording import Floats, Recording
@@ -118,10 +118,19 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
         reached = abs(float(ahead[turn.row]))
         share = height / criterion.heights[0]
         least = criterion.at_least * share
-        if reached < least or abs(reached - unit * height) > criterion.tolerance * unit * height:
+        if reached < least:
             return failed(
-                f"Expected the robot to go out about {max(unit * height, least):.0f} mm the {_nth(number)} time "
-                f"(within {criterion.tolerance:.0%}), but it went {reached:.0f} mm.",
+                f"Expected the robot to go out at least {least:g} mm the {_nth(number)} time, "
+                f"but it went {reached:.0f} mm.",
+                *place_at(recording, turn.row),
+                score=right,
+                measures=measures,
+            )
+        if abs(reached - unit * height) > criterion.tolerance * unit * height:
+            ways = ", ".join(f"{abs(float(ahead[each.row])):.0f}" for each in outs)
+            return failed(
+                f"Expected the robot to go out {_proportion(criterion.heights)} (within {criterion.tolerance:.0%}), "
+                f"but it went {ways} mm.",
                 *place_at(recording, turn.row),
                 score=right,
                 measures=measures,
@@ -247,9 +256,9 @@ def _missing_move(
     after = max((made.index(move) for move in found[:number] if move is not None), default=-1) + 1
     free = [move for move in made[after if criterion.in_order else 0 :] if move not in found]
     if not free:
-        told = f"{_count(len(made), 'move')} in all" if made else "no move at all"
+        told = f"did not: the last that it did is that it {made[-1]}" if made else "did not move at all"
         return failed(
-            f"Expected {called}{_asked(wanted)}, but the robot made {told}.",
+            f"Expected {called}{_asked(wanted)}, but the robot {told}.",
             recording.end_t,
             recording.end,
             score,
@@ -266,15 +275,25 @@ def _missing_move(
 
 def _asked(wanted: NamedMotion) -> str:
     asked = (
-        ("forwards", wanted.forward, " mm"),
-        ("to the left", wanted.sideways, " mm"),
-        ("away from where it began", wanted.distance, " mm"),
-        ("of turn to the left", wanted.turn, "°"),
-        ("of turn", wanted.turn_size, "°"),
-        ("long", wanted.seconds, " s"),
+        ("forwards", "backwards", wanted.forward, " mm"),
+        ("to the left", "to the right", wanted.sideways, " mm"),
+        ("away from where it began", "", wanted.distance, " mm"),
+        ("of turn to the left", "of turn to the right", wanted.turn, "°"),
+        ("of turn", "", wanted.turn_size, "°"),
+        ("long", "", wanted.seconds, " s"),
     )
-    words = [f"{wished[0]:g} to {wished[1]:g}{unit} {what}" for what, wished, unit in asked if wished is not None]
+    words = []
+    for positive, negative, wished, unit in asked:
+        if wished is not None:
+            what, least, most = facing(wished, positive, negative)
+            words.append(f"{range_words(least, most, unit)} {what}")
     return f"a move of {', '.join(words)}"
+
+
+def _proportion(heights: tuple[float, ...]) -> str:
+    if len(set(heights)) == 1:
+        return "equally far each time"
+    return f"in the proportion {' to '.join(f'{height:g}' for height in heights)}"
 
 
 def _how_far(wanted: NamedMotion, move: Move) -> int:

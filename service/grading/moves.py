@@ -21,6 +21,8 @@ from submissions.criteria.motion import Motion
 _STRAIGHT = 0.1
 #: Driving straight and turning are two moves where each goes on for so many ticks (0.3 s).
 _LASTING = 9
+#: A bound so far off (mm, degrees, s) is none: no run comes near it.
+_NO_BOUND = 10_000
 #: A shorter rest within a move does not part it in two.
 _REST = 2
 
@@ -81,19 +83,36 @@ def straight(recording: Recording) -> NDArray[np.bool_]:
 
 
 def misses(wanted: Motion, move: Move) -> str | None:
-    """In what a move is not as wanted: ``expected a turn of 85° to 95°``; None if it is."""
+    """In what a move is not as wanted, ``a turn of 85 to 95°, but it was 80°``; None if it is."""
     asked = (
-        ("distance from where it began", wanted.distance, move.distance, " mm"),
-        ("way forwards", wanted.forward, move.forward, " mm"),
-        ("way to the left", wanted.sideways, move.sideways, " mm"),
-        ("turn to the left", wanted.turn, move.turn, "°"),
-        ("turn", wanted.turn_size, abs(move.turn), "°"),
-        ("time", wanted.seconds, move.seconds, " s"),
+        ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
+        ("a way", " forwards", " backwards", wanted.forward, move.forward, " mm"),
+        ("a way", " to the left", " to the right", wanted.sideways, move.sideways, " mm"),
+        ("a turn", " to the left", " to the right", wanted.turn, move.turn, "°"),
+        ("a turn", "", "", wanted.turn_size, abs(move.turn), "°"),
+        ("a time", "", "", wanted.seconds, move.seconds, " s"),
     )
-    for what, wished, value, unit in asked:
-        if wished is not None and not wished[0] <= value <= wished[1]:
-            return f"a {what} of {wished[0]:g} to {wished[1]:g}{unit}, but it was {shown(value)}{unit}"
+    for what, positive, negative, wished, value, unit in asked:
+        if wished is None or wished[0] <= value <= wished[1]:
+            continue
+        side, least, most = facing(wished, positive, negative)
+        found = shown(abs(value))
+        way = "" if found == "0" else negative if value < 0 else positive
+        return f"{what}{side} of {range_words(least, most, unit)}, but it was {found}{unit}{way}"
     return None
+
+
+def facing(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
+    """A range below 0 as one above it, with the words for its side."""
+    least, most = wished
+    return (negative, -most, -least) if most <= 0 and least < 0 else (positive, least, most)
+
+
+def range_words(least: float, most: float, unit: str) -> str:
+    """``85 to 95°``, ``at least 100 mm``, ``1 s``."""
+    if most >= _NO_BOUND:
+        return f"at least {least:g}{unit}"
+    return f"{least:g}{unit}" if least == most else f"{least:g} to {most:g}{unit}"
 
 
 def shown(value: float) -> str:

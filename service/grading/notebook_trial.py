@@ -36,12 +36,14 @@ class NotebookHandIn:
 class Marking:
     """The run that is marked: ``order`` has all but the program, unless the assignment brings that itself.
 
-    ``which`` is the assignment's word for the cell; None when the program is the assignment's.
+    ``which`` is the assignment's word for the cell; None when the program is the assignment's. With ``as_read`` the
+    text in ``order`` is what is run: its rules were held against that, and a notebook can hand over another.
     """
 
     order: TrialOrder
     obstacles: tuple[Rectangle, ...]
     which: str | None
+    as_read: bool = False
 
 
 def run_notebook_trial(hand_in: NotebookHandIn, marking: Marking, rig: Rig, pulse: Callable[[], None]) -> Recording:
@@ -73,6 +75,8 @@ def _play(
     staged = Staged(order, marking.obstacles, None, True, True)
 
     def marked_run(program: Program, flags: Flags, setup: Setup) -> Staged:
+        if marking.as_read:
+            program = replace(program, text=order.program.code.text)
         run = replace(
             order,
             program=program_order(program, order.program.limits, order.program.output_bytes),
@@ -80,8 +84,9 @@ def _play(
         )
         return replace(staged, order=run)
 
-    # On the usual sheet, never on the marked one: there the patches would tell the answers.
-    unmarked = UnmarkedRuns(order.program.limits, order.program.output_bytes, order.seconds, order.seed)
+    # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
+    sheet = int(order.floor.sheet == 0 and not order.floor.patches)
+    unmarked = UnmarkedRuns(order.program.limits, order.program.output_bytes, order.seconds, order.seed, sheet)
     stage = NotebookStage(site, marked_run, unmarked, staged if marking.which is None else Staged())
     notebook = hand_in.notebook
     played = rig.play(

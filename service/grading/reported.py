@@ -27,7 +27,7 @@ def judge_reports(criterion: Reports, trial: TrialResult, assignment: Assignment
     wanted = _expected(criterion, trial, assignment)
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
-    asked = f"Expected {who} to {deed} {_entries(wanted)}"
+    asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
     texts = _texts(criterion, trial.recording)
     if not texts:
         return failed(f"{asked}, but it did not {deed} anything.")
@@ -122,6 +122,12 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
     if criterion.only and others:
         return f"it reported {others[0].word} as well"
     return ""
+
+
+def _leeway(criterion: Reports, wanted: Sequence[Entry]) -> str:
+    """How far off a number may be, where it is far enough to matter to whoever compares."""
+    numbers = any(not isinstance(entry, str) for entry in wanted)
+    return f" (within {criterion.tolerance:g})" if numbers and criterion.tolerance >= 1 else ""
 
 
 def _entries(entries: Sequence[Entry]) -> str:

@@ -24,7 +24,7 @@ from sim.camera import CachedCamera, Cameras
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording
 
-_MOST_ARENAS = 8
+_MOST_ARENAS = 4
 
 
 class Rig:

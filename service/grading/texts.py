@@ -27,6 +27,9 @@ class Deed:
     past: str
 
 
+#: How conditions begin that are more than quoted texts.
+_SOMETHING = "something that "
+
 _PRINT = Deed("the program", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
 _SEND = Deed("the robot", "send", "sent")
@@ -93,7 +96,7 @@ def conditions(criterion: Sequenced | Replies) -> str:
         words.append(f"contains {listed(criterion.contains)}")
     if criterion.matches is not None:
         words.append(f"matches the pattern {quoted(criterion.matches)}")
-    return f"something that {' and '.join(words)}" if words else ""
+    return f"{_SOMETHING}{' and '.join(words)}" if words else ""
 
 
 def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
@@ -128,10 +131,11 @@ def _judge_order(
             found.append(line)
         elif extra is None:
             extra = line
-    expected = f"Expected {deed.who} to {deed.verb} {listed(wanted)} in this order"
+    expected = f"Expected {deed.who} to {deed.verb} {listed(wanted)}{' in this order' if len(wanted) > 1 else ''}"
     if criterion.only:
         expected += " and nothing else"
-        expected += f" that is {conditions(criterion)}" if criterion.has_conditions else ""
+        counts = conditions(criterion)
+        expected += f" that {counts.removeprefix(_SOMETHING)}" if counts.startswith(_SOMETHING) else ""
     extras = len(chosen) - len(found) if criterion.only else 0
     score = Fraction(len(found), len(wanted) + extras)
     if criterion.only and extra is not None:

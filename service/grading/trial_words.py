@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from service.grading.grade import TrialResult
 from service.grading.outcome import Outcome, cut, fault_words
+from sim.recording import Verdict
 from submissions.sweep import CONDITIONS
 
 
@@ -33,4 +34,8 @@ def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
     fault = cut(trial.recording)
     if fault is None or (outcome is not None and fault_words(fault) in outcome.message):
         return ""
+    if fault.verdict is Verdict.TIME_LIMIT:
+        if outcome is not None and "still running" in outcome.message:
+            return ""
+        return f" The program was still running when the time was up, at {fault.t:g} s."
     return f" The run ended early, at {fault.t:.2f} s."

@@ -12,6 +12,7 @@ from service.grading.grade import TrialResult
 from service.grading.patches import decoded
 from service.grading.places import part_at
 from sim.backgrounds import label_names
+from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import LabelledPlace, Recognition
 
@@ -63,6 +64,8 @@ def _known(criterion: Recognition, trial: TrialResult, told: Mapping[tuple[str, 
     recording = trial.recording
     found: list[Shown] = []
     for number, image in enumerate(recording.images):
+        if criterion.near_start is not None and _way_from_start(recording, image.pose) > criterion.near_start:
+            continue
         truth: str | None
         match criterion.truth:
             case "label":
@@ -76,6 +79,11 @@ def _known(criterion: Recognition, trial: TrialResult, told: Mapping[tuple[str, 
         if truth is not None:
             found.append((number, truth))
     return found
+
+
+def _way_from_start(recording: Recording, pose: Pose) -> float:
+    """How far the robot at ``pose`` is from where it started, mm."""
+    return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y))
 
 
 def _told(criterion: Recognition, assignment: Assignment) -> Mapping[tuple[str, int], str]:

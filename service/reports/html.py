@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -16,7 +17,7 @@ from importlib.resources import files
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from service.grading.grade import Grade
 from service.reports.audience import BEFORE_PUBLICATION, student_view
@@ -81,7 +82,7 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", walls: str = "")
     graded = [row for row in rows if row.marks is not None]
     cells = [
         {
-            "student": row.student,
+            "student": _breakable(row.student),
             "marks": "" if row.marks is None else number(row.marks),
             "max_marks": "" if row.max_marks is None else number(row.max_marks),
             "share": _share(row.marks, row.max_marks),
@@ -134,6 +135,11 @@ def _shown(value: object) -> object:
 
 def _data_uri(data: bytes) -> Markup:
     return Markup("data:image/png;base64,") + Markup(base64.b64encode(data).decode("ascii"))
+
+
+def _breakable(name: str) -> Markup:
+    """A name that a narrow screen breaks where its parts meet, not inside a word."""
+    return Markup(re.sub(r"([_.@])", r"\1<wbr>", str(escape(readable(name, 400)))))
 
 
 def _relative_link(path: str) -> str:

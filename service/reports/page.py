@@ -177,7 +177,7 @@ def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:
 
 
 def _where(grade: Grade, evidence: Evidence) -> str:
-    if not 0 <= evidence.trial < len(grade.trials):
+    if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
     trial = grade.trials[evidence.trial]
     return f"First missed in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"

@@ -32,7 +32,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
         Verdict.FINISHED: VerdictWords(
             "finished",
             "Your program ran to its end without an error.",
-            "Nothing went wrong while it ran.",
+            "Nothing stopped it.",
             "If marks are missing, compare what each criterion asked for with what your robot did.",
             "good",
         ),
@@ -67,8 +67,9 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
         Verdict.CPU_LIMIT: VerdictWords(
             "computed for too long",
             "Your code computed for so long without waiting that it was stopped.",
-            "A loop in your code never waits, so the robot's world cannot move.",
-            "Put a sensor reading or a short time.sleep inside the loop, or make the calculation smaller.",
+            "A loop never ends, or never waits, so that the robot's world cannot move; or a calculation is too long.",
+            "Check when the loop in the line below ends. In a robot program, put a sensor reading or a short "
+            "time.sleep inside it; in a responder, make the calculation smaller.",
             "bad",
         ),
         Verdict.MEMORY_LIMIT: VerdictWords(
@@ -124,7 +125,7 @@ def verdict_words(verdict: Verdict) -> VerdictWords:
 
 #: Where no robot was run: only functions were called and texts were read.
 _NO_ROBOT = VerdictWords(
-    "looked at",
+    "code checked",
     "Your functions were called and your code was read; no robot was run.",
     "What came of it is told at each criterion.",
     "If marks are missing, call the function yourself with the values that are named there.",

@@ -6,6 +6,7 @@ Pictures only: how a light sensor sees them is the camera's, and what a flag ask
 from sim.backgrounds.drawing import HEIGHT, LABEL_GREYS, WIDTH
 from sim.backgrounds.floors import (
     OBSTACLE_PRESETS,
+    SEEDED,
     SHAPES,
     Floor,
     FloorLabel,
@@ -20,6 +21,7 @@ __all__ = [
     "HEIGHT",
     "LABEL_GREYS",
     "OBSTACLE_PRESETS",
+    "SEEDED",
     "SHAPES",
     "WIDTH",
     "Floor",

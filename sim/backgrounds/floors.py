@@ -184,6 +184,9 @@ _PLANS: Mapping[str, _Plan | _SheetPlan | _ShapesPlan] = MappingProxyType(
     }
 )
 
+#: The floors that each seed draws anew.
+SEEDED = tuple(name for name, plan in _PLANS.items() if isinstance(plan, _SheetPlan | _ShapesPlan))
+
 
 def names() -> tuple[str, ...]:
     """Every floor that ``floor`` knows, in the order of the course's menu."""
@@ -213,7 +216,7 @@ def _printed(name: str, plan: _Plan, labels: bool) -> Floor:
     return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles, patches=labels)
 
 
-@functools.lru_cache(maxsize=8)  # a worker sees ever new seeds, and a picture is 8 MB
+@functools.lru_cache(maxsize=4)  # a worker sees ever new seeds
 def _digit_sheet(name: str, plan: _SheetPlan, labels: bool, seed: int) -> Floor:
     sheet = digits.draw_sheet(seed, plan.paper, patches=labels)
     return Floor(name, _read_only(sheet.picture), plan.pose, _digit_labels(sheet.digits), patches=labels, sheet=seed)

@@ -35,8 +35,10 @@ class Recognition(CriterionBase):
 
     ``pictures`` says which of a trial's pictures count. With ``each_pattern`` all pictures of one pattern count
     as one: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"`` of the answers; a trial
-    that has pictures of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. A trial
-    without a picture counts as one wrong answer, so that staying silent never helps.
+    that has pictures of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
+    ``near_start`` only pictures count that were taken at most so many mm from where the robot started, so that it
+    cannot drive to one that is easier. A trial without a picture that counts is one wrong answer, so that staying
+    silent never helps.
     """
 
     truth: Literal["label", "grey", "places"] | tuple[str, ...] = "label"
@@ -49,6 +51,7 @@ class Recognition(CriterionBase):
     labels: tuple[str, ...] = ()  # all that could be named; without it those that the floor and the truths have
     aliases: dict[str, Texts] = Field(default_factory=dict)
     pictures: Literal["all", "first", "last"] = "all"
+    near_start: float | None = Field(default=None, gt=0, le=5000)
     each_pattern: Literal["first", "any", "majority"] | None = None
     patterns: int = Field(default=0, ge=0, le=1000)
     at_least: float | None = Field(default=None, gt=0, le=1)

@@ -12,6 +12,9 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import CriterionBase
 
+#: What a series may be a log of.
+Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
+
 
 class Datalog(CriterionBase):
     """A series of the datalog, by its name (``Light_left``), has what it should; all that is given must hold.
@@ -19,8 +22,10 @@ class Datalog(CriterionBase):
     ``at_least`` and ``at_most`` count its samples. ``plateaus`` are values that it must keep for
     ``plateau_samples`` samples in a row, within ``tolerance``, in this order; others may lie between.
     ``between`` is [least, most] for every sample; ``covers`` is a range that the series must reach both ends
-    of. ``dips_below`` names a series whose lowest sample must lie above this one's. ``timed`` asks for the
-    time in every sample, as in ``print("Light_left: 42 " + str(get_clock()))``.
+    of. With ``measured`` only samples count that this instrument read (in any unit of the brick's) at most half a
+    second before they were printed: a program may print any number. ``dips_below`` names a series whose lowest
+    sample must lie above this one's. ``timed`` asks for the time in every sample, as in
+    ``print("Light_left: 42 " + str(get_clock()))``.
     """
 
     check: Literal["datalog"]
@@ -34,6 +39,7 @@ class Datalog(CriterionBase):
     covers: tuple[float, float] | None = None
     dips_below: str | None = Field(default=None, min_length=1)
     timed: bool = False
+    measured: Instrument | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
