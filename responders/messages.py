@@ -12,6 +12,7 @@ from sim.recording import Datum
 
 PY = "PY::"
 IMG_DATA = "IMG_DATA"
+_MOST = 1e15
 JSON = "JSON::"
 
 _DATALOG = (
@@ -57,7 +58,7 @@ def logged_sides(text: str) -> tuple[Literal["left", "right"], ...]:
 
 
 def datum(text: str, t: float) -> Datum | None:
-    """The datalog entry in a printed line, None if it is not one or cannot be read."""
+    """The datalog entry in a printed line, None if it is not one or has no numbers that a sensor could have given."""
     if not text.startswith(_DATALOG):
         return None
     name, colon, rest = text.partition(": ")
@@ -65,9 +66,13 @@ def datum(text: str, t: float) -> Datum | None:
     if not colon or not words:
         return None
     try:
-        return Datum(t, name, float(words[0]), float(words[1]) if len(words) > 1 else None)
+        numbers = [float(word) for word in words[:2]]
     except ValueError:
         return None
+    # Not what is infinite or no number, nor what becomes so when a few are added up.
+    if not all(abs(number) <= _MOST for number in numbers):
+        return None
+    return Datum(t, name, numbers[0], numbers[1] if len(numbers) > 1 else None)
 
 
 def _no_constant(name: str) -> None:

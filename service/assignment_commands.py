@@ -18,6 +18,7 @@ from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.rig import Rig
 from service.reports.readable import one_line, readable
 from sim.errors import AssignmentError, UsageError
+from submissions.assignment import Assignment
 from submissions.assignment_file import FILE_NAME, catalogue, find_assignment
 from submissions.assignment_folder import export_for_students, export_whole, write_new
 from submissions.example_folder import EXAMPLES, REFERENCE
@@ -51,6 +52,15 @@ def _cell(which: str) -> str:
     return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'
 
 
+def _setting(found: Assignment) -> str:
+    if not found.scenarios:
+        return f"no robot is run; responder: {found.parts.responder}"
+    return (
+        f"world: {found.world.background}, robot {found.world.robot}; "
+        f"program: {found.parts.program}, responder: {found.parts.responder}; of a notebook: {_cell(found.parts.cell)}"
+    )
+
+
 @assignments_app.command()
 def show(assignment: Which) -> None:
     """What an assignment asks for, and how it is marked."""
@@ -60,12 +70,7 @@ def show(assignment: Which) -> None:
     console.print(title.append(f" ({found.id}), {found.max_marks:g} marks", style="not bold"))
     if found.description:
         console.print(Text(_flowing(readable(found.description.strip(), 20_000, lines=500))))
-    console.print(
-        f"\nworld: {found.world.background}, robot {found.world.robot}; "
-        f"program: {found.parts.program}, responder: {found.parts.responder}; of a notebook: {_cell(found.parts.cell)}",
-        highlight=False,
-        markup=False,
-    )
+    console.print(f"\n{_setting(found)}", highlight=False, markup=False)
     if found.given:
         console.print(f"given files: {', '.join(sorted(found.given))}", highlight=False, markup=False)
     table = Table("criterion", "check", "marks", box=None, pad_edge=False)

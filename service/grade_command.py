@@ -24,7 +24,7 @@ from service.reports.text import plain_text
 from service.reports.written import prepare_folder, write_report
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment_file import find_assignment, find_in_catalogue
 from submissions.bundle import fit_parts, read_submission
 from submissions.submission import Submission
 
@@ -110,7 +110,7 @@ def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission
     if submission.assignment is None:
         raise UsageError(f"{path}: which assignment is this for? name it with -a, or in the hand-in's submission.toml")
     try:
-        asked = find_assignment(submission.assignment)
+        asked = find_in_catalogue(submission.assignment)
     except UsageError as error:
         raise UsageError(f"{path}: {error} Name the assignment with -a.") from None
     return fit_parts(submission, asked.parts), asked

@@ -20,9 +20,10 @@ from service.roster import RosterRow, file_inside, read_roster
 from service.store.intake import HandIn
 from sim.errors import UsageError
 from submissions.assignment import Assignment
-from submissions.assignment_file import catalogue, find_assignment, read_assignment
-from submissions.bundle import fit_parts, read_submission
+from submissions.assignment_file import catalogue, find_assignment, find_in_catalogue, read_assignment
+from submissions.bundle import clean_name, fit_parts, read_submission
 from submissions.raw_files import shown
+from submissions.submission import Submission
 
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
@@ -65,7 +66,7 @@ def preflight(path: Path, assignment: str | None) -> Preflight:
             for row in read_roster(path)
         )
     with _opened(path) as folder:
-        find_own = cache(find_assignment)
+        find_own = cache(find_in_catalogue)
         return _read([_Row(shown(entry.name), partial(_hand_in, entry, asked, find_own)) for entry in _entries(folder)])
 
 
@@ -91,12 +92,21 @@ def _read(rows: Iterable[_Row]) -> Preflight:
 
 def _hand_in(entry: Path, asked: Assignment | None, find: Callable[[str], Assignment]) -> HandIn:
     if asked is not None:
-        return HandIn(read_submission(entry, asked=asked.parts), asked, shown(entry.name))
+        return HandIn(_named(read_submission(entry, asked=asked.parts), entry), asked, shown(entry.name))
     submission = read_submission(entry)
     if submission.assignment is None:
         raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
     own = find(submission.assignment)
-    return HandIn(fit_parts(submission, own.parts), own, shown(entry.name))
+    return HandIn(_named(fit_parts(submission, own.parts), entry), own, shown(entry.name))
+
+
+def _named(submission: Submission, entry: Path) -> Submission:
+    """By the name of its file or folder: in a batch nobody hands in for somebody else."""
+    student = clean_name(entry.name if entry.is_dir() else entry.stem)
+    if submission.student == student:
+        return submission
+    note = f"submission.toml names the student {submission.student}; in a batch the name of the file or folder counts."
+    return replace(submission, student=student, notes=(*submission.notes, note))
 
 
 def _roster_hand_in(

@@ -63,6 +63,18 @@ def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
     return read_assignment(assignment_folder(name_or_path))
 
 
+def find_in_catalogue(name: str) -> Assignment:
+    """The assignment of the catalogue with this id, which a hand-in names; never a folder, which it could bring along.
+
+    Raises UsageError if there is none.
+    """
+    ids = catalogue()
+    if name not in ids:
+        hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
+        raise UsageError(f"There is no assignment {name!r} in the catalogue, expected one of its ids{hint}.")
+    return find_assignment(name)
+
+
 def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     """The folder of the assignment with this id in the catalogue, or this folder itself.
 
@@ -77,8 +89,10 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         path = path.parent
     if path.is_dir():
         return path
+    if path.is_file():
+        raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
     hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
-    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}.")
+    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
 
 
 def read_assignment(folder: Path) -> Assignment:

@@ -32,7 +32,7 @@ from submissions.assignment_tables import (
     listed,
     read_table,
 )
-from submissions.code_parts import check_code, check_ranks, check_sources, runs_no_robot
+from submissions.code_parts import check_code, check_given, check_ranks, check_sources, runs_no_robot
 from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies, Reports
 from submissions.problems import Problems
 from submissions.recognition_parts import check_recognition, check_reports, checked_training, completed
@@ -73,6 +73,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         training = checked_training(training_table, scenarios, ground, problems) if training_table else None
     check_ranks(criteria, problems)
     given_parts = check_sources(criteria, files, problems)
+    check_given(document, given_parts.keys(), problems)
     given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):

@@ -48,6 +48,20 @@ def check_code(
         problems.add((*place, key), f'{key} looks at the {asked}, but parts has {asked} = "none", expected one')
 
 
+def check_given(document: Mapping[str, object], checks: Iterable[str], problems: Problems) -> None:
+    """Names files that would hand the answers to students: checks, places, and what describes the assignment."""
+    criteria = document.get("criterion")
+    tables = [table for table in criteria if isinstance(table, dict)] if isinstance(criteria, list) else []
+    answers: set[object] = {table["places"] for table in tables if isinstance(table.get("places"), str)}
+    answers |= {*checks, "assignment.toml", "expected.toml"}
+    given = document.get("given")
+    for number, name in enumerate(given if isinstance(given, list) else []):
+        if isinstance(name, str) and name in answers:
+            problems.add(
+                ("given", number), f'given names "{name[:60]}", which holds answers, expected what students may read'
+            )
+
+
 def check_ranks(criteria: Iterable[Criterion], problems: Problems) -> None:
     """Names ranks of figures that no other criterion measures."""
     known = {criterion.id for criterion in criteria if not isinstance(criterion, Ranking)}

@@ -337,6 +337,9 @@ def test_assignment_is_found_by_id_and_by_path(tmp_path: Path) -> None:
     assert find_assignment(str(folder / "assignment.toml")).id == "a"
     with pytest.raises(UsageError, match='did you mean "echo-responder"'):
         find_assignment("echo-respnder")
+    (tmp_path / "task.toml").write_text("")
+    with pytest.raises(UsageError, match=r"task\.toml is a file, expected"):
+        find_assignment(str(tmp_path / "task.toml"))
     with pytest.raises(UsageError, match="robomark assignments list shows the catalogue"):
         find_assignment("zzz")
 

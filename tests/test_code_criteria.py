@@ -345,6 +345,18 @@ def check(trial):
     assert result.evidence[0].measures[0].value == pytest.approx(172.0685, abs=0.01)
 
 
+@pytest.mark.parametrize("value", ["1 nan", "nan 1", "inf 1", "1e308 1", "1 -1e308", "1e999 2"])
+def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Path, rig: Rig) -> None:
+    (tmp_path / "assignment.toml").write_text(HEAD)
+    (tmp_path / "check.py").write_text(
+        "def check(trial):\n"
+        "    numbers = [number for _, _, *both in trial['datalog'] for number in both if number is not None]\n"
+        "    return {'passed': not numbers, 'score': sum(numbers) - sum(numbers), 'measures': {'sum': sum(numbers)}}\n"
+    )
+    program = Source("robot.py", f"print('Light_left: {value}')\n" * 3)
+    assert grade(Submission("ada", program), read_assignment(tmp_path), rig=rig).marks == 4
+
+
 @pytest.mark.parametrize(
     ("check", "words"),
     [
@@ -368,6 +380,11 @@ def test_a_check_that_fails_is_the_instructors_mistake(check: str, words: str, t
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        (
+            ('check = "python"\nfile = "check.py"', 'check = "functions"\ncalls = [{ arguments = [3] }]'),
+            "neither returns nor one_of",
+        ),
+        (('title = "A"', 'title = "A"\ngiven = ["check.py"]'), r'given names "check\.py", which holds answers'),
         (("check.py", "other.py"), r'file is "other\.py", expected a \.py file beside this file'),
         (
             ('check = "python"\nfile = "check.py"', 'check = "ranking"\nof = "x"\nmeasure = "time"\nsteps = [[1, 1]]'),

@@ -13,11 +13,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
 from service.settings import Settings
+from sim.backgrounds import OBSTACLE_PRESETS
+from sim.robot import ROBOTS
 from submissions.assignment_file import find_assignment
-from submissions.assignment_tables import read_table
+from submissions.assignment_tables import (
+    ChannelTable,
+    HeadTable,
+    LimitsTable,
+    PartsTable,
+    ScenarioTable,
+    WorldTable,
+    read_table,
+)
 from submissions.criteria import SCHEMAS
 from submissions.criteria.common import CriterionBase
 from submissions.example_folder import examples
@@ -73,6 +84,18 @@ def test_the_assignment_shown_is_in_order(tmp_path: Path) -> None:
     assignment = find_assignment(str(tmp_path))
     assert len(list(assignment.trials())) == 36
     assert assignment.max_marks == 8
+
+
+@pytest.mark.parametrize("table", [HeadTable, WorldTable, PartsTable, ScenarioTable, ChannelTable, LimitsTable])
+def test_every_key_of_an_assignment_is_explained_to_instructors(table: type[BaseModel]) -> None:
+    text = (ROOT / "docs" / "instructors.md").read_text()
+    assert [key for key in table.model_fields if not re.search(rf"\b{key}\b", text)] == []
+
+
+def test_every_robot_and_set_of_obstacles_is_named_for_instructors() -> None:
+    text = (ROOT / "docs" / "instructors.md").read_text()
+    assert [name for name in OBSTACLE_PRESETS if f"`{name}`" not in text] == []
+    assert [name for name in ROBOTS if name.removesuffix("_Wide_Eyes") not in text] == []
 
 
 def test_every_kind_of_criterion_is_listed_for_instructors() -> None:

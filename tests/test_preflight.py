@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 import zipfile
 from pathlib import Path
 
 import pytest
 
+from service.grade_command import read_with_assignment
 from service.preflight import preflight
 from sim.errors import UsageError
+from submissions.assignment_file import assignment_folder
 
 PROGRAM = "print('hello')\n"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -83,6 +86,30 @@ def test_each_hand_in_may_name_its_own_assignment(tmp_path: Path) -> None:
     ((name, sentence),) = checked.problems
     assert name == "eve"
     assert "no-such-thing" in sentence
+
+
+def test_a_hand_in_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "class"
+    _student(folder, "eve", toml='assignment = "eve"\n')
+    shutil.copytree(assignment_folder("echo-responder"), folder / "bait")
+    (folder / "eve" / "assignment.toml").write_bytes((folder / "bait" / "assignment.toml").read_bytes())
+    monkeypatch.chdir(folder)
+    with pytest.raises(UsageError, match="no assignment 'eve' in the catalogue"):
+        read_with_assignment(Path("eve"), None)
+    checked = preflight(Path(), None)
+    assert checked.hand_ins == ()
+    assert "no assignment 'eve' in the catalogue" in dict(checked.problems)["eve"]
+
+
+def test_in_a_batch_nobody_hands_in_for_somebody_else(tmp_path: Path) -> None:
+    folder = tmp_path / "class"
+    _student(folder, "ada", toml='student = "bob"\n')
+    _student(folder, "bob")
+    checked = preflight(folder, "echo-responder")
+    assert checked.problems == ()
+    ada, bob = checked.hand_ins
+    assert (ada.submission.student, bob.submission.student) == ("ada", "bob")
+    assert "submission.toml names the student bob" in " ".join(ada.submission.notes)
 
 
 def test_a_folder_named_after_an_assignment_names_it(tmp_path: Path) -> None:

@@ -14,19 +14,19 @@ from service.grading.grade import Grade
 from service.reports.html import BatchRow, batch_index, staff_report, student_report
 from service.reports.page import page_of, timeline
 from service.reports.plots import draw_all, plots_of
-from sim.recording import Verdict
+from sim.recording import Fault, Verdict
 
 #: All that the templates write; anything else came from somewhere it should not.
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "section", "footer", "div", "span", "p", "b",
     "i", "h1", "h2", "h3", "table", "thead", "tbody", "tfoot", "tr", "th", "td", "pre", "ol", "li", "dl", "dt", "dd",
-    "svg", "rect", "figure", "figcaption", "img", "details", "summary", "a",
+    "svg", "rect", "figure", "figcaption", "img", "details", "summary", "a", "wbr",
 }  # fmt: skip
 ATTRIBUTES = {
     "lang", "charset", "http-equiv", "content", "name", "class", "scope", "role", "aria-label", "aria-hidden",
     "viewbox", "preserveaspectratio", "width", "height", "src", "alt", "href",
 }  # fmt: skip
-VOID = {"meta", "img", "rect"}
+VOID = {"meta", "img", "rect", "wbr"}
 
 
 class Reader(HTMLParser):
@@ -169,6 +169,18 @@ def test_a_line_number_outside_the_file_gives_no_excerpt() -> None:
     assert groups[0].where == "Responder (responder.py), line 2"
 
 
+def test_time_that_was_up_is_told_and_not_called_wrong() -> None:
+    time_up = Fault(10.0, Verdict.TIME_LIMIT, "program", "the program was still running after 10 seconds")
+    grade = build.line_follower_grade()
+    recording = replace(grade.trials[0].recording, faults=(time_up,))
+    ended = replace(grade, trials=(replace(grade.trials[0], recording=recording),))
+    reader = Reader(student_report(ended, {}))
+    assert "How it ended" in reader.text
+    assert "What went wrong" not in reader.text
+    assert ("10.00", "stopped") in [(entry.t, entry.kind) for entry in timeline(recording)]
+    assert "What went wrong" in Reader(student_report(build.faulty_grade(), {})).text
+
+
 def test_timelines_are_capped_and_say_so() -> None:
     entries = timeline(build.hostile_grade().trials[0].recording)
     assert len(entries) == 56
@@ -198,6 +210,7 @@ def test_batch_index_links_and_escapes() -> None:
         BatchRow("s3", note=build.HOSTILE),
         BatchRow("s4", Decimal(8), Decimal(8), Verdict.FINISHED, "//evil.example/x"),
     ]
+    assert "ada_<wbr>l@<wbr>ou.<wbr>uk&lt;b&gt;" in batch_index([BatchRow("ada_l@ou.uk<b>")])
     reader = Reader(batch_index(rows, "Batch <1>", "process limits only"))
     assert reader.values("a", "href") == ["reports/s%201.html", "javascript%3Aalert%281%29", "evil.example/x"]
     assert reader.tags <= TAGS

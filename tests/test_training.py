@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -117,6 +118,15 @@ class Model:
 """
     found = trained(rig, training, text).trials[1].recording.responder_output
     assert found.splitlines()[0] == "['train.npz'] [True] []"
+
+
+def test_unseen_images_do_not_come_in_the_order_of_the_track(rig: Rig, training: Assignment) -> None:
+    """Else a model could name a whole stretch by the clearest picture in it."""
+    result = trained(rig, training, ROWS.format("return [str(place) for place in range(len(rows))]"))
+    messages = result.trials[1].recording.messages
+    places = [int(message.text) for message in messages if message.sender == "responder"][:100]
+    neighbours = sum(abs(one - other) == 1 for one, other in pairwise(places))
+    assert neighbours < 10
 
 
 def test_a_notebook_is_no_function_that_trains(training: Assignment) -> None:

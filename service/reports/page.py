@@ -15,7 +15,7 @@ from service.reports.plots import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.verdict_words import VerdictWords, grade_words, verdict_words
-from sim.recording import Message, Recording, Verdict
+from sim.recording import Fault, Message, Recording, Verdict
 from submissions.submission import Submission
 
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
@@ -101,6 +101,7 @@ class Page:
     next_step: str
     criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
+    faults_title: str
     classification: tuple[Plot, ...]
     recognition: tuple[RecognitionTable, ...]
     scenes: tuple[Scene, ...]
@@ -114,6 +115,8 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
     """Everything a report says about ``grade``."""
     plots = plots_of(grade)
     lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
+    faults = fault_groups(grade, submission)
+    time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=number(grade.marks),
@@ -122,7 +125,8 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
         words=grade_words(grade),
         next_step=_next_step(grade),
         criteria=tuple(_criterion_line(grade, result) for result in grade.criteria),
-        faults=fault_groups(grade, submission),
+        faults=faults,
+        faults_title="How it ended" if time_alone else "What went wrong",
         classification=tuple(plot for plot in plots if not plot.scenario),
         recognition=recognition_tables(grade),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
@@ -138,7 +142,7 @@ def timeline(recording: Recording) -> tuple[Entry, ...]:
     moments = [(line.t, "printed", line.text) for line in recording.printed]
     moments += [(line.t, "said", line.text) for line in recording.spoken]
     moments += [(touch.t, "touched", touch.what) for touch in recording.touches]
-    moments += [(fault.t, "fault", fault.message) for fault in recording.faults]
+    moments += [(fault.t, _kind(fault), fault.message) for fault in recording.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
     if omitted <= 1:
@@ -146,6 +150,11 @@ def timeline(recording: Recording) -> tuple[Entry, ...]:
     first, last = moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:]
     gap = Entry("", "", f"{omitted:,} more entries are not shown")
     return (*(_entry(*moment) for moment in first), gap, *(_entry(*moment) for moment in last))
+
+
+def _kind(fault: Fault) -> str:
+    """Time that is up is no fault by itself."""
+    return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
 def _next_step(grade: Grade) -> str:

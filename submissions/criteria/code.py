@@ -94,6 +94,13 @@ class ExpectedCall(Table):
     returns: Any = None
     one_of: tuple[Any, ...] = ()
 
+    @model_validator(mode="after")
+    def _expects_something(self) -> Self:
+        # A function that does nothing returns None, which is what the lack of both would ask for.
+        if "returns" not in self.model_fields_set and not self.one_of:
+            raise ValueError("says of a call neither returns nor one_of, expected what the function must return")
+        return self
+
 
 class Functions(CriterionBase):
     """Functions of the responder are called, without a robot, and return what they must.
