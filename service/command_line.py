@@ -5,59 +5,72 @@ The commands themselves are in modules of their own, named after them; ``cli.py`
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
 import traceback
+from collections.abc import Mapping, Sequence
 from io import TextIOWrapper
 from pathlib import Path
+from types import MappingProxyType
 from typing import NoReturn
 
 import typer
 from sqlalchemy.exc import DBAPIError
 from typer.exceptions import TyperException
 
-from service.assignment_commands import assignments_app
-from service.batch_commands import batch_app
-from service.course_commands import course_app
-from service.demo_command import demo
-from service.floors_command import floors
-from service.grade_command import grade
-from service.models_commands import models_app
-from service.operator_commands import database_app, doctor, show, worker
 from service.reports.readable import readable
-from service.run_command import run
-from service.sandbox_command import sandbox_app
-from service.up_command import serve, up
-from service.verify_command import verify
 from sim.errors import Cancelled, RobomarkError, UsageError
 
 _CALLER, _OURS, _STOPPED = 2, 3, 130
 
-app = typer.Typer(
-    name="robomark",
-    help="Grades robot programs and responders of the RoboLab activities, without a screen.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+#: Where each command is, in the order in which help lists them; a name that ends in ``_app`` is a group of commands.
+_COMMANDS: Mapping[str, str] = MappingProxyType(
+    {
+        "run": "run:run",
+        "grade": "grade:grade",
+        "batch": "batch:batch_app",
+        "assignments": "assignments:assignments_app",
+        "models": "models:models_app",
+        "floors": "floors:floors",
+        "show": "operator:show",
+        "verify": "verify:verify",
+        "course": "course:course_app",
+        "up": "up:up",
+        "serve": "up:serve",
+        "worker": "operator:worker",
+        "doctor": "operator:doctor",
+        "db": "operator:database_app",
+        "sandbox": "sandbox:sandbox_app",
+        "demo": "demo:demo",
+    }
 )
-app.command()(run)
-app.command()(grade)
-app.add_typer(batch_app, name="batch")
-app.add_typer(assignments_app, name="assignments")
-app.add_typer(models_app, name="models")
-app.command()(floors)
-app.command()(show)
-app.command()(verify)
-app.add_typer(course_app, name="course")
-app.command()(up)
-app.command()(serve)
-app.command()(worker)
-app.command()(doctor)
-app.add_typer(database_app, name="db")
-app.add_typer(sandbox_app, name="sandbox")
-app.command()(demo)
+
+
+def commands(words: Sequence[str] = ()) -> typer.Typer:
+    """The command that ``words`` begins with, or all of them: only what is needed is imported, which takes a while."""
+    app = typer.Typer(
+        name="robomark",
+        help="Grades robot programs and responders of the RoboLab activities, without a screen.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_nothing)
+    for name in words[:1] if words and words[0] in _COMMANDS else _COMMANDS:
+        module, _, attribute = _COMMANDS[name].partition(":")
+        found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
+        if attribute.endswith("_app"):
+            app.add_typer(found, name=name)
+        else:
+            app.command(name)(found)
+    return app
+
+
+def _nothing() -> None:
+    """Keeps a lone command a command of ``robomark``."""
 
 
 def main() -> NoReturn:
@@ -67,7 +80,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
-        ending = app(standalone_mode=False)
+        ending = commands(sys.argv[1:])(standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
         _end(str(error), _CALLER)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from service.grading.grade import CriterionResult, Measure, TrialResult
-from service.grading.judge import judge
+from service.grading.judging.judge import judge
 from sim.recording import Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion

@@ -15,6 +15,7 @@ from rich.console import Console
 from sqlalchemy import select, update
 
 from builders import hand_in, settings_in
+from service.commands.waiting import Waiting
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.nudges import Nudger
@@ -22,7 +23,6 @@ from service.store import batch_control
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.models import CriterionRow, Job, JobState, Lane, TrialRow
-from service.waiting import Waiting
 from submissions.example_folder import examples
 from test_batch_commands import Ended, robomark
 

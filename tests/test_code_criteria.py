@@ -13,8 +13,8 @@ from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at
 from service.grading.grade import Grade
 from service.grading.grader import grade
+from service.grading.judging.source_rules import SourceFacts, judge_source
 from service.grading.rig import Rig
-from service.grading.source_rules import SourceFacts, judge_source
 from sim.errors import AssignmentError
 from sim.recording import Verdict
 from submissions.assignment import Assignment, Limits, Parts, WorldSpec

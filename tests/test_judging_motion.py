@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from driving import criterion, driven, judged, measured, passes, rest, spin, straight
-from service.grading.drawing import between, legs_of
-from service.grading.moves import moves_of
+from service.grading.judging.drawing import between, legs_of
+from service.grading.judging.moves import moves_of
 from sim.recording import Pose
 
 WHITE, BLACK = (255, 255, 255), (0, 0, 0)

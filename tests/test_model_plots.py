@@ -15,7 +15,7 @@ from models import card, shapes
 from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
 from models.views import Shift, Viewer
-from service.models_commands import models_app
+from service.commands.models import models_app
 from service.reports.curve_plot import Curve, Panel, draw_curves
 from service.reports.model_plots import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.grade_command import read_with_assignment
+from service.commands.grade import read_with_assignment
 from service.preflight import preflight
 from sim.errors import UsageError
 from submissions.assignment_file import assignment_folder

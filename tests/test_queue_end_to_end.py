@@ -16,6 +16,7 @@ from sqlalchemy import func, select
 
 from builders import comparable, hand_in, settings_in
 from databases import fresh_database
+from service.commands.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.rig import Rig
 from service.preflight import preflight
@@ -28,7 +29,6 @@ from service.store import artifacts, batches, grades, jobs
 from service.store.engine import Store, open_store
 from service.store.intake import HandIn, accept_batch, load_hand_in
 from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
-from service.waiting import Waiting
 from submissions.example_folder import examples
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.

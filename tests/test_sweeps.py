@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from service.grading.grade import Level
 from service.grading.grader import grade
+from service.grading.judging.sweeps import area, part_above, range_above
 from service.grading.rig import Rig
-from service.grading.sweeps import area, part_above, range_above
 from service.store.plain import from_plain, to_plain
 from sim.recording import Pose
 from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from service.grading.collecting import pairs
 from service.grading.grade import Grade
 from service.grading.grader import check_parts, grade
+from service.grading.judging.collecting import pairs
 from service.grading.rig import Rig
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.outcome import fault_words
+from service.grading.judging.outcome import fault_words
 from service.grading.rig import Rig
 from sim.errors import UsageError
 from submissions.assignment import Assignment

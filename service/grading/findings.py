@@ -15,10 +15,10 @@ from typing import Any, Protocol
 from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.running_child import ChildLimits
-from service.grading.function_checks import calls_of, checked
 from service.grading.grade import TrialResult
-from service.grading.outcome import Outcome, fault_words
-from service.grading.source_rules import SourceFacts
+from service.grading.judging.function_checks import calls_of, checked
+from service.grading.judging.outcome import Outcome, fault_words
+from service.grading.judging.source_rules import SourceFacts
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules

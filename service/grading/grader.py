@@ -17,7 +17,7 @@ from responders.conversation import Code, ResponderOrder
 from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at, reads_program
 from service.grading.grade import Grade, TrialResult
-from service.grading.judge import judge
+from service.grading.judging.judge import judge
 from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
 from service.grading.rig import Rig
 from service.grading.training import with_models_answers

@@ -16,9 +16,9 @@ import numpy as np
 from responders.conversation import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.training import Images, Trained, TrainingOrder
-from service.grading.collecting import Pair, pairs
 from service.grading.grade import TrialResult
-from service.grading.patches import grey_picture
+from service.grading.judging.collecting import Pair, pairs
+from service.grading.judging.patches import grey_picture
 from service.grading.rig import Rig
 from sim.chance import Stream
 from sim.recording import Fault, Image, Message, Recording, Verdict

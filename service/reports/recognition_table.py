@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Grade
-from service.grading.per_class import class_scores
+from service.grading.judging.per_class import class_scores
 from service.reports.readable import one_line
 
 

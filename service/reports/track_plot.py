@@ -14,9 +14,9 @@ from itertools import pairwise
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from service.grading.classification import wilson
 from service.grading.grade import Sight, TrialResult
-from service.grading.places import part_at
+from service.grading.judging.classification import wilson
+from service.grading.judging.places import part_at
 from service.reports.curve_plot import Curve, draw_curve
 from service.reports.figure import (
     FAINT,

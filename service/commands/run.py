@@ -1,0 +1,231 @@
+"""``robomark run``: one robot program, now, in a simulator set up by the magic's flags. No marks."""
+
+from __future__ import annotations
+
+import json
+import stat
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from models import weights_bytes
+from responders.bridge import ProgramOrder, TrialOrder
+from responders.channel import Channel
+from responders.conversation import Code, ResponderOrder
+from responders.sandbox.manager import FULL, NONE
+from responders.sandbox.running_child import ChildLimits
+from service.commands.grade import warn_of_no_walls
+from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
+from service.grading.grade import TrialResult
+from service.grading.rig import Rig
+from service.reports.figure import png
+from service.reports.path_plot import draw_path
+from service.reports.readable import readable
+from service.reports.trace import trace
+from sim.backgrounds import floor
+from sim.errors import UsageError
+from sim.recording import Recording
+from sim.robot import robot
+from sim.world import Noise
+from submissions.magics import Flags, setup, split_program
+from submissions.notebook import is_script, read_notebook, read_script
+from submissions.source_text import decode_source
+from submissions.submission import Notebook
+
+_PROGRAM = ChildLimits(5.0, 128 << 20)
+_RESPONDER = ChildLimits(10.0, 512 << 20)
+_OUTPUT_BYTES = 1_000_000
+_FILES_BYTES = 16 << 20
+_NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
+
+
+def run(
+    program: Annotated[Path, typer.Argument(help="The robot program, a .py file, or a notebook.")],
+    background: Annotated[str | None, typer.Option("-b", "--background", help="Floor.")] = None,
+    robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot.")] = None,
+    obstacles: Annotated[str | None, typer.Option("-o", "--obstacles", help="Obstacle preset.")] = None,
+    x: Annotated[str | None, typer.Option("-x", "--xpos", help="Start, mm from the left.")] = None,
+    y: Annotated[str | None, typer.Option("-y", "--ypos", help="Start, mm from the bottom.")] = None,
+    angle: Annotated[str | None, typer.Option("-a", "--angle", help="Start heading, degrees.")] = None,
+    light_noise: Annotated[str | None, typer.Option("-N", "--sensornoise", help="Light noise, 0 to 128.")] = None,
+    motor_noise: Annotated[str | None, typer.Option("-M", "--motornoise", help="Wheel noise, 0 to 500.")] = None,
+    pen_colour: Annotated[str | None, typer.Option("-P", "--pencolor", help="Colour of the pen.")] = None,
+    pen_down: Annotated[bool, typer.Option("-p", "--pendown", help="Draw the path.")] = False,
+    collab: Annotated[bool, typer.Option("-L", "--collab", help="Pass PY:: texts on.")] = False,
+    autorun: Annotated[bool, typer.Option("-R", "--autorun", help="Always so here.")] = False,
+    output: Annotated[bool, typer.Option("-O", "--output", hidden=True)] = False,
+    array: Annotated[bool, typer.Option("-A", "--array", hidden=True)] = False,
+    hide: Annotated[bool, typer.Option("-H", "--hide", hidden=True)] = False,
+    world: Annotated[bool, typer.Option("-W", "--world", hidden=True)] = False,
+    settings: Annotated[bool, typer.Option("-Z", "--settings", hidden=True)] = False,
+    noise_controls: Annotated[bool, typer.Option("-z", "--noisecontrols", hidden=True)] = False,
+    positioning: Annotated[bool, typer.Option("-X", "--positioning", hidden=True)] = False,
+    code: Annotated[bool, typer.Option("-D", "--code", hidden=True)] = False,
+    instrumentation: Annotated[bool, typer.Option("-i", "--instrumentation", hidden=True)] = False,
+    chart: Annotated[bool, typer.Option("-c", "--chart", hidden=True)] = False,
+    ultrasound: Annotated[bool, typer.Option("-u", "--ultrasound", hidden=True)] = False,
+    clear: Annotated[bool, typer.Option("-C", "--clear", hidden=True)] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", hidden=True)] = False,
+    preview: Annotated[bool, typer.Option("-v", "--preview", "--previewcode", hidden=True)] = False,
+    simulator: Annotated[str | None, typer.Option("-s", "--sim", hidden=True)] = None,
+    stop: Annotated[bool, typer.Option("-S", "--stop", hidden=True)] = False,
+    move: Annotated[bool, typer.Option("-m", "--move", hidden=True)] = False,
+    refresh: Annotated[bool, typer.Option("-F", "--refresh", hidden=True)] = False,
+    responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
+    sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
+    trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw the path over the floor, as PNG.")] = None,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
+    ] = False,
+) -> None:
+    """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
+    values = {
+        "b": background,
+        "r": robot_setup,
+        "o": obstacles,
+        "x": x,
+        "y": y,
+        "a": angle,
+        "N": light_noise,
+        "M": motor_noise,
+        "P": pen_colour,
+    }
+    switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
+    wanted = Flags(switches=frozenset(switches)).with_values(**values)
+    if unsafe:
+        warn_of_no_walls()
+    notebook = _notebook(program)
+    if notebook is not None:
+        if responder is not None:
+            raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
+        last = LastRun(wanted, seed, seed if sheet is None else sheet)
+        limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
+        with Rig(NONE if unsafe else FULL) as rig:
+            played = run_notebook(notebook, _files_beside(program), limits, last, rig)
+        show_notebook(played, _show)
+        if played.runs:
+            _keep(played.runs[-1].recording, program.name, seed, trace_file, picture)
+        return
+    flags, text = _program(program)
+    flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
+    chosen = setup(flags)
+    order = TrialOrder(
+        program=ProgramOrder(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
+        responder=_responder(responder),
+        collaborative=chosen.collaborative or responder is not None,
+        floor=floor(chosen.background, seed=seed if sheet is None else sheet),
+        robot=robot(chosen.robot),
+        pose=chosen.pose,
+        noise=Noise(chosen.light_noise, chosen.motor_noise),
+        channel=Channel(),
+        seconds=seconds,
+        seed=seed,
+        pen_down=chosen.pen_down,
+    )
+    for note in chosen.notes:
+        typer.echo(f"note: {note}", err=True)
+    with Rig(NONE if unsafe else FULL) as rig:
+        recording = rig.run(order, chosen.obstacles)
+    _show(recording)
+    _keep(recording, program.name, seed, trace_file, picture)
+
+
+def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, picture: Path | None) -> None:
+    if trace_file is not None:
+        _write(trace_file, json.dumps(trace(recording)).encode())
+    if picture is not None:
+        _write(picture, _drawn(recording, name, seed))
+
+
+def _notebook(path: Path) -> Notebook | None:
+    """The notebook in a file, or that nbconvert has made a file of; None if it is a robot program."""
+    if path.suffix.lower() == ".ipynb":
+        read = read_notebook(_read(path), path.name)
+        for note in read.notes:
+            typer.echo(f"note: {note}", err=True)
+        return read.notebook
+    text = _source(path)
+    return read_script(text, path.name) if is_script(text) else None
+
+
+def _program(path: Path) -> tuple[Flags, str]:
+    text = _source(path)
+    try:
+        return split_program(text)
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from None
+
+
+def _source(path: Path) -> str:
+    return decode_source(_read(path), path.name).text
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise UsageError(f"{path} is not a file; expected a Python file")
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _responder(given: str | None) -> ResponderOrder | None:
+    """FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
+    if given is None:
+        return None
+    path, name = Path(given), None
+    if not path.exists() and ":" in given:
+        file, _, name = given.rpartition(":")
+        path = Path(file)
+    return ResponderOrder(Code(path.name, _source(path)), _files_beside(path), _RESPONDER, _OUTPUT_BYTES, name)
+
+
+def _files_beside(path: Path) -> dict[str, bytes]:
+    files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
+    left = _FILES_BYTES
+    for beside in sorted(path.parent.iterdir()):
+        if beside.suffix in (".py", ".ipynb", "") or beside.is_symlink() or not beside.is_file():
+            continue
+        left -= beside.stat().st_size
+        if left >= 0:
+            files[beside.name] = beside.read_bytes()
+    return files
+
+
+def _show(recording: Recording) -> None:
+    """What was printed, spoken and answered, in order, and how it ended."""
+    shown = [(line.t, 0, line.text) for line in recording.printed]
+    shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
+    shown += [
+        (message.delivered, 2, f"(answer) {message.text}")
+        for message in recording.messages
+        if message.sender == "responder" and message.delivered is not None
+    ]
+    for t, _, text in sorted(shown, key=lambda each: (each[0], each[1])):
+        typer.echo(f"{t:8.2f} s  {readable(text, 400)}")
+    end = recording.end
+    typer.echo(
+        f"{recording.end_t:8.2f} s  end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading {end.heading:.1f} degrees; "
+        f"{recording.verdict}"
+    )
+    for fault in recording.faults:
+        where = f" ({fault.place} of the {fault.who})" if fault.line is not None else ""
+        typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
+        if fault.hint:
+            typer.echo(f"            {fault.hint}", err=True)
+
+
+def _drawn(recording: Recording, name: str, seed: int) -> bytes:
+    trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
+    return png(draw_path(trial, name, floor(recording.background, seed=recording.sheet).picture))

@@ -1,0 +1,229 @@
+"""Judging how often the pictures that the robot sent were named rightly: accuracy, confusion, and every picture.
+
+It compares words only; what a picture shows is found in ``truths.py``, what became of it in ``tally.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import fmean
+
+from models.intervals import wilson
+from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Sight, TrialResult
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.labels import LabelFinder
+from service.grading.judging.outcome import quoted
+from service.grading.judging.patterns import by_pattern
+from service.grading.judging.tally import Fate, Reply, reply_to
+from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
+from sim.recording import Image, Line, Recording
+from submissions.assignment import Assignment
+from submissions.criteria.classification import Recognition
+
+__all__ = ["NO_PICTURE", "Classified", "Naming", "classify", "told", "wilson"]
+
+
+@dataclass(frozen=True, slots=True)
+class Naming:
+    """One picture that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
+
+    trial: int  # index into the grade's trials
+    image: Image | None
+    truth: str
+    answer: str | None
+    words: str  # what happened, for a sentence
+    confidence: float | None = None
+
+    @property
+    def right(self) -> bool:
+        return self.answer == self.truth
+
+
+@dataclass(frozen=True, slots=True)
+class Classified:
+    """What a recognition criterion found in its trials: each picture or, where it says so, each pattern."""
+
+    namings: tuple[Naming, ...]
+    accuracy: Accuracy
+    sights: tuple[Sight, ...]
+    evidence: tuple[Evidence, ...]
+
+
+def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
+    """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
+    shown = shown_in(criterion, assignment, trials)
+    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
+    labels = nameable(criterion, assignment, truths)
+    finder = LabelFinder(labels, criterion.aliases)
+    pictures: list[Naming] = []
+    namings: list[Naming] = []
+    fates: Counter[Fate] = Counter()
+    duplicates = 0
+    for index, trial in trials:
+        recording = trial.recording
+        replies = _replies(criterion, recording)
+        fates.update(reply.fate for reply in replies)
+        duplicates += sum(reply.duplicates for reply in replies)
+        own = []
+        for number, truth in shown[index]:
+            answer, words, confidence = _answer(criterion, replies[number], finder)
+            image = recording.images[number]
+            own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
+        pictures += own
+        namings += _that_count(criterion, assignment, index, trial, own, finder)
+    by_index = dict(trials)
+    sights = tuple(
+        Sight(naming.image, naming.truth, naming.answer, by_index[naming.trial].scenario, naming.trial)
+        for naming in pictures
+        if naming.image is not None
+    )
+    missing = sum(naming.image is None for naming in namings)
+    counts = Counts(
+        sum(fates.values()),
+        fates["answered"],
+        fates["late"],
+        fates["malformed"],
+        fates["unanswered"],
+        duplicates,
+        len(namings) - missing,
+        missing,
+        "pictures" if criterion.each_pattern is None else "patterns",
+    )
+    return Classified(
+        tuple(namings),
+        _accuracy(namings, labels, counts),
+        sights,
+        tuple(_evidence(namings, index) for index, _ in trials),
+    )
+
+
+def told(naming: Naming) -> str:
+    """A sentence on one picture."""
+    if naming.image is None:
+        if naming.truth == NO_PICTURE:
+            return f"Expected a picture (IMG_DATA), but {naming.words}."
+        return f"Expected {quoted(naming.truth)}, but {naming.words}."
+    if naming.right:
+        return f"The picture showed {quoted(naming.truth)} and was named so."
+    return f"The picture showed {quoted(naming.truth)}, but {naming.words}."
+
+
+def _that_count(
+    criterion: Recognition,
+    assignment: Assignment,
+    index: int,
+    trial: TrialResult,
+    own: list[Naming],
+    finder: LabelFinder,
+) -> Sequence[Naming]:
+    """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
+    counted: list[Naming] = own
+    if criterion.each_pattern is not None:
+        counted = by_pattern(own, criterion.each_pattern, max(30.0, 2 * criterion.within))
+    if counted and len(counted) >= criterion.patterns:
+        return counted
+    if not counted and criterion.patterns <= 1:
+        truth = missing_truth(criterion, assignment, trial)
+        sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
+        if criterion.near_start is not None and trial.recording.images:
+            sent += f" from within {criterion.near_start:g} mm of where it started"
+        return [Naming(index, None, finder.canonical(truth), None, sent)]
+    words = f"the robot sent pictures of {len(counted)} patterns, and {criterion.patterns} were expected"
+    lacking = Naming(index, None, NO_PICTURE, None, words)
+    return [*counted, *[lacking] * (criterion.patterns - len(counted))]
+
+
+def _accuracy(namings: Sequence[Naming], labels: tuple[str, ...], counts: Counts) -> Accuracy:
+    right = sum(naming.right for naming in namings)
+    count = len(namings)
+    low, high = wilson(right, count)
+    cells = Counter((naming.truth, naming.answer) for naming in namings)
+    confusion = tuple(
+        (truth, answer, number)
+        for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
+    )
+    known = tuple(dict.fromkeys([*labels, *(naming.truth for naming in namings)]))
+    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(namings))
+
+
+def _confidence(namings: Sequence[Naming]) -> Confidence | None:
+    """How sure the answers were that were right, and those that were wrong; None if no answer said."""
+    right = [naming.confidence for naming in namings if naming.right and naming.confidence is not None]
+    wrong = [naming.confidence for naming in namings if not naming.right and naming.confidence is not None]
+    if not right and not wrong:
+        return None
+    return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
+
+
+def _evidence(namings: Sequence[Naming], index: int) -> Evidence:
+    """The first picture of the trial that was named wrongly, else its last."""
+    own = [naming for naming in namings if naming.trial == index]
+    shown = next((naming for naming in own if not naming.right), own[-1])
+    image = shown.image
+    return Evidence(
+        trial=index,
+        passed=all(naming.right for naming in own),
+        message=told(shown),
+        t=image.t if image else None,
+        pose=image.pose if image else None,
+    )
+
+
+def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
+    """What came back to every picture of the recording, whether it counts or not."""
+    if criterion.answer_from == "reply":
+        answers = Answers(recording)
+        return [reply_to(recording, answers, number) for number in range(len(recording.images))]
+    said = "said" if criterion.answer_from == "speech" else "printed"
+    replies = []
+    for image in recording.images:
+        heard = _between(recording, image, criterion.answer_from == "speech")
+        text = " | ".join(line.text for line in heard)
+        silent = Reply("unanswered", None, f"the robot {said} nothing after it")
+        replies.append(Reply("answered", text, "") if heard else silent)
+    return replies
+
+
+def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
+    """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
+    if reply.text is None:
+        return None, reply.words, None
+    if reply.fate == "late" and criterion.late == "wrong":
+        return None, f"the answer came too late: {quoted(reply.text)}", None
+    text, confidence = reply.text, None
+    if criterion.answer_from == "reply":
+        value = parsed(text)
+        if criterion.confidence is not None:
+            confidence = _probability(at_path(value, criterion.confidence))
+        if criterion.answer is not None:
+            picked = at_path(value, criterion.answer)
+            text = text if picked is NOTHING else as_text(picked)
+    found = finder.labels_in(text)
+    if not found:
+        return None, f"the answer names no label: {quoted(text)}", confidence
+    if len(found) > 1:
+        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
+    return found[0], f"it was taken for {quoted(found[0])}", confidence
+
+
+def _probability(value: object) -> float | None:
+    """A number from 0 to 1, as JSON has it; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        return None
+    return float(value)
+
+
+def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
+    """What the robot said or printed after this picture and before the next."""
+    following = bisect_right(recording.images, image.message, key=lambda other: other.message)
+    end = recording.images[following].t if following < len(recording.images) else math.inf
+    lines = recording.spoken if speech else recording.printed
+    return lines[bisect_left(lines, image.t, key=_time) : bisect_left(lines, end, key=_time)]
+
+
+def _time(line: Line) -> float:
+    return line.t

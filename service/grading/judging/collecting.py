@@ -1,0 +1,137 @@
+"""Judging training data that a robot collected: pairs of images, their labels, balance and duplicates.
+
+The images are the simulator's own records; whether a network learns from them is ``training.py``'s.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
+from service.grading.judging.patches import decoded
+from service.grading.judging.places import part_at
+from sim.backgrounds import floor, label_names, names
+from sim.recording import Image, Recording
+from submissions.criteria.collecting import Collects
+
+_PART_FOR_THE_REST = Fraction(1, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A left and a right image of the same moment, what the left one shows, and what the right one's grey says."""
+
+    image: Image
+    truth: str | None
+    decoded: str | None
+
+    @property
+    def label(self) -> str | None:
+        """What the pair can be trained with as; None where the two disagree or either says nothing."""
+        return self.truth if self.truth is not None and self.truth == self.decoded else None
+
+
+def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    found = pairs(recording, criterion.source, trial.light_noise)
+    classes = criterion.classes or label_names(recording.background)
+    usable = [pair for pair in found if pair.label in classes]
+    different = {pair.image.left: pair for pair in reversed(usable)}
+    counts = Counter(pair.label for pair in different.values())
+    repeated = len(found) - len({pair.image.left for pair in found})
+    measures = (
+        Measure("pairs", float(len(found))),
+        Measure("usable", float(len(usable))),
+        Measure("duplicates", float(repeated)),
+        *(Measure(f"different: {label}", float(counts[label])) for label in classes),
+    )
+    where = found[-1].image if found else None
+    wanted = criterion.each * len(classes)
+    reached = Fraction(sum(min(counts[label], criterion.each) for label in classes), wanted) if wanted else Fraction(0)
+    checks = list(_checks(criterion, classes, counts, found, len(usable), repeated))
+    wrong = next((words for holds, words in checks if not holds), None)
+    if wrong is None:
+        counted = ", ".join(f"{counts[label]} of {quoted(label)}" for label in classes)
+        return passed(
+            f"Of {len(found)} pairs of images {len(usable)} are usable, {repeated} repeat an earlier one: {counted}.",
+            where.t if where else None,
+            where.pose if where else None,
+            measures,
+        )
+    if reached == 1:
+        reached = 1 - _PART_FOR_THE_REST * Fraction(sum(not holds for holds, _ in checks), len(checks))
+    return failed(f"{wrong}.", where.t if where else None, where.pose if where else None, reached, measures)
+
+
+def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[Pair]:
+    """The pairs of images that a recording has: those logged (``log``) or those sent as ``IMG_DATA`` (``sent``)."""
+    images = recording.images if source == "sent" else tuple(_logged(recording))
+    return [
+        Pair(image, _truth(recording, image), decoded(image, recording.background, light_noise)) for image in images
+    ]
+
+
+def _logged(recording: Recording) -> Iterator[Image]:
+    """Every left image of the log, with the right one if that follows it, as ``get_sensor_image_pair`` takes them."""
+    log = recording.image_log
+    for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
+        if side == "left":
+            t = tick / 30
+            pixels = _bytes(left)
+            beside = _bytes(right) if other == "right" else b""
+            yield Image(t, tick, pose_at(recording, t), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))
+
+
+def _bytes(csv: str) -> bytes:
+    return bytes(map(int, csv.split(",")))
+
+
+def _truth(recording: Recording, image: Image) -> str | None:
+    """What the floor has under the left sensor where the image was taken."""
+    if image.truth is not None or image.message >= 0 or recording.background not in names():
+        return image.truth
+    ground = floor(recording.background, labels=recording.patches, seed=recording.sheet)
+    return ground.label_at(*part_at(recording, "left", image.pose))
+
+
+def _checks(
+    criterion: Collects,
+    classes: Sequence[str],
+    counts: Counter[str | None],
+    found: Sequence[Pair],
+    usable: int,
+    repeated: int,
+) -> Iterator[tuple[bool, str]]:
+    """What must hold, each with what to say if it does not."""
+    how = "image_data both" if criterion.source == "log" else "IMG_DATA"
+    yield bool(found), f"Expected pairs of images to be collected, but there are none ({how})"
+    rarest = min(classes, key=lambda label: counts[label], default="")
+    commonest = max(classes, key=lambda label: counts[label], default="")
+    images = "image" if criterion.each == 1 else "images"
+    yield (
+        bool(classes) and counts[rarest] >= criterion.each,
+        f"Expected at least {criterion.each} different usable {images} of each class, but there are "
+        f"{counts[rarest]} of {quoted(rarest)}; {usable} of {len(found)} pairs are usable, with a pattern under the "
+        "left sensor and its label patch under the right one",
+    )
+    if criterion.balance is not None:
+        yield (
+            counts[rarest] >= criterion.balance * counts[commonest],
+            f"Expected the rarest class to have at least {criterion.balance:.0%} of the images of the commonest, but "
+            f"there are {counts[rarest]} of {quoted(rarest)} and {counts[commonest]} of {quoted(commonest)}",
+        )
+    yield (
+        repeated <= criterion.most_duplicates * len(found),
+        f"Expected at most {criterion.most_duplicates:.0%} of the images to repeat an earlier one, but {repeated} of "
+        f"{len(found)} do",
+    )
+    useless = len(found) - usable
+    yield (
+        useless <= criterion.most_unusable * len(found),
+        f"Expected at most {criterion.most_unusable:.0%} of pairs to be unusable, but {useless} of {len(found)} are",
+    )

@@ -1,0 +1,197 @@
+"""Judging what the robot drew: its straight legs, the angles between them, and whether figures close.
+
+A leg is driven straight; what lies between two legs, a turn on the spot or a bend, is a corner.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.moves import straight
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.whereabouts import pen_down, place_at, positions, stretches, travel
+from sim.recording import Floats, Recording
+from submissions.criteria.drawing import Drawing
+
+#: Two straight parts that differ by less than this, degrees, are one leg.
+_SAME_DIRECTION = 3.0
+#: A shorter straight part belongs to a corner, mm.
+_STUB = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A straight part of the path: its rows, its ends, mm."""
+
+    first: int
+    last: int
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.start, self.end)
+
+    @property
+    def direction(self) -> float:
+        """Degrees, in which the robot moved."""
+        return math.degrees(math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0]))
+
+
+def legs_of(recording: Recording, pen: bool) -> tuple[Leg, ...]:
+    """The legs of a path in order; with ``pen`` only of what was drawn."""
+    points = positions(recording)
+    ahead, _ = travel(recording)
+    going = straight(recording)
+    if pen:
+        going &= pen_down(recording)[1:]
+    parts = [_leg(points, first, last) for way in (1, -1) for first, last in stretches(going & (np.sign(ahead) == way))]
+    legs: list[Leg] = []
+    for part in sorted(parts, key=lambda leg: leg.first):
+        if part.length < _STUB:
+            continue
+        if legs and abs(between(legs[-1].direction, part.direction)) < _SAME_DIRECTION:
+            legs[-1] = _leg(points, legs[-1].first, part.last)
+        else:
+            legs.append(part)
+    return tuple(legs)
+
+
+def between(before: float, after: float) -> float:
+    """From one direction to another, degrees to the left, -180 to 180."""
+    return (after - before + 180) % 360 - 180
+
+
+def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
+    """Every figure in turn; the score is the share of the figures that are right."""
+    recording = trial.recording
+    if criterion.pen and not pen_down(recording).any():
+        return failed(
+            "Expected something to be drawn, but the pen was never down: the program's magic line has no -p.",
+            0.0,
+            recording.start,
+        )
+    legs = legs_of(recording, criterion.pen)
+    wanted = criterion.legs * criterion.figures
+    measures = _measures(legs)
+    whole, left_over = divmod(len(legs), criterion.legs)
+    enough = whole >= criterion.figures and not left_over if criterion.at_least else len(legs) == wanted
+    figures = [legs[first : first + criterion.legs] for first in range(0, whole * criterion.legs, criterion.legs)]
+    problems = [_problem(criterion, number, figure) for number, figure in enumerate(figures)]
+    right = sum(problem is None for problem in problems[: criterion.figures])
+    score = Fraction(right, criterion.figures)
+    if not enough:
+        lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
+        told = f"{len(legs)}, of {lengths} mm" if legs else "none"
+        row = legs[min(wanted, len(legs)) - 1].last if legs else 0
+        return failed(
+            f"Expected {_figures_words(criterion)}, but the path has {told}.",
+            *place_at(recording, row),
+            score=score / 2,
+            measures=measures,
+        )
+    found = next((problem for problem in problems if problem is not None), None)
+    if found is not None:
+        return failed(found.words, *place_at(recording, found.row), score=score, measures=measures)
+    means = [_mean(figure) for figure in figures]
+    if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
+        number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
+        return failed(
+            f"Expected each figure to be larger than the one before, but after legs of {means[number]:.0f} mm came "
+            f"legs of {means[number + 1]:.0f} mm.",
+            *place_at(recording, figures[number + 1][-1].last),
+            measures=measures,
+        )
+    told = ", ".join(f"{mean:.0f}" for mean in means)
+    return passed(
+        f"The path has {len(legs)} straight legs as asked, of {told} mm.", *place_at(recording, legs[-1].last), measures
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    """What is wrong with a figure, and the row where that is seen."""
+
+    words: str
+    row: int
+
+
+def _figures_words(criterion: Drawing) -> str:
+    legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
+    least = "at least " if criterion.at_least else ""
+    if criterion.figures == 1:
+        return f"{least}one figure of {legs}" if least else legs
+    return f"{least}{criterion.figures} figures of {legs} ({criterion.figures * criterion.legs} in all)"
+
+
+def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
+    """The first thing that is wrong with the figure, if something is."""
+    mean = _mean(figure)
+    which = f" of figure {number + 1}" if criterion.figures > 1 else ""
+    for place, leg in enumerate(figure, 1):
+        if leg.length < criterion.shortest:
+            return _Problem(
+                f"Expected each leg to be {criterion.shortest:g} mm or longer, but leg {place}{which} has "
+                f"{leg.length:.0f} mm.",
+                leg.last,
+            )
+        if abs(leg.length - mean) > criterion.equal_within * mean:
+            return _Problem(
+                f"Expected equal legs (within {criterion.equal_within:.0%} of their mean, {mean:.0f} mm), "
+                f"but leg {place}{which} has {leg.length:.0f} mm.",
+                leg.last,
+            )
+    for place, (before, after) in enumerate(itertools.pairwise(figure), 1):
+        angle = abs(between(before.direction, after.direction))
+        if abs(angle - criterion.angle) > criterion.angle_within:
+            return _Problem(
+                f"Expected a turn of {criterion.angle:g}° (within {criterion.angle_within:g}°) after each leg, "
+                f"but after leg {place}{which} the robot turned {angle:.1f}°.",
+                after.first,
+            )
+    if criterion.closes:
+        gap = math.dist(figure[0].start, figure[-1].end)
+        allowed = max(criterion.closes_within, mean / 10)
+        if gap > allowed:
+            return _Problem(
+                f"Expected the figure to end within {allowed:.0f} mm of where it began, "
+                f"but the end{which} is {gap:.0f} mm away.",
+                figure[-1].last,
+            )
+    if number < len(criterion.sizes):
+        low, high = criterion.sizes[number]
+        if not low <= mean <= high:
+            return _Problem(
+                f"Expected legs of {low:g} to {high:g} mm in figure {number + 1}, but they have {mean:.0f} mm.",
+                figure[-1].last,
+            )
+    return None
+
+
+def _mean(figure: Sequence[Leg]) -> float:
+    return sum(leg.length for leg in figure) / len(figure)
+
+
+def _measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
+    figures = [Measure("legs", len(legs))]
+    figures += [Measure(f"leg {number}", leg.length, "mm") for number, leg in enumerate(legs[:12], 1)]
+    figures += [
+        Measure(f"corner {number}", abs(between(before.direction, after.direction)), "°")
+        for number, (before, after) in enumerate(itertools.pairwise(legs), 1)
+    ]
+    if legs:
+        figures.append(Measure("from start to end", math.dist(legs[0].start, legs[-1].end), "mm"))
+    return tuple(figures)
+
+
+def _leg(points: Floats, first: int, last: int) -> Leg:
+    """The ticks from ``first`` to ``last`` are the way from row ``first`` to row ``last``."""
+    (x1, y1), (x2, y2) = points[first], points[last]
+    return Leg(first, last, (float(x1), float(y1)), (float(x2), float(y2)))

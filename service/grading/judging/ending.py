@@ -1,0 +1,107 @@
+"""Judging how a run ended: by itself and in time, and where the robot was.
+
+Faults of the responder do not end a program, so they are no business of this module.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.areas import distance_to
+from service.grading.judging.outcome import Outcome, cut, failed, fault_words, passed
+from sim.recording import Fault, Recording, Verdict
+from submissions.criteria import EndPose, Finishes
+
+
+def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    fault = cut(recording)
+    measures = (Measure("time", recording.end_t, "s"),)
+    if fault is not None:
+        return failed(
+            f"Expected the program to end by itself, but {_ended(fault)}.",
+            fault.t,
+            recording.end,
+            measures=measures,
+        )
+    if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:
+        return failed(
+            f"Expected the program to end within {criterion.seconds:g} s, but it took {recording.end_t:.2f} s.",
+            recording.end_t,
+            recording.end,
+            measures=measures,
+        )
+    return passed(
+        f"The program ended by itself after {recording.end_t:.2f} s.", recording.end_t, recording.end, measures
+    )
+
+
+def _ended(fault: Fault) -> str:
+    if fault.verdict is Verdict.TIME_LIMIT:
+        return fault_words(fault)
+    return f"after {fault.t:.2f} s: {fault_words(fault)}"
+
+
+def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
+    """Distances in mm, angles in degrees without regard to full turns; the edges of a zone belong to it."""
+    end, t = trial.recording.end, trial.recording.end_t
+    where = f"({end.x:.1f}, {end.y:.1f}) facing {end.heading % 360:.1f}°"
+    measures = (
+        Measure("end x", end.x, "mm"),
+        Measure("end y", end.y, "mm"),
+        Measure("end heading", end.heading, "°"),
+        Measure("time", t, "s"),
+        *_way(trial.recording),
+    )
+    if criterion.x is not None and criterion.y is not None:
+        distance = math.hypot(end.x - criterion.x, end.y - criterion.y)
+        if not distance <= criterion.tolerance:
+            return failed(
+                f"Expected the robot to end within {criterion.tolerance:g} mm of ({criterion.x:g}, {criterion.y:g}), "
+                f"but it ended at {where}, {distance:.1f} mm away.",
+                t,
+                end,
+                measures=measures,
+            )
+    if criterion.zone is not None:
+        left, bottom, right, top = criterion.zone
+        if not (left <= end.x <= right and bottom <= end.y <= top):
+            return failed(
+                f"Expected the robot to end with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}, "
+                f"but it ended at {where}.",
+                t,
+                end,
+                measures=measures,
+            )
+    if criterion.areas:
+        gaps = [float(distance_to(area, np.array([[end.x, end.y]]))[0]) for area in criterion.areas]
+        if not min(gaps) <= 0:
+            near = criterion.areas[gaps.index(min(gaps))]
+            one = "in" if len(gaps) == 1 else f"in one of {len(gaps)} areas, the nearest being"
+            return failed(
+                f"Expected the robot to end {one} {near}, but it ended at {where}, {min(gaps):.0f} mm outside.",
+                t,
+                end,
+                measures=measures,
+            )
+    if criterion.heading is not None:
+        off = abs((end.heading - criterion.heading + 180) % 360 - 180)
+        if not off <= criterion.heading_tolerance:
+            return failed(
+                f"Expected the robot to end facing {criterion.heading:g}° within {criterion.heading_tolerance:g}°, "
+                f"but it ended at {where}, {off:.1f}° off.",
+                t,
+                end,
+                measures=measures,
+            )
+    return passed(f"The robot ended at {where}.", t, end, measures)
+
+
+def _way(recording: Recording) -> tuple[Measure, ...]:
+    """How far and in which direction the end is from the start, as the crow flies."""
+    dx, dy = recording.end.x - recording.start.x, recording.end.y - recording.start.y
+    bearing = math.degrees(math.atan2(dy, dx))
+    return Measure("displacement", math.hypot(dx, dy), "mm"), Measure("bearing", bearing, "°")

@@ -1,0 +1,138 @@
+"""Judging what functions return: values of called functions, and what an instructor's own check says of a trial.
+
+Values come from inside the walls and are compared here; a student's value is data and nothing more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from responders.function_calls import Called, FunctionCall, Returned
+from service.grading.grade import Measure
+from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
+from service.grading.judging.outcome import Outcome, failed, fault_words, passed, quoted
+from sim.errors import AssignmentError
+from submissions.criteria.code import ExpectedCall, Functions, PythonCheck
+
+_LONGEST_MESSAGE = 500
+_MOST_MEASURES = 20
+
+
+def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
+    """What has to be called for the criterion."""
+    return tuple(
+        FunctionCall(call.function or criterion.function, call.arguments, call.named) for call in criterion.calls
+    )
+
+
+def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
+    if called is None:
+        return failed("Expected a responder to be handed in, but it was not.")
+    if called.fault is not None:
+        return failed(f"Expected the responder to be loaded, but: {fault_words(called.fault)}.")
+    scores: list[Fraction] = []
+    first = ""
+    for call, gave in zip(criterion.calls, called.returned, strict=True):
+        score, what = _compare(criterion, call, gave)
+        scores.append(score)
+        if score < Fraction(str(criterion.at_least)) and not first:
+            first = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
+    share = sum(scores, Fraction(0)) / len(scores)
+    measures = (Measure("right", float(share)),)
+    if not first:
+        some = f"{float(share):.0%} right" if criterion.each else f"{len(scores)} of {len(scores)} calls right"
+        return passed(f"The functions returned what they must: {some}.", measures=measures)
+    right = sum(score == 1 for score in scores)
+    tally = f" ({right} of {len(scores)} calls right)" if len(scores) > 1 else ""
+    return failed(f"{first}{tally}.", score=share, measures=measures)
+
+
+def checked(criterion: PythonCheck, gave: Returned) -> Outcome:
+    """The outcome that an instructor's check returned. Raises AssignmentError when it failed or returned nonsense."""
+    if gave.fault is not None:
+        raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")
+    told = {"passed": gave.value} if isinstance(gave.value, bool) else gave.value
+    returned = f"{criterion.file}: check returned {quoted(as_text(gave.value))}"
+    wrong = f"The assignment's own check fails: {returned}, expected True, False or a dict"
+    if not isinstance(told, dict) or not isinstance(told.get("passed"), bool):
+        raise AssignmentError(f'{wrong} with "passed".')
+    score, measures = told.get("score", 0), told.get("measures", {})
+    message = told.get("message") or ("As expected." if told["passed"] else "Not as expected.")
+    numbers = [score, *measures.values()] if isinstance(measures, dict) else [None]
+    if not isinstance(message, str) or not all(map(_is_number, numbers)):
+        raise AssignmentError(f"{wrong}: message is a text, score a number, measures maps names to numbers.")
+    message = " ".join(message.split())[:_LONGEST_MESSAGE]
+    kept = tuple(Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES])
+    if told["passed"]:
+        return passed(message, measures=kept)
+    return failed(message, score=Fraction(str(score)), measures=kept)
+
+
+def _compare(criterion: Functions, call: ExpectedCall, gave: Returned) -> tuple[Fraction, str]:
+    """The part of a call that is right, and what happened."""
+    if gave.fault is not None:
+        return Fraction(0), f"it did not: {fault_words(gave.fault)}"
+    value = gave.value
+    if criterion.path is not None:
+        value = at_path(parsed(value), criterion.path) if isinstance(value, str) else NOTHING
+        if value is NOTHING:
+            return Fraction(0), f"there is nothing at {criterion.path} in {quoted(as_text(gave.value))}"
+    what = f"it returned {_shown(value)}"
+    if criterion.each:
+        return _entries_right(criterion, call.returns, value), what
+    wanted = call.one_of or (call.returns,)
+    return Fraction(any(_same(criterion, value, each) for each in wanted)), what
+
+
+def _entries_right(criterion: Functions, wanted: Sequence[Any], value: Any) -> Fraction:
+    if not isinstance(value, list):
+        return Fraction(0)
+    right = sum(_same(criterion, got, each) for got, each in zip(value, wanted, strict=False))
+    return Fraction(right, max(len(wanted), len(value)))
+
+
+def _same(criterion: Functions, found: Any, wanted: Any) -> bool:
+    """Equal in JSON's sense, numbers within the tolerance, texts but for runs of spaces."""
+    if isinstance(found, bool) or isinstance(wanted, bool):
+        return found is wanted
+    if _is_number(found) and _is_number(wanted):
+        return abs(float(found) - float(wanted)) <= criterion.tolerance + 1e-12
+    if isinstance(found, str) and isinstance(wanted, str):
+        one, other = " ".join(found.split()), " ".join(wanted.split())
+        return one.casefold() == other.casefold() if criterion.ignore_case else one == other
+    if isinstance(found, list) and isinstance(wanted, list | tuple):
+        return len(found) == len(wanted) and all(
+            _same(criterion, got, each) for got, each in zip(found, wanted, strict=True)
+        )
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        return found.keys() == wanted.keys() and all(_same(criterion, found[key], wanted[key]) for key in wanted)
+    return found is None and wanted is None
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def _call_words(criterion: Functions, call: ExpectedCall) -> str:
+    arguments = [repr(value) for value in call.arguments]
+    arguments += [f"{name}={value!r}" for name, value in call.named.items()]
+    text = ", ".join(arguments)
+    return f"{call.function or criterion.function}({text if len(text) <= 80 else text[:77] + '...'})"
+
+
+def _wanted(call: ExpectedCall) -> str:
+    return " or ".join(map(_shown, call.one_of or (call.returns,)))
+
+
+def _shown(value: Any) -> str:
+    """Texts in quotes, all else as it is, shortened."""
+    told = quoted(as_text(value))
+    return told if isinstance(value, str) else told[1:-1]

@@ -1,0 +1,205 @@
+"""Judging how well a line was followed, and how fast a circuit was driven.
+
+Where the path was along the line is worked out in ``courses.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.courses import Along, along, covered
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.path import PART_NAMES
+from service.grading.judging.whereabouts import place_at, positions
+from sim.recording import Floats
+from submissions.criteria.line import Follows, Laps
+
+
+def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
+    """The part of the line that counts begins where it is first come upon; of a closed line all counts."""
+    recording = trial.recording
+    who, line = PART_NAMES[criterion.of], criterion.line.name
+    found = along(criterion.line, positions(recording, criterion.of), criterion.within)
+    if found is None:
+        return failed(
+            f"Expected {who} to follow {line}, but it never came within {criterion.within:g} mm of it.",
+            recording.end_t,
+            recording.end,
+        )
+    begin = float(found.progress[0])
+    end = begin + found.length if criterion.line.is_closed else found.length
+    share = covered(found, criterion.within, begin, end)
+    on_it = _until_the_end(found, end)
+    offsets = np.abs(found.offset[:on_it])
+    farthest = int(np.argmax(offsets))
+    one_side = _one_side(found.offset[:on_it])
+    measures = (
+        Measure("share covered", share),
+        Measure("farthest off", float(offsets[farthest]), "mm"),
+        Measure("mean off", float(offsets.mean()), "mm"),
+        Measure("seconds to the end", (found.first + on_it - 1) / 30, "s"),
+        Measure("share on one side", one_side),
+    )
+    score = Fraction(min(share / criterion.covers, 1.0)).limit_denominator(1000)
+    if criterion.at_most is not None and offsets[farthest] > criterion.at_most:
+        return failed(
+            f"Expected {who} to stay within {criterion.at_most:g} mm of {line}, "
+            f"but it was {offsets[farthest]:.0f} mm off.",
+            *place_at(recording, found.first + farthest),
+            score=score,
+            measures=measures,
+        )
+    if share < criterion.covers - 1e-9:
+        return failed(
+            f"Expected {who} to follow {criterion.covers:.0%} of {line} within {criterion.within:g} mm, "
+            f"but it followed {share:.0%} of it.",
+            *place_at(recording, found.first + _where_it_ended(found, criterion.within)),
+            score=score,
+            measures=measures,
+        )
+    if criterion.one_side is not None and one_side < criterion.one_side - 1e-9:
+        return failed(
+            f"Expected {who} to stay on one side of {line} for {criterion.one_side:.0%} of the time, "
+            f"but it was on its main side for {one_side:.0%}.",
+            *place_at(recording, found.first + on_it - 1),
+            score=score,
+            measures=measures,
+        )
+    return passed(
+        f"{who[:1].upper()}{who[1:]} followed {share:.0%} of {line}, never more than {offsets[farthest]:.0f} mm off.",
+        *place_at(recording, found.first + on_it - 1),
+        measures,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Crossing:
+    """When the robot crossed the start line, and how far it had come along the circuit."""
+
+    t: float
+    row: int
+    progress: float
+
+
+def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
+    """A lap is from one crossing of the start line to a later one; the path between two ticks is straight."""
+    recording = trial.recording
+    points = positions(recording)
+    found = along(criterion.line, points, criterion.within)
+    if found is None:
+        return failed(
+            f"Expected the robot to drive along {criterion.line.name}, but it never came within "
+            f"{criterion.within:g} mm of it.",
+            recording.end_t,
+            recording.end,
+        )
+    crossings = _crossings(criterion, points, found)
+    laps, spoilt = _laps(criterion, found, crossings)
+    off = float(np.abs(found.offset[: _last_row(found, crossings)]).max())
+    driven = float(found.progress.max() - found.progress[0])
+    measures = (
+        *([Measure("lap time", min(lap for lap, _ in laps), "s")] if laps else []),
+        Measure("laps", len(laps)),
+        Measure("farthest off", off, "mm"),
+        Measure("part of a lap", driven / found.length),
+    )
+    score = Fraction(min(max(driven / found.length, 0.0) / criterion.laps, 1.0)).limit_denominator(1000)
+    if len(laps) < criterion.laps:
+        if spoilt is not None:
+            return failed(
+                f"Expected {_laps_words(criterion.laps)} within {criterion.within:g} mm of {criterion.line.name}, "
+                f"but the robot was {abs(found.offset[spoilt]):.0f} mm off it.",
+                *place_at(recording, found.first + spoilt),
+                score=score,
+                measures=measures,
+            )
+        return failed(
+            f"Expected {_laps_words(criterion.laps)} from start line to start line, but the robot came "
+            f"{max(driven, 0) / found.length:.0%} of the way round and crossed the start line "
+            f"{len(crossings)} time{'' if len(crossings) == 1 else 's'}.",
+            recording.end_t,
+            recording.end,
+            score=score,
+            measures=measures,
+        )
+    best, row = min(laps)
+    if criterion.seconds is not None and not criterion.seconds[0] <= best <= criterion.seconds[1]:
+        return failed(
+            f"Expected a lap in {criterion.seconds[0]:g} to {criterion.seconds[1]:g} s, "
+            f"but the best took {best:.2f} s.",
+            *place_at(recording, row),
+            score=score,
+            measures=measures,
+        )
+    return passed(
+        f"The robot drove {_laps_words(len(laps))}, the best in {best:.2f} s.", *place_at(recording, row), measures
+    )
+
+
+def _laps_words(count: int) -> str:
+    return "a whole lap" if count == 1 else f"{count} whole laps"
+
+
+def _crossings(criterion: Laps, points: Floats, found: Along) -> list[_Crossing]:
+    """Each time the path crosses the start line in the circuit's direction."""
+    x1, y1, x2, y2 = criterion.start_line
+    first, line = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
+    away = points - first
+    # Which side of the start line each point is on, and where along it.
+    side = line[0] * away[:, 1] - line[1] * away[:, 0]
+    place = away @ line / float(line @ line)
+    crossings = []
+    for row in range(found.first + 1, len(points)):
+        if (side[row - 1] > 0) == (side[row] > 0):
+            continue
+        share = float(side[row - 1] / (side[row - 1] - side[row]))
+        where = place[row - 1] + share * (place[row] - place[row - 1])
+        before, after = found.progress[row - 1 - found.first], found.progress[row - found.first]
+        if 0 <= where <= 1 and after > before:
+            crossings.append(_Crossing((row - 1 + share) / 30, row, float(before + share * (after - before))))
+    return crossings
+
+
+def _laps(criterion: Laps, found: Along, crossings: list[_Crossing]) -> tuple[list[tuple[float, int]], int | None]:
+    """Time and last row of each whole lap, and where a lap was spoilt by leaving the line, if one was."""
+    laps, spoilt = [], None
+    begin = None
+    for crossing in crossings:
+        if begin is None:
+            begin = crossing
+            continue
+        if crossing.progress - begin.progress < criterion.progress * found.length:
+            continue
+        rows = slice(begin.row - found.first, crossing.row - found.first + 1)
+        off = np.abs(found.offset[rows])
+        if off.max() <= criterion.within:
+            laps.append((crossing.t - begin.t, crossing.row))
+        elif spoilt is None:
+            spoilt = begin.row - found.first + int(np.argmax(off))
+        begin = crossing
+    return laps, spoilt
+
+
+def _last_row(found: Along, crossings: list[_Crossing]) -> int:
+    return crossings[-1].row - found.first + 1 if len(crossings) > 1 else len(found.offset)
+
+
+def _until_the_end(found: Along, end: float) -> int:
+    """How many rows there are until the line's end was reached; all, if it was not."""
+    reached = np.flatnonzero(found.progress >= end - 1e-6)
+    return int(reached[0]) + 1 if len(reached) else len(found.progress)
+
+
+def _where_it_ended(found: Along, within: float) -> int:
+    """The row at which the robot was on the line for the last time."""
+    return int(np.flatnonzero(np.abs(found.offset) <= within)[-1])
+
+
+def _one_side(offset: Floats) -> float:
+    """The larger share of the rows on either side of the line; 1 if none is off it."""
+    left, right = int((offset > 0).sum()), int((offset < 0).sum())
+    return max(left, right) / (left + right) if left + right else 1.0

@@ -1,0 +1,204 @@
+"""Judging what a program logs: series of the datalog, and images.
+
+Images are the simulator's own records; values are what the program printed, and ``measured.py`` tells which were read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.measured import measured_only
+from service.grading.judging.outcome import Outcome, failed, passed, pose_at
+from sim.backgrounds import floor, names
+from sim.camera import HEIGHT, WIDTH, sensor_mask
+from sim.recording import Datum, Pose, Recording
+from sim.robot import ROBOTS, LightSensor, robot
+from sim.sensors import look
+from sim.trigonometry import sincos
+from submissions.criteria.logged import Datalog, ImageLog
+
+Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
+
+
+def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    name = criterion.series
+    logged = [datum for datum in recording.datalog if datum.name == name]
+    samples = logged if criterion.measured is None else measured_only(logged, criterion.measured, recording)
+    values = [datum.value for datum in samples]
+    measures = (Measure("samples", float(len(values))), *_extremes(values))
+    if logged and not values:
+        return failed(
+            f"Expected {name} to be what the {criterion.measured} read, but none of {len(logged)} samples is."
+        )
+    if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
+        return failed(f'Expected the program to log {name}, but the datalog has none (print "{name}: 42").')
+    checks = _datalog_checks(criterion, samples, recording)
+    if criterion.plateaus:
+        checks.append(_plateau_check(criterion, values))
+    wrong = next((words for reached, words in checks if reached < 1), None)
+    if wrong is None:
+        return passed(f"The program logged {len(values)} samples of {name} as expected.", measures=measures)
+    return failed(
+        f"{wrong}.", score=sum((reached for reached, _ in checks), Fraction(0)) / len(checks), measures=measures
+    )
+
+
+def _images(count: int) -> str:
+    return f"{count or 'no'} image{'' if count == 1 else 's'}"
+
+
+def _there(count: int) -> str:
+    return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
+
+
+def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    log = recording.image_log
+    checks: list[tuple[bool, str]] = []
+    for side, count in (("left", criterion.left), ("right", criterion.right)):
+        got = sum(entry[0] == side for entry in log)
+        if count is not None:
+            checks.append(
+                (got == count, f"Expected {_images(count)} of the {side} sensor to be logged, but {_there(got)}")
+            )
+    if criterion.pairs:
+        sides = [entry[0] for entry in log]
+        turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
+        checks.append((turns, "Expected left and right images to take turns, but they did not (image_data both)"))
+    if criterion.at_start:
+        moved = next((entry for entry in log if not _shows_start(entry, recording, trial.light_noise)), None)
+        where = _where(recording, moved[2]) if moved else ""
+        checks.append(
+            (
+                bool(log) and moved is None,
+                f"Expected every image to be taken at the start pose, but {where or 'there is none'}",
+            )
+        )
+    if criterion.uniform is not None:
+        own = [entry[1] for entry in log if entry[0] == criterion.uniform]
+        flat = bool(own) and all(_is_uniform(csv) for csv in own)
+        checks.append(
+            (flat, f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not")
+        )
+    measures = (Measure("images", float(len(log))),)
+    wrong = next((words for holds, words in checks if not holds), None)
+    if wrong is None:
+        return passed(f"The program logged {len(log)} images as expected.", measures=measures)
+    last = log[-1][2] / 30 if log else None
+    pose = None if last is None else pose_at(recording, last)
+    held = Fraction(sum(holds for holds, _ in checks), len(checks))
+    return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
+
+
+def _extremes(values: Sequence[float]) -> tuple[Measure, ...]:
+    finite = [value for value in values if math.isfinite(value)]
+    return (Measure("least", min(finite)), Measure("most", max(finite))) if finite else ()
+
+
+def _datalog_checks(criterion: Datalog, samples: Sequence[Datum], recording: Recording) -> list[Check]:
+    """What is asked but for the plateaus; the number of samples counts only where more than one is asked for."""
+    name, count = criterion.series, len(samples)
+    values = [datum.value for datum in samples]
+    checks: list[Check] = []
+    if criterion.at_least > 1:
+        words = f"Expected at least {criterion.at_least} samples of {name}, but there are {count}"
+        checks.append((min(Fraction(count, criterion.at_least), Fraction(1)), words))
+    if criterion.at_most is not None:
+        most = criterion.at_most
+        checks.append((Fraction(count <= most), f"Expected at most {most} samples of {name}, but there are {count}"))
+    if criterion.timed:
+        timed = Fraction(sum(datum.simtime is not None for datum in samples), max(count, 1))
+        checks.append(
+            (timed, f'Expected every sample of {name} to have its time ("{name}: 42 1.5"), but some have none')
+        )
+    if criterion.between is not None:
+        least, greatest = criterion.between
+        strays = [value for value in values if not least <= value <= greatest]
+        stray = f"{strays[0]:g}" if strays else ""
+        words = f"Expected {name} to stay between {least:g} and {greatest:g}, but it was {stray} once"
+        checks.append((Fraction(count - len(strays), max(count, 1)), words))
+    if criterion.covers is not None and values:
+        low, high = criterion.covers
+        words = f"Expected {name} to go from {low:g} to {high:g}, but it went from {min(values):g} to {max(values):g}"
+        checks.append((Fraction(min(values) <= low and max(values) >= high), words))
+    if criterion.dips_below is not None:
+        others = [datum.value for datum in recording.datalog if datum.name == criterion.dips_below]
+        deeper = bool(others) and bool(values) and min(values) < min(others)
+        words = f"Expected the lowest {name} to be below the lowest {criterion.dips_below}, but it is not"
+        checks.append((Fraction(deeper), words))
+    return checks
+
+
+def _plateau_check(criterion: Datalog, values: Sequence[float]) -> Check:
+    found, count = _plateaus_in_order(criterion, values), len(criterion.plateaus)
+    series = ", ".join(f"{value:g}" for value in criterion.plateaus)
+    before = f"after {criterion.plateaus[found - 1]:g} " if found else ""
+    missing = criterion.plateaus[min(found, count - 1)]
+    words = f"Expected {criterion.series} to stay at {series} in this order, but {before}it never stayed at {missing:g}"
+    return Fraction(found, count), words
+
+
+def _plateaus_in_order(criterion: Datalog, values: Sequence[float]) -> int:
+    """How many of the plateaus come in order."""
+    place = 0
+    for found, wanted in enumerate(criterion.plateaus):
+        run = 0
+        while place < len(values) and run < criterion.plateau_samples:
+            run = run + 1 if abs(values[place] - wanted) <= criterion.tolerance + 1e-9 else 0
+            place += 1
+        if run < criterion.plateau_samples:
+            return found
+    return len(criterion.plateaus)
+
+
+def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float) -> bool:
+    """Whether a logged image is the floor's own crop at the start pose, up to the noise on the light sensors."""
+    if recording.background not in names():
+        pose = pose_at(recording, entry[2] / 30)
+        return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y)) < 1
+    side, csv, _ = entry
+    bolted = robot(recording.robot if recording.robot in ROBOTS else "Default_Robot")
+    sensor = bolted.left_light if side == "left" else bolted.right_light
+    expected = _crop(recording, sensor, recording.start)
+    found = _pixels(csv, sensor.diameter)
+    if found is None:
+        return False
+    mask = sensor_mask(sensor.diameter)
+    return bool((np.abs(found[mask] - expected[mask]) <= noise).all())
+
+
+def _crop(recording: Recording, sensor: LightSensor, pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """RGB under the sensor, shape (diameter, diameter, 3), black off the floor."""
+    picture = floor(recording.background, labels=recording.patches, seed=recording.sheet).picture
+    sine, cosine = sincos(math.radians(pose.heading) - math.pi / 2)
+    where = look(sensor, pose.x, pose.y, sine, cosine)
+    side = sensor.diameter
+    crop = np.zeros((side, side, 3), np.int64)
+    top, left = max(where.row, 0), max(where.column, 0)
+    bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
+    if top < bottom and left < right:
+        place = (slice(top - where.row, bottom - where.row), slice(left - where.column, right - where.column))
+        crop[place] = picture[top:bottom, left:right]
+    return crop
+
+
+def _pixels(csv: str, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]] | None:
+    numbers = np.array([int(number) for number in csv.split(",") if number.isdecimal()], np.int64)
+    return numbers.reshape(side, side, 4)[:, :, :3] if numbers.size == side * side * 4 else None
+
+
+def _is_uniform(csv: str) -> bool:
+    side = math.isqrt((csv.count(",") + 1) // 4)
+    pixels = _pixels(csv, side)
+    return pixels is not None and bool((np.ptp(pixels[sensor_mask(side)], axis=0) == 0).all())
+
+
+def _where(recording: Recording, tick: int) -> str:
+    pose = pose_at(recording, tick / 30)
+    return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"

@@ -1,0 +1,367 @@
+"""Judging how the robot moved: as a whole, move by move, there and back, and after what a sensor saw.
+
+Moves are found in ``moves.py``; where on the floor the robot went is judged in ``path.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.whereabouts import place_at, positions, robot_of, standing, stretches, times, travel
+from sim.recording import Floats, Recording
+from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
+
+#: A turning point must stand out by so much from what lies around it, mm.
+_NOTICEABLE = 5.0
+#: What counts as having reversed (mm) and turned (degrees) after an encounter, and as having stopped (ticks).
+_REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
+
+
+def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
+    """From the start to the end; the wheels' positions are those that the program would read at the end."""
+    recording = trial.recording
+    whole = move_between(recording, 0, len(recording.ticks))
+    left, right = _wheels(recording)
+    expected = abs(left) / 360 * math.pi * robot_of(recording).wheel_diameter
+    measures = (
+        Measure("displacement", whole.distance, "mm"),
+        Measure("displacement forward", whole.forward, "mm"),
+        Measure("displacement sideways", whole.sideways, "mm"),
+        Measure("heading change", whole.turn, "°"),
+        Measure("left wheel", left, "°"),
+        Measure("right wheel", right, "°"),
+    )
+    t, end = recording.end_t, recording.end
+    missed = misses(criterion, whole)
+    if missed is not None:
+        return failed(f"Expected, from start to end, {missed}.", t, end, measures=measures)
+    for side, wished, value in (("left", criterion.left_wheel, left), ("right", criterion.right_wheel, right)):
+        if wished is not None and not wished[0] <= value <= wished[1]:
+            return failed(
+                f"Expected the {side} wheel's position to be {wished[0]:g} to {wished[1]:g} at the end, "
+                f"but it was {value:.0f}.",
+                t,
+                end,
+                measures=measures,
+            )
+    share = criterion.agrees_with_wheels
+    if share is not None and not abs(whole.distance - expected) <= share * max(expected, 1e-9):
+        return failed(
+            f"Expected the robot to have gone the {expected:.0f} mm that its left wheel's position stands for "
+            f"(within {share:.0%}), but it ended {whole.distance:.0f} mm from its start.",
+            t,
+            end,
+            measures=measures,
+        )
+    return passed(f"From start to end the robot {whole}.", t, end, measures)
+
+
+def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
+    """Each move that is asked for is looked for among those that were made."""
+    recording = trial.recording
+    made = moves_of(recording)
+    found = _in_order(criterion, made) if criterion.in_order else _in_any_order(criterion, made)
+    score = Fraction(sum(move is not None for move in found), len(found))
+    measures = tuple(
+        measure
+        for number, move in enumerate(found, 1)
+        if move is not None
+        for measure in measures_of(move, f"move {number}")
+    )
+    missing = next((number for number, move in enumerate(found) if move is None), None)
+    if missing is not None:
+        return _missing_move(criterion, recording, made, found, missing, score, measures)
+    others = [move for move in made if move not in found]
+    if criterion.only and others:
+        expected = f"only the {_count(len(found), 'move')} asked for"
+        return failed(
+            f"Expected {expected}, but the robot also {others[0]}.",
+            *place_at(recording, others[0].first),
+            score=score,
+            measures=measures,
+        )
+    told = "; ".join(str(move) for move in found[:4] if move is not None)
+    return passed(f"The robot moved as asked: it {told}.", *place_at(recording, made[-1].last), measures)
+
+
+def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
+    """Peaks of the way along the start's heading, and how near the start the robot came after each."""
+    recording = trial.recording
+    ahead = _ahead(recording)
+    turns = _turning_points(ahead)
+    outs = [turn for turn in turns if turn.out]
+    wanted = len(criterion.heights)
+    measures = tuple(
+        Measure(f"{'peak' if turn.out else 'return'} {number}", float(ahead[turn.row]), "mm")
+        for out in (True, False)
+        for number, turn in enumerate((turn for turn in turns if turn.out is out), 1)
+    )[:24]
+    right = Fraction(min(len(outs), wanted), wanted) / 2
+    if len(outs) != wanted:
+        row = turns[-1].row if turns else 0
+        return failed(
+            f"Expected the robot to go out and come back {_times(wanted)}, but it {_did(len(outs))}.",
+            *place_at(recording, row),
+            score=right,
+            measures=measures,
+        )
+    unit = sum(abs(float(ahead[turn.row])) for turn in outs) / sum(criterion.heights)
+    for number, (turn, height) in enumerate(zip(outs, criterion.heights, strict=True), 1):
+        reached = abs(float(ahead[turn.row]))
+        share = height / criterion.heights[0]
+        least = criterion.at_least * share
+        if reached < least:
+            return failed(
+                f"Expected the robot to go out at least {least:g} mm the {_nth(number)} time, "
+                f"but it went {reached:.0f} mm.",
+                *place_at(recording, turn.row),
+                score=right,
+                measures=measures,
+            )
+        if abs(reached - unit * height) > criterion.tolerance * unit * height:
+            ways = ", ".join(f"{abs(float(ahead[each.row])):.0f}" for each in outs)
+            return failed(
+                f"Expected the robot to go out {_proportion(criterion.heights)} (within {criterion.tolerance:.0%}), "
+                f"but it went {ways} mm.",
+                *place_at(recording, turn.row),
+                score=right,
+                measures=measures,
+            )
+    for number, turn in enumerate((turn for turn in turns if not turn.out), 1):
+        if abs(float(ahead[turn.row])) > criterion.returns_within:
+            return failed(
+                f"Expected the robot to come back to within {criterion.returns_within:g} mm of its start each time, "
+                f"but the {_nth(number)} time it came back to {shown(float(ahead[turn.row]))} mm.",
+                *place_at(recording, turn.row),
+                score=right + Fraction(number - 1, 2 * wanted),
+                measures=measures,
+            )
+    return passed(
+        f"The robot went out and came back {_times(wanted)}, {abs(float(ahead[outs[0].row])):.0f} mm the first time, "
+        f"and ended {shown(float(ahead[-1]))} mm from its start.",
+        recording.end_t,
+        recording.end,
+        measures,
+    )
+
+
+def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
+    """Each fall of the reading below the threshold, and what the robot did in the seconds after it."""
+    recording = trial.recording
+    falls = _falls(criterion, recording)
+    answered = [row for row in falls if _answered(criterion, recording, row)]
+    measures = (Measure("encounters", len(falls)), Measure("answered", len(answered)))
+    score = Fraction(min(len(answered), criterion.at_least), criterion.at_least)
+    if len(answered) >= criterion.at_least:
+        return passed(
+            f"The robot came upon something dark {_times(len(falls))}, and did what was asked {_times(len(answered))}.",
+            *place_at(recording, answered[-1]),
+            measures,
+        )
+    what = " and then ".join(criterion.then)
+    expected = f"Expected the robot to {what} {_times(criterion.at_least)} after seeing something dark"
+    ignored = next((row for row in falls if row not in answered), None)
+    if ignored is not None:
+        return failed(
+            f"{expected}, but it {_did(len(answered))}; here is the first time that it did not.",
+            *place_at(recording, ignored),
+            score=score,
+            measures=measures,
+        )
+    sensor = "a light sensor" if criterion.light == "either" else f"its {criterion.light} light sensor"
+    fell = (
+        f"fell below {criterion.below:g} % only {_times(len(falls))}"
+        if falls
+        else f"never fell below {criterion.below:g} %"
+    )
+    return failed(
+        f"{expected}, but the reading of {sensor} {fell}.",
+        recording.end_t,
+        recording.end,
+        score=score,
+        measures=measures,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """Where going out became coming back (``out``), or the other way round."""
+
+    row: int
+    out: bool
+
+
+def _turning_points(ahead: Floats) -> list[_Turn]:
+    """Peaks and returns in turn, beginning with the first way out, ending with the last row.
+
+    A change of direction counts from 5 mm on. A last way out without a return is a peak with no return after it.
+    """
+    turns: list[_Turn] = []
+    sign = 0.0  # the side on which the current excursion is, 0 before the first
+    extreme, going_out = 0, True
+    for row, value in enumerate(ahead):
+        if not sign:
+            if abs(value) >= _NOTICEABLE:
+                sign, extreme = math.copysign(1, value), row
+            continue
+        away, best = sign * float(value), sign * float(ahead[extreme])
+        if (away > best) if going_out else (away < best):
+            extreme = row
+        elif abs(away - best) >= _NOTICEABLE:
+            turns.append(_Turn(extreme, going_out))
+            going_out, extreme = not going_out, row
+    if sign:
+        turns.append(_Turn(extreme, going_out))
+    return turns
+
+
+def _in_order(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
+    found: list[Move | None] = []
+    after = 0
+    for wanted in criterion.moves:
+        place = next((place for place in range(after, len(made)) if misses(wanted, made[place]) is None), None)
+        found.append(None if place is None else made[place])
+        after = after if place is None else place + 1
+    return found
+
+
+def _in_any_order(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
+    found: list[Move | None] = []
+    for wanted in criterion.moves:
+        free = (move for move in made if move not in found)
+        found.append(next((move for move in free if misses(wanted, move) is None), None))
+    return found
+
+
+def _missing_move(
+    criterion: Moves,
+    recording: Recording,
+    made: tuple[Move, ...],
+    found: list[Move | None],
+    number: int,
+    score: Fraction,
+    measures: tuple[Measure, ...],
+) -> Outcome:
+    """Tells of the move that was made in the place of the missing one."""
+    wanted = criterion.moves[number]
+    called = f"{wanted.name}: " if wanted.name else ""
+    after = max((made.index(move) for move in found[:number] if move is not None), default=-1) + 1
+    free = [move for move in made[after if criterion.in_order else 0 :] if move not in found]
+    if not free:
+        told = f"did not: the last that it did is that it {made[-1]}" if made else "did not move at all"
+        return failed(
+            f"Expected {called}{_asked(wanted)}, but the robot {told}.",
+            recording.end_t,
+            recording.end,
+            score,
+            measures,
+        )
+    near = min(free, key=lambda move: _how_far(wanted, move)) if not criterion.in_order else free[0]
+    return failed(
+        f"Expected {called}{_asked(wanted)}, but the robot {near}.",
+        *place_at(recording, near.last),
+        score=score,
+        measures=measures or measures_of(near, "this move"),
+    )
+
+
+def _asked(wanted: NamedMotion) -> str:
+    asked = (
+        ("forwards", "backwards", wanted.forward, " mm"),
+        ("to the left", "to the right", wanted.sideways, " mm"),
+        ("away from where it began", "", wanted.distance, " mm"),
+        ("of turn to the left", "of turn to the right", wanted.turn, "°"),
+        ("of turn", "", wanted.turn_size, "°"),
+        ("long", "", wanted.seconds, " s"),
+    )
+    words = []
+    for positive, negative, wished, unit in asked:
+        if wished is not None:
+            what, least, most = facing(wished, positive, negative)
+            words.append(f"{range_words(least, most, unit)} {what}")
+    return f"a move of {', '.join(words)}"
+
+
+def _proportion(heights: tuple[float, ...]) -> str:
+    if len(set(heights)) == 1:
+        return "equally far each time"
+    return f"in the proportion {' to '.join(f'{height:g}' for height in heights)}"
+
+
+def _how_far(wanted: NamedMotion, move: Move) -> int:
+    """How many of the conditions a move misses."""
+    parts = ("forward", "sideways", "distance", "turn", "turn_size", "seconds")
+    given = (part for part in parts if getattr(wanted, part) is not None)
+    return sum(misses(NamedMotion(**{part: getattr(wanted, part)}), move) is not None for part in given)
+
+
+def _ahead(recording: Recording) -> Floats:
+    """How far the robot was ahead of its start, along the heading of the start, mm, shape (n + 1,)."""
+    along = math.radians(recording.start.heading)
+    away = positions(recording) - np.array([recording.start.x, recording.start.y])
+    return np.asarray(away @ np.array([math.cos(along), math.sin(along)]))
+
+
+def _wheels(recording: Recording) -> tuple[float, float]:
+    ticks = recording.ticks
+    return (float(ticks.left_position[-1]), float(ticks.right_position[-1])) if len(ticks) else (0.0, 0.0)
+
+
+def _falls(criterion: Encounters, recording: Recording) -> list[int]:
+    """The rows at which a sensor began to read less than the threshold."""
+    ticks = recording.ticks
+    readings = {"left": ticks.left_rgb, "right": ticks.right_rgb}
+    dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
+    for side, rgb in readings.items():
+        if criterion.light in (side, "either"):
+            dark |= rgb[:, 0] / 255 * 100 < criterion.below
+    return [first + 1 for first, _ in stretches(dark)]
+
+
+def _answered(criterion: Encounters, recording: Recording, row: int) -> bool:
+    """Whether all that was asked came in order after ``row``, and in time."""
+    ahead, turned = travel(recording)
+    still = standing(recording)
+    until = int(np.searchsorted(times(recording), row / 30 + criterion.seconds, side="right")) - 1
+    at = row
+    for deed in criterion.then:
+        done = None
+        for now in range(at, min(until, len(ahead))):
+            since = slice(at, now + 1)
+            if deed == "reverse":
+                reached = -float(np.minimum(ahead[since], 0).sum()) >= _REVERSED
+            elif deed == "turn":
+                reached = abs(float(turned[since].sum())) >= _TURNED
+            else:
+                reached = bool(still[max(now + 1 - _STOPPED, at) : now + 1].sum() >= _STOPPED)
+            if reached:
+                done = now + 1
+                break
+        if done is None:
+            return False
+        at = done
+    return True
+
+
+def _times(count: int) -> str:
+    return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def _did(count: int) -> str:
+    return f"did so {_times(count)}" if count else "never did"
+
+
+def _nth(number: int) -> str:
+    return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

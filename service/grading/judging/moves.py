@@ -1,0 +1,155 @@
+"""A run move by move: where one ends and the next begins, and what each came to.
+
+It finds and measures; what was asked of the moves is judged in ``motion.py``.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.grading.grade import Measure
+from service.grading.judging.whereabouts import place_at, relative_to, robot_of, standing, stretches, travel
+from sim.recording import Recording
+from submissions.criteria.motion import Motion
+
+#: What differs by less than this share between the wheels is straight.
+_STRAIGHT = 0.1
+#: Driving straight and turning are two moves where each goes on for so many ticks (0.3 s).
+_LASTING = 9
+#: A bound so far off (mm, degrees, s) is none: no run comes near it.
+_NO_BOUND = 10_000
+#: A shorter rest within a move does not part it in two.
+_REST = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One move: rows from ``first`` to ``last`` (``whereabouts``), and what it came to (mm, degrees, seconds)."""
+
+    first: int
+    last: int
+    forward: float
+    sideways: float
+    turn: float
+    seconds: float
+
+    @property
+    def distance(self) -> float:
+        return math.hypot(self.forward, self.sideways)
+
+    def __str__(self) -> str:
+        words = []
+        if abs(self.turn) >= 2:
+            words.append(f"turned {abs(self.turn):.1f}° {'left' if self.turn > 0 else 'right'}")
+        if self.distance >= 5 or not words:
+            way = "forwards" if self.forward >= 0 else "backwards"
+            words.append(f"went {abs(self.forward):.0f} mm {way}")
+        if abs(self.sideways) >= 5:
+            words.append(f"{abs(self.sideways):.0f} mm to its {'left' if self.sideways > 0 else 'right'}")
+        return f"{' and '.join(words)} in {self.seconds:.2f} s"
+
+
+def moves_of(recording: Recording) -> tuple[Move, ...]:
+    """The moves of a run, in order.
+
+    Standing still for more than two ticks parts moves, and so does the change between driving straight and turning
+    where both go on for 0.3 s.
+    """
+    return tuple(
+        move_between(recording, first, last)
+        for begin, end in _parted_by_rests(standing(recording))
+        for first, last in _parted_by_kind(recording, begin, end)
+    )
+
+
+def move_between(recording: Recording, first: int, last: int) -> Move:
+    """What came of the ticks after row ``first`` up to row ``last``."""
+    _, before = place_at(recording, first)
+    _, after = place_at(recording, last)
+    ahead, left = relative_to(before, after.x, after.y)
+    return Move(first, last, ahead, left, after.heading - before.heading, (last - first) / 30.0)
+
+
+def straight(recording: Recording) -> NDArray[np.bool_]:
+    """Whether both wheels went almost alike in each tick, shape (n,); false where the robot stood."""
+    ahead, turned = travel(recording)
+    between_wheels = np.radians(turned) * robot_of(recording).wheel_spacing
+    return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~standing(recording)
+
+
+def misses(wanted: Motion, move: Move) -> str | None:
+    """In what a move is not as wanted, ``a turn of 85 to 95°, but it was 80°``; None if it is."""
+    asked = (
+        ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
+        ("a way", " forwards", " backwards", wanted.forward, move.forward, " mm"),
+        ("a way", " to the left", " to the right", wanted.sideways, move.sideways, " mm"),
+        ("a turn", " to the left", " to the right", wanted.turn, move.turn, "°"),
+        ("a turn", "", "", wanted.turn_size, abs(move.turn), "°"),
+        ("a time", "", "", wanted.seconds, move.seconds, " s"),
+    )
+    for what, positive, negative, wished, value, unit in asked:
+        if wished is None or wished[0] <= value <= wished[1]:
+            continue
+        side, least, most = facing(wished, positive, negative)
+        found = shown(abs(value))
+        way = "" if found == "0" else negative if value < 0 else positive
+        return f"{what}{side} of {range_words(least, most, unit)}, but it was {found}{unit}{way}"
+    return None
+
+
+def facing(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
+    """A range below 0 as one above it, with the words for its side."""
+    least, most = wished
+    return (negative, -most, -least) if most <= 0 and least < 0 else (positive, least, most)
+
+
+def range_words(least: float, most: float, unit: str) -> str:
+    """``85 to 95°``, ``at least 100 mm``, ``1 s``."""
+    if most >= _NO_BOUND:
+        return f"at least {least:g}{unit}"
+    return f"{least:g}{unit}" if least == most else f"{least:g} to {most:g}{unit}"
+
+
+def shown(value: float) -> str:
+    """At most two places after the point, without trailing zeros."""
+    return f"{value:.2f}".rstrip("0").rstrip(".") if "." in f"{value:.2f}" else f"{value:.2f}"
+
+
+def measures_of(move: Move, name: str) -> tuple[Measure, ...]:
+    """``move 2 forward`` and so on."""
+    return (
+        Measure(f"{name} forward", move.forward, "mm"),
+        Measure(f"{name} sideways", move.sideways, "mm"),
+        Measure(f"{name} distance", move.distance, "mm"),
+        Measure(f"{name} turn", move.turn, "°"),
+        Measure(f"{name} seconds", move.seconds, "s"),
+    )
+
+
+def _parted_by_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    resting = np.zeros_like(still)
+    for first, last in stretches(still):
+        if last - first > _REST or first == 0 or last == len(still):
+            resting[first:last] = True
+    return stretches(~resting)
+
+
+def _parted_by_kind(recording: Recording, first: int, last: int) -> list[tuple[int, int]]:
+    """A stretch of ticks, cut where a lasting straight part and a lasting other part meet."""
+    driving_straight = straight(recording)[first:last]
+    lasting = sorted(
+        (begin, end, kind)
+        for kind, mask in ((True, driving_straight), (False, ~driving_straight))
+        for begin, end in stretches(mask)
+        if end - begin >= _LASTING
+    )
+    cuts = [first]
+    for (_, end, kind), (_, _, following) in itertools.pairwise(lasting):
+        if kind != following:
+            cuts.append(first + end)
+    return list(zip(cuts, [*cuts[1:], last], strict=True))

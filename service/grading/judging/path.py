@@ -1,0 +1,276 @@
+"""Judging where the robot went: through places, within areas, clear of them, and how near a point.
+
+Going round a point is judged in ``circuits.py``, following a line in ``line.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.areas import distance_to, to_segment
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.whereabouts import headings, place_at, positions, standing, stretches
+from sim.recording import Floats, Recording
+from submissions.criteria.path import Closest, KeepsOut, StaysInside, TouchesNothing, Visits
+from submissions.criteria.places import Area, Part
+
+#: Standing still for more than so many ticks (half a second), or at the end, is stopping.
+_STOP = 15
+#: The least change of heading that is a turn, degrees.
+_TURN = 2.0
+#: As far as the robot could go straight on, mm.
+_FAR = 10_000.0
+
+PART_NAMES = {
+    "robot": "the robot",
+    "pen": "the pen",
+    "left_light": "the left light sensor",
+    "right_light": "the right light sensor",
+}
+
+
+def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
+    """Each place after the one before it (or at any time); a place is visited when its edge is reached."""
+    recording = trial.recording
+    points = positions(recording, criterion.of)
+    rows: list[int] = []
+    missed: Area | None = None
+    reached = 0
+    for place in criterion.places:
+        inside = distance_to(place, points) <= 0
+        after = rows[-1] if rows and criterion.in_order else 0
+        found = np.flatnonzero(inside[after:])
+        if not len(found):
+            missed = missed or place
+            continue
+        reached += 1
+        rows.append(after + int(found[0]))
+    measures = (Measure("places visited", reached),)
+    enough = criterion.at_least or len(criterion.places)
+    score = Fraction(min(reached, enough), enough)
+    who = PART_NAMES[criterion.of]
+    if missed is not None and reached < enough:
+        near = _nearest(distance_to(missed, points))
+        then = ", after the places before it," if criterion.in_order and criterion.places[0] is not missed else ""
+        told = (
+            f"it came no nearer to it than {near[1]:.0f} mm" if near and near[1] > 0 else "it did not come there then"
+        )
+        return failed(
+            f"Expected {who} to come{then} to {missed}, but {told} "
+            f"({reached} of {len(criterion.places)} places visited).",
+            *place_at(recording, near[0] if near else len(points) - 1),
+            score=score,
+            measures=measures,
+        )
+    stops = [(place, row) for place in criterion.places if (row := _stop_in(recording, place, points)) is not None]
+    if criterion.without_stopping and stops:
+        place, row = stops[0]
+        return failed(
+            f"Expected {who} not to stop in {place}, but it stood still there.",
+            *place_at(recording, row),
+            score=Fraction(max(min(reached, enough) - len(stops), 0), enough),
+            measures=measures,
+        )
+    places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
+    return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
+
+
+def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    points = _driven(recording, criterion.of)
+    if points is None:
+        return _no_pen(recording)
+    depth = np.min([distance_to(area, points) for area in criterion.areas], axis=0)
+    who, where = PART_NAMES[criterion.of], _either(criterion.areas)
+    measures = (
+        *_bounds(points),
+        Measure("farthest out", float(np.nanmax(depth)), "mm"),
+    )
+    outside = np.flatnonzero(~(depth <= 0) & ~np.isnan(points[:, 0]))
+    if len(outside):
+        row = int(outside[0])
+        share = Fraction(row, len(points))
+        return failed(
+            f"Expected {who} to stay in {where}, but it left it at ({points[row, 0]:.0f}, {points[row, 1]:.0f}) "
+            f"and was up to {np.nanmax(depth):.0f} mm outside.",
+            *place_at(recording, row),
+            score=share,
+            measures=measures,
+        )
+    if _way(recording) < criterion.drives:
+        return _drove_too_little(recording, criterion.drives, measures)
+    return passed(f"{_upper(who)} stayed in {where}.", recording.end_t, recording.end, measures)
+
+
+def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
+    """The measure is the least distance to any of the areas."""
+    recording = trial.recording
+    points = _driven(recording, criterion.of)
+    if points is None:
+        return _no_pen(recording)
+    who = PART_NAMES[criterion.of]
+    distances = np.array([distance_to(area, points) for area in criterion.areas])
+    measures = (Measure("least clearance", float(np.nanmin(distances)), "mm"), *_bounds(points))
+    within = distances <= 0
+    if within.any():
+        row = int(np.flatnonzero(within.any(axis=0))[0])
+        area = criterion.areas[int(np.flatnonzero(within[:, row])[0])]
+        return failed(
+            f"Expected {who} to keep out of {area}, but it came into it at "
+            f"({points[row, 0]:.0f}, {points[row, 1]:.0f}).",
+            *place_at(recording, row),
+            measures=measures,
+        )
+    if _way(recording) < criterion.drives:
+        return _drove_too_little(recording, criterion.drives, measures)
+    return passed(
+        f"{_upper(who)} kept out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
+        f"by {np.nanmin(distances):.0f} mm or more.",
+        recording.end_t,
+        recording.end,
+        measures,
+    )
+
+
+def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    touches = recording.touches
+    measures = (Measure("touches", len(touches)),)
+    if len(touches) > criterion.at_most:
+        touch = touches[criterion.at_most]
+        allowed = f"at most {criterion.at_most} times" if criterion.at_most else "nothing"
+        return failed(
+            f"Expected the robot to touch {allowed}, but it touched {touch.what}.",
+            touch.t,
+            touch.pose,
+            measures=measures,
+        )
+    return passed("The robot touched nothing." if not touches else f"The robot touched {len(touches)} times.",
+                  recording.end_t, recording.end, measures)  # fmt: skip
+
+
+def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
+    """The least distance of the robot's middle to a point, and how it began to turn with regard to it."""
+    recording = trial.recording
+    points = positions(recording)
+    near = _nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
+    row, least = near if near else (0, math.nan)
+    straight = _straight_on(recording, criterion.x, criterion.y)
+    measures = (Measure("least distance", least, "mm"), Measure("straight on", straight, "mm"))
+    point = f"({criterion.x:g}, {criterion.y:g})"
+    where = place_at(recording, row)
+    if criterion.first_turn is not None:
+        turned = _first_turn(recording, criterion.x, criterion.y)
+        if turned is None or (turned[1] == "towards") != (criterion.first_turn == "towards"):
+            told = "it did not turn at all" if turned is None else f"it turned {_to(turned[1])} it"
+            wished = f"Expected the robot first to turn {_to(criterion.first_turn)}"
+            return failed(
+                f"{wished} {point}, but {told}.", *place_at(recording, turned[0] if turned else 0), measures=measures
+            )
+    if criterion.distance is not None and not criterion.distance[0] <= least <= criterion.distance[1]:
+        low, high = criterion.distance
+        return failed(
+            f"Expected the robot to come as near to {point} as {low:g} to {high:g} mm, "
+            f"but the nearest it came was {least:.0f} mm.",
+            *where,
+            measures=measures,
+        )
+    if criterion.than_straight is not None and (least < straight) != (criterion.than_straight == "nearer"):
+        wish = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
+        return failed(
+            f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), "
+            f"but the nearest it came was {least:.0f} mm.",
+            *where,
+            measures=measures,
+        )
+    return passed(f"The robot came as near to {point} as {least:.0f} mm.", *where, measures)
+
+
+def _to(direction: str) -> str:
+    return "towards" if direction == "towards" else "away from"
+
+
+def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
+    """When the robot had turned by 2 degrees, and whether that was towards the point."""
+    degrees = headings(recording)
+    rows = np.flatnonzero(np.abs(degrees - degrees[0]) > _TURN)
+    if not len(rows):
+        return None
+    row = int(rows[0])
+    start = recording.start
+    bearing = math.degrees(math.atan2(y - start.y, x - start.x))
+    left = (bearing - start.heading + 180) % 360 - 180 > 0
+    return row, "towards" if (degrees[row] > degrees[0]) == left else "away"
+
+
+def _straight_on(recording: Recording, x: float, y: float) -> float:
+    """Least distance from a point to the ray ahead of the start, mm."""
+    start = recording.start
+    along = math.radians(start.heading)
+    end = (start.x + _FAR * math.cos(along), start.y + _FAR * math.sin(along))
+    return float(to_segment(np.array([[x, y]]), (start.x, start.y), end)[0])
+
+
+def _stop_in(recording: Recording, place: Area, points: Floats) -> int | None:
+    """The row at which the robot had stopped in a place, if it did."""
+    inside = distance_to(place, points)[1:] <= 0
+    resting = standing(recording) & inside
+    for first, last in stretches(resting):
+        if last - first > _STOP:
+            return first + 1
+    return len(points) - 1 if len(inside) and inside[-1] else None
+
+
+def _driven(recording: Recording, part: Part) -> Floats | None:
+    """The part's positions; None if the pen never drew."""
+    points = positions(recording, part)
+    return None if np.isnan(points).all() else points
+
+
+def _way(recording: Recording) -> float:
+    """How far the robot drove in all, mm."""
+    return float(np.hypot(*np.diff(positions(recording), axis=0).T).sum())
+
+
+def _drove_too_little(recording: Recording, least: float, measures: tuple[Measure, ...]) -> Outcome:
+    return failed(
+        f"Expected the robot to drive {least:g} mm or more, but it drove only {_way(recording):.0f} mm.",
+        recording.end_t,
+        recording.end,
+        score=Fraction(min(_way(recording) / least, 1.0)).limit_denominator(1000),
+        measures=measures,
+    )
+
+
+def _no_pen(recording: Recording) -> Outcome:
+    return failed(
+        "Expected the pen to be down, but the program's magic line has no -p, so nothing was drawn.",
+        0.0,
+        recording.start,
+    )
+
+
+def _nearest(distances: Floats) -> tuple[int, float] | None:
+    if np.isnan(distances).all():
+        return None
+    row = int(np.nanargmin(distances))
+    return row, float(distances[row])
+
+
+def _bounds(points: Floats) -> tuple[Measure, ...]:
+    """The rectangle that the path fills."""
+    (left, bottom), (right, top) = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    figures = (("least x", left), ("greatest x", right), ("least y", bottom), ("greatest y", top))
+    return tuple(Measure(name, float(value), "mm") for name, value in figures)
+
+
+def _either(areas: tuple[Area, ...]) -> str:
+    return str(areas[0]) if len(areas) == 1 else f"one of {len(areas)} areas"
+
+
+def _upper(words: str) -> str:
+    return words[:1].upper() + words[1:]

@@ -1,0 +1,43 @@
+"""Where the robot's parts are at a moment of a recording, and whether that is in a zone.
+
+Geometry only; what it is worth is decided in the modules of the kinds.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from service.grading.judging.outcome import pose_at
+from sim.recording import Pose, Recording
+from sim.robot import ROBOTS, robot
+
+Part = Literal["left", "right", "middle"]
+Zone = tuple[float, float, float, float]
+
+
+def part_at(recording: Recording, part: Part, pose: Pose) -> tuple[float, float]:
+    """World mm of the middle of a light sensor, or of the axle, with the robot at ``pose``."""
+    if part == "middle":
+        return pose.x, pose.y
+    bolted = robot(recording.robot if recording.robot in ROBOTS else "Default_Robot")
+    sensor = bolted.left_light if part == "left" else bolted.right_light
+    turn = math.radians(pose.heading - 90)
+    sine, cosine = math.sin(turn), math.cos(turn)
+    return pose.x + cosine * sensor.x - sine * sensor.y, pose.y + sine * sensor.x + cosine * sensor.y
+
+
+def part_at_time(recording: Recording, part: Part, t: float) -> tuple[float, float]:
+    """As ``part_at``, after the last tick until ``t`` seconds."""
+    return part_at(recording, part, pose_at(recording, t))
+
+
+def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
+    """Whether a place is in [left, bottom, right, top], or at most ``margin`` mm outside each edge."""
+    (x, y), (left, bottom, right, top) = place, zone
+    return left - margin <= x <= right + margin and bottom - margin <= y <= top + margin
+
+
+def zone_words(zone: Zone) -> str:
+    left, bottom, right, top = zone
+    return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"

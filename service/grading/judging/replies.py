@@ -1,0 +1,143 @@
+"""Judging what the responder answers: to given texts, or to every message that reached it.
+
+An answer counts whether or not it arrived before the program ended; what the robot does with it is judged
+elsewhere.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from service.grading.grade import TrialResult
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
+from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
+from service.grading.judging.texts import conditions, meets, same_text
+from sim.recording import Message, Recording
+from submissions.criteria import Replies
+
+
+def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    asked = [
+        (index, message)
+        for index, message in enumerate(recording.messages)
+        if message.sender == "robot" and message.delivered is not None
+    ]
+    if criterion.expect:
+        return _judge_expected(criterion, asked, recording)
+    asked = [(index, message) for index, message in asked if _is_asked_about(criterion, message.text)]
+    if len(asked) < criterion.at_least:
+        few = f"only {len(asked)} reached it" if asked else "none reached it"
+        return failed(
+            f"Expected the responder to be sent at least {criterion.at_least} of {_messages(criterion)}, but {few}.",
+            score=Fraction(0),
+        )
+    answers = Answers(recording)
+    wrong: list[tuple[Message, str]] = []
+    for index, message in asked:
+        mistake = _mistake(criterion, answers, index)
+        if mistake:
+            wrong.append((message, mistake))
+    if not wrong:
+        return passed(f"The responder answered {len(asked)} of {len(asked)} messages as expected.")
+    message, mistake = wrong[0]
+    right = len(asked) - len(wrong)
+    return failed(
+        f"Expected the responder to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
+        f"({right} of {len(asked)} answered as expected).",
+        message.t,
+        pose_at(recording, message.t),
+        Fraction(right, len(asked)),
+    )
+
+
+def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], recording: Recording) -> Outcome:
+    answers = Answers(recording)
+    right = 0
+    first: Outcome | None = None
+    for text, answer in criterion.expect.items():
+        sent = [(index, message) for index, message in asked if same_text(message.text, text, criterion.ignore_case)]
+        wanted = quoted(as_text(answer)) + (f" at {criterion.path}" if criterion.path else "")
+        if not sent:
+            outcome = failed(f"Expected the responder to be sent {quoted(text)}, but it never was.")
+        else:
+            mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in sent]
+            place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
+            if place is None:
+                right += 1
+                continue
+            message = sent[place][1]
+            outcome = failed(
+                f"Expected the responder to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
+                message.t,
+                pose_at(recording, message.t),
+            )
+        first = first or outcome
+    count = len(criterion.expect)
+    if first is None:
+        return passed(f"The responder answered {count} of {count} messages as expected.")
+    return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
+
+
+def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
+    """What is wrong with the answer to the message at ``index``; empty if it is the expected one."""
+    reply = answers.to(index)
+    if reply is None:
+        return answers.silence(index)
+    if criterion.is_json and not is_json_answer(reply.text):
+        return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
+    if criterion.path is None:
+        same = same_text(reply.text, str(answer), criterion.ignore_case)
+        return "" if same else f"it answered {quoted(reply.text)}"
+    found = at_path(parsed(reply.text), criterion.path)
+    if found is NOTHING:
+        return f"there is nothing at {criterion.path} in its answer {quoted(reply.text)}"
+    if isinstance(found, str) and isinstance(answer, str):
+        same = same_text(found, answer, criterion.ignore_case)
+    else:
+        same = same_value(found, answer)
+    return "" if same else f"it has {quoted(as_text(found))} at {criterion.path}"
+
+
+def _mistake(criterion: Replies, answers: Answers, index: int) -> str:
+    """What is wrong with the answer to the message at ``index``, against the conditions; empty if nothing is."""
+    reply = answers.to(index)
+    if reply is None:
+        return answers.silence(index)
+    if criterion.is_json and not is_json_answer(reply.text):
+        return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
+    text = reply.text
+    if criterion.path is not None:
+        found = at_path(parsed(reply.text), criterion.path)
+        if found is NOTHING:
+            return f"there is nothing at {criterion.path} in its answer {quoted(reply.text)}"
+        if criterion.value is not None and not same_value(found, criterion.value):
+            return f"it has {quoted(as_text(found))} at {criterion.path}"
+        text = as_text(found)
+    return "" if meets(criterion, text) else f"it answered {quoted(text)}"
+
+
+def _is_asked_about(criterion: Replies, text: str) -> bool:
+    if criterion.to and not any(same_text(text, wanted, criterion.ignore_case) for wanted in criterion.to):
+        return False
+    return not criterion.to_starts_with or text.startswith(criterion.to_starts_with)
+
+
+def _messages(criterion: Replies) -> str:
+    if criterion.to:
+        return f"the texts {listed(criterion.to, 'or')}"
+    if criterion.to_starts_with:
+        return f"the texts that start with {listed(criterion.to_starts_with, 'or')}"
+    return "the robot's messages"
+
+
+def _wanted(criterion: Replies) -> str:
+    words = ["JSON"] if criterion.is_json else []
+    there = f" at {criterion.path}" if criterion.path else ""
+    if criterion.value is not None:
+        words.append(f"{quoted(as_text(criterion.value))}{there}")
+    elif criterion.has_conditions:
+        words.append(f"{conditions(criterion)}{there}")
+    elif there:
+        words.append(f"something{there}")
+    return " and ".join(words) or "a text"

@@ -1,0 +1,134 @@
+"""Judging what a program reports: the figures and words that belong to the pose it started from.
+
+What is expected is the instructor's table or the floor's label; nothing a student prints is trusted further.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.outcome import Outcome, failed, listed, passed, quoted
+from service.grading.judging.places import part_at
+from service.grading.judging.planned import pose_number
+from service.grading.judging.words import Token, find_words, tokens_of, words_of
+from sim.backgrounds import floor, names
+from sim.recording import Recording
+from submissions.assignment import Assignment
+from submissions.criteria.reporting import Reports
+
+Entry = float | str
+
+_DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
+
+
+def judge_reports(criterion: Reports, trial: TrialResult, assignment: Assignment) -> Outcome:
+    wanted = _expected(criterion, trial, assignment)
+    who = "the responder" if criterion.source == "reply" else "the program"
+    deed = _DEEDS[criterion.source]
+    asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
+    texts = _texts(criterion, trial.recording)
+    if not texts:
+        return failed(f"{asked}, but it did not {deed} anything.")
+    tokens = [token for text in texts for token in tokens_of(text)]
+    found, values = _found(wanted, tokens, criterion.tolerance)
+    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(values, 1))
+    heard = quoted(" | ".join(texts))
+    foreign = _foreign(criterion, wanted, tokens)
+    if foreign:
+        return failed(f"{asked}, but {foreign}: {heard}.", measures=measures)
+    if found < len(wanted):
+        missing = _entries(wanted[found : found + 1])
+        where = f" after {_entries(wanted[found - 1 : found])}" if found else ""
+        return failed(
+            f"{asked}, but {missing} did not come{where}: {heard}.",
+            score=Fraction(found, len(wanted)),
+            measures=measures,
+        )
+    return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
+
+
+def _expected(criterion: Reports, trial: TrialResult, assignment: Assignment) -> tuple[Entry, ...]:
+    if criterion.expected != "label":
+        place = pose_number(assignment, trial)
+        rows = criterion.expected
+        return rows[min(place, len(rows) - 1)]
+    label = label_at_start(trial.recording)
+    return (float(label) if label.isdecimal() else label,)
+
+
+def label_at_start(recording: Recording) -> str:
+    """What the floor has under the left light sensor at the start; ``nothing`` where it has no label."""
+    if recording.background not in names():
+        return "nothing"
+    ground = floor(recording.background, labels=recording.patches, seed=recording.sheet)
+    return ground.label_at(*part_at(recording, "left", recording.start)) or "nothing"
+
+
+def _texts(criterion: Reports, recording: Recording) -> list[str]:
+    if criterion.source == "reply":
+        return [m.text for m in recording.messages if m.sender == "responder" and m.note != "duplicated"]
+    printed = recording.printed if criterion.source != "speech" else ()
+    # What say() prints as well would be there twice.
+    spoken = recording.spoken if criterion.source == "speech" else ()
+    if criterion.source == "either":
+        shown = {(line.t, line.text) for line in printed}
+        spoken = tuple(line for line in recording.spoken if (line.t, line.text) not in shown)
+    return [line.text for line in sorted([*printed, *spoken], key=lambda line: line.t)]
+
+
+def _found(wanted: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> tuple[int, list[float]]:
+    """How many of the wanted entries come in order, and the numbers that stand for them."""
+    words = [token.word for token in tokens]
+    start = 0
+    values: list[float] = []
+    for count, entry in enumerate(wanted):
+        if isinstance(entry, str):
+            parts = words_of(entry)
+            place = find_words(words, parts, start)
+            length = len(parts)
+        else:
+            near = (i for i in range(start, len(tokens)) if _is_near(tokens[i].value, entry, tolerance))
+            place, length = next(near, None), 1
+        if place is None:
+            return count, values
+        value = tokens[place].value
+        if value is not None:
+            values.append(value)
+        start = place + length
+    return len(wanted), values
+
+
+def _is_near(value: float | None, wanted: float, tolerance: float) -> bool:
+    return value is not None and abs(value - wanted) <= tolerance + 1e-9
+
+
+def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> str:
+    """What was reported that must not be, in words; empty if nothing was."""
+    expected = [words_of(entry) for entry in wanted if isinstance(entry, str)]
+    words = [token.word for token in tokens]
+    for text in criterion.among:
+        parts = words_of(text)
+        inside = any(find_words(entry, parts) is not None for entry in expected)
+        if not inside and find_words(words, parts) is not None:
+            return f"it named {quoted(text)}"
+    numbers = [entry for entry in wanted if not isinstance(entry, str)]
+    others = [
+        token
+        for token in tokens
+        if token.value is not None and not any(_is_near(token.value, number, criterion.tolerance) for number in numbers)
+    ]
+    if criterion.only and others:
+        return f"it reported {others[0].word} as well"
+    return ""
+
+
+def _leeway(criterion: Reports, wanted: Sequence[Entry]) -> str:
+    """How far off a number may be, where it is far enough to matter to whoever compares."""
+    numbers = any(not isinstance(entry, str) for entry in wanted)
+    return f" (within {criterion.tolerance:g})" if numbers and criterion.tolerance >= 1 else ""
+
+
+def _entries(entries: Sequence[Entry]) -> str:
+    return listed(tuple(entry if isinstance(entry, str) else f"{entry:g}" for entry in entries))

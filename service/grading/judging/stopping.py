@@ -1,0 +1,109 @@
+"""Judging what is under a light sensor when the robot stops.
+
+The end of a run is the last tick that was reached; motors that are still on do not move a robot whose program ended.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Literal
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.outcome import Outcome, cut, failed, passed
+from service.grading.judging.places import in_zone, part_at, zone_words
+from sim.recording import Recording, Verdict
+from submissions.criteria.stopping import StopOn
+
+Side = Literal["left", "right"]
+
+_MM = 0.01  # less than this in a tick is no movement
+
+
+def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    fault = cut(recording)
+    if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
+        return failed(
+            f"Expected the robot to stop {_wanted(criterion)}, but its program was still running after "
+            f"{recording.end_t:.2f} s.",
+            recording.end_t,
+            recording.end,
+        )
+    if not len(recording.ticks):
+        return failed(f"Expected the robot to stop {_wanted(criterion)}, but it never moved: no time passed.")
+    sides: tuple[Side, ...] = ("left", "right") if criterion.sensor == "either" else (criterion.sensor,)
+    tried = [_judge_side(criterion, side, recording) for side in sides]
+    return max(tried, key=lambda outcome: outcome.score)
+
+
+def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
+    place = part_at(recording, side, recording.end)
+    rgb = (recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb)[-1]
+    reflected = 100 * int(rgb[0]) / 255
+    checks: list[tuple[bool, str, str]] = []  # whether it holds, what was expected, what there was
+    where = f"at ({place[0]:.1f}, {place[1]:.1f})"
+    if criterion.zone is not None:
+        checks.append((in_zone(place, criterion.zone), f"at {zone_words(criterion.zone)}", where))
+    if criterion.near is not None:
+        away = math.dist(place, criterion.near)
+        x, y = criterion.near
+        wanted = f"within {criterion.within:g} mm of ({x:g}, {y:g})"
+        checks.append((away <= criterion.within, wanted, f"{where}, {away:.1f} mm away"))
+    if criterion.reflected is not None:
+        least, most = criterion.reflected
+        checks.append((least <= reflected <= most, f"reading {_range(least, most)} %", f"reading {reflected:.2f} %"))
+    if criterion.rgb is not None:
+        close = all(abs(a - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True))
+        seen = ", ".join(str(int(part)) for part in rgb)
+        colour = ", ".join(f"{part:g}" for part in criterion.rgb)
+        checks.append((close, f"over the colour ({colour})", f"over ({seen})"))
+    if criterion.still:
+        stood = _stood_still(recording)
+        checks.append((stood >= criterion.still, f"standing for {criterion.still:g} s", f"had stood for {stood:.2f} s"))
+    measures = (
+        Measure("end x", recording.end.x, "mm"),
+        Measure("end y", recording.end.y, "mm"),
+        Measure("sensor x", place[0], "mm"),
+        Measure("sensor y", place[1], "mm"),
+        Measure("reading", reflected, "%"),
+        Measure("time", recording.end_t, "s"),
+    )
+    wrong = next(((wanted, found) for holds, wanted, found in checks if not holds), None)
+    if wrong is None:
+        return passed(
+            f"The robot stopped with its {side} sensor {where}, reading {reflected:.2f} %.",
+            recording.end_t,
+            recording.end,
+            measures,
+        )
+    return failed(
+        f"Expected the robot to stop with its {side} sensor {wrong[0]}, but it stopped with it {wrong[1]}.",
+        recording.end_t,
+        recording.end,
+        Fraction(sum(holds for holds, _, _ in checks), len(checks)),
+        measures,
+    )
+
+
+def _stood_still(recording: Recording) -> float:
+    """Seconds without movement before the end."""
+    ticks = recording.ticks
+    count = 0
+    for i in range(len(ticks) - 1, 0, -1):
+        if math.hypot(ticks.x[i] - ticks.x[i - 1], ticks.y[i] - ticks.y[i - 1]) > _MM:
+            break
+        count += 1
+    return count / 30
+
+
+def _wanted(criterion: StopOn) -> str:
+    return (
+        "with one of its light sensors in place"
+        if criterion.sensor == "either"
+        else (f"with its {criterion.sensor} light sensor in place")
+    )
+
+
+def _range(least: float, most: float) -> str:
+    return f"{least:g}" if least == most else f"{least:g} to {most:g}"

@@ -1,0 +1,107 @@
+"""Accuracy along the conditions that a scenario sweeps: the curves, and what part of the marks a curve is worth.
+
+Shares are exact fractions; rounding to marks is ``marks.py``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from itertools import pairwise
+
+from service.grading.grade import AccuracyCurve, Level, TrialResult
+from service.grading.judging.classification import Naming, wilson
+from submissions.criteria.classification import Robustness
+from submissions.sweep import CONDITIONS
+
+_NOISES = ("light_noise", "motor_noise")
+
+
+def curves_of(namings: Iterable[Naming], trials: Mapping[int, TrialResult]) -> tuple[AccuracyCurve, ...]:
+    """A curve for every condition that the trials (by index in the grade) were swept over, in a fixed order."""
+    namings = tuple(namings)
+    return tuple(
+        curve for condition in CONDITIONS if len((curve := curve_along(condition, namings, trials)).levels) > 1
+    )
+
+
+def curve_along(condition: str, namings: Iterable[Naming], trials: Mapping[int, TrialResult]) -> AccuracyCurve:
+    """The accuracy at each level of ``condition``; trials that were not swept over it are left out."""
+    levels = levels_along(condition, trials)
+    counts: dict[float, tuple[int, int]] = {}
+    for naming in namings:
+        if naming.trial in levels:
+            right, count = counts.get(levels[naming.trial], (0, 0))
+            counts[levels[naming.trial]] = right + naming.right, count + 1
+    levels_of_curve = (Level(at, right, count, *wilson(right, count)) for at, (right, count) in sorted(counts.items()))
+    return AccuracyCurve(condition, tuple(levels_of_curve))
+
+
+def share_of_robustness(criterion: Robustness, curve: AccuracyCurve) -> Fraction:
+    """What part of the marks the curve is worth."""
+    reached = area(curve.levels) if criterion.level is None else part_above(curve.levels, criterion.level)
+    if criterion.at_least is None:
+        return reached
+    enough = Fraction(str(criterion.at_least))
+    if reached >= enough:
+        return Fraction(1)
+    return Fraction(0) if criterion.over == "all" else reached / enough
+
+
+def area(levels: Sequence[Level]) -> Fraction:
+    """The mean height of the curve between its first level and its last: the area under its straight lines."""
+    if len(levels) < 2:
+        return _height(levels[0]) if levels else Fraction(0)
+    below = sum(
+        ((_at(high) - _at(low)) * (_height(low) + _height(high)) / 2 for low, high in pairwise(levels)), Fraction(0)
+    )
+    return below / (_at(levels[-1]) - _at(levels[0]))
+
+
+def part_above(levels: Sequence[Level], level: float) -> Fraction:
+    """What part of the sweep lies round its easiest level, the one nearest to 0, without falling below ``level``."""
+    held = range_above(levels, level)
+    if held is None:
+        return Fraction(0)
+    if len(levels) < 2:
+        return Fraction(1)
+    return (_at(held[1]) - _at(held[0])) / (_at(levels[-1]) - _at(levels[0]))
+
+
+def range_above(levels: Sequence[Level], level: float) -> tuple[Level, Level] | None:
+    """The first and the last level of that part; None if it falls below at the easiest already."""
+    if not levels:
+        return None
+    enough = Fraction(str(level))
+    first = last = min(range(len(levels)), key=lambda place: abs(levels[place].at))
+    if _height(levels[first]) < enough:
+        return None
+    while first > 0 and _height(levels[first - 1]) >= enough:
+        first -= 1
+    while last + 1 < len(levels) and _height(levels[last + 1]) >= enough:
+        last += 1
+    return levels[first], levels[last]
+
+
+def levels_along(condition: str, trials: Mapping[int, TrialResult]) -> dict[int, float]:
+    """The level of each trial that belongs to the curve; noise that a scenario lists counts as swept."""
+    levels = {index: dict(trial.sweep)[condition] for index, trial in trials.items() if condition in dict(trial.sweep)}
+    if levels or condition not in _NOISES:
+        return levels
+    listed: dict[str, set[float]] = {}
+    for trial in trials.values():
+        if not trial.sweep:
+            listed.setdefault(trial.scenario, set()).add(getattr(trial, condition))
+    return {
+        index: getattr(trial, condition)
+        for index, trial in trials.items()
+        if not trial.sweep and len(listed[trial.scenario]) > 1
+    }
+
+
+def _at(level: Level) -> Fraction:
+    return Fraction(str(level.at))
+
+
+def _height(level: Level) -> Fraction:
+    return Fraction(level.right, level.n)

@@ -1,0 +1,279 @@
+"""Judging what was printed, said and sent: which texts count, how many there are, and in which order they came.
+
+The texts are a student's; patterns are the instructor's and see only the beginning of a long text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from responders.messages import JSON, PY
+from service.grading.grade import TrialResult
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
+from sim.recording import Line, Message, Recording
+from submissions.criteria import LONGEST_MATCHED_TEXT, Messages, Prints, Replies, Says
+
+
+@dataclass(frozen=True, slots=True)
+class Deed:
+    """The words for what is judged: the robot, say, said."""
+
+    who: str
+    verb: str
+    past: str
+
+
+#: How conditions begin that are more than quoted texts.
+_SOMETHING = "something that "
+
+_PRINT = Deed("the program", "print", "printed")
+_SAY = Deed("the robot", "say", "said")
+_SEND = Deed("the robot", "send", "sent")
+_RECEIVE = Deed("the robot", "receive", "received")
+
+Sequenced = Prints | Says | Messages
+
+
+def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
+    return judge_sequence(criterion, trial.recording.printed, _PRINT, trial.recording)
+
+
+def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
+    return judge_sequence(criterion, trial.recording.spoken, _SAY, trial.recording)
+
+
+def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
+    """What the robot sent, or what its queue got; with ``queue_grows`` both that and any other condition count."""
+    recording = trial.recording
+    if not criterion.queue_grows:
+        return _judge_texts(criterion, recording)
+    grown = _queue_grows(recording)
+    counted = (criterion.at_least, criterion.at_most, criterion.exactly) != (None, None, None)
+    if not (criterion.has_conditions or criterion.in_order or counted):
+        return grown
+    texts = _judge_texts(criterion, recording)
+    worse = texts if grown.passed else grown
+    return Outcome(worse.passed, min(texts.score, grown.score), worse.message, worse.t, worse.pose)
+
+
+def judge_sequence(criterion: Sequenced, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
+    """Whether the right texts are among ``lines``; everything is compared with its runs of spaces as one."""
+    if criterion.last:
+        return _judge_last(criterion, lines, deed, recording)
+    chosen = [line for line in lines if meets(criterion, line.text)]
+    if criterion.in_order:
+        return _judge_order(criterion, chosen, lines, deed, recording)
+    return _judge_count(criterion, chosen, lines, deed, recording)
+
+
+def meets(criterion: Sequenced | Replies, text: str) -> bool:
+    """Whether a text meets every condition that is given."""
+    fold = criterion.ignore_case
+    plain = _plain(text, fold)
+    if criterion.equals and plain not in [_plain(wanted, fold) for wanted in criterion.equals]:
+        return False
+    if criterion.starts_with and not plain.startswith(tuple(_plain(w, fold) for w in criterion.starts_with)):
+        return False
+    if not all(_plain(wanted, fold) in plain for wanted in criterion.contains):
+        return False
+    return criterion.matches is None or _matches(criterion.matches, text, fold)
+
+
+def conditions(criterion: Sequenced | Replies) -> str:
+    """What is looked for, in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
+    if criterion.equals and not (criterion.starts_with or criterion.contains or criterion.matches is not None):
+        return listed(criterion.equals, "or")
+    words = []
+    if criterion.equals:
+        words.append(f"is {listed(criterion.equals, 'or')}")
+    if criterion.starts_with:
+        words.append(f"starts with {listed(criterion.starts_with, 'or')}")
+    if criterion.contains:
+        words.append(f"contains {listed(criterion.contains)}")
+    if criterion.matches is not None:
+        words.append(f"matches the pattern {quoted(criterion.matches)}")
+    return f"{_SOMETHING}{' and '.join(words)}" if words else ""
+
+
+def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
+    return _plain(text, ignore_case) == _plain(wanted, ignore_case)
+
+
+def _judge_last(criterion: Sequenced, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
+    wanted = conditions(criterion)
+    if not lines:
+        return failed(
+            f"Expected the last thing that {deed.who} {deed.past} to be {wanted}, but it {deed.past} nothing."
+        )
+    last = lines[-1]
+    pose = pose_at(recording, last.t)
+    if meets(criterion, last.text):
+        return passed(f"The last thing that {deed.who} {deed.past} was {quoted(last.text)}.", last.t, pose)
+    return failed(
+        f"Expected the last thing that {deed.who} {deed.past} to be {wanted}, but it was {quoted(last.text)}.",
+        last.t,
+        pose,
+    )
+
+
+def _judge_order(
+    criterion: Sequenced, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
+) -> Outcome:
+    wanted = criterion.in_order
+    found: list[Line] = []
+    extra: Line | None = None
+    for line in chosen:
+        if len(found) < len(wanted) and _compares(criterion, line.text, wanted[len(found)]):
+            found.append(line)
+        elif extra is None:
+            extra = line
+    expected = f"Expected {deed.who} to {deed.verb} {listed(wanted)}{' in this order' if len(wanted) > 1 else ''}"
+    if criterion.only:
+        expected += " and nothing else"
+        counts = conditions(criterion)
+        expected += f" that {counts.removeprefix(_SOMETHING)}" if counts.startswith(_SOMETHING) else ""
+    extras = len(chosen) - len(found) if criterion.only else 0
+    score = Fraction(len(found), len(wanted) + extras)
+    if criterion.only and extra is not None:
+        return failed(
+            f"{expected}, but it {deed.past} {quoted(extra.text)} as well.", extra.t, pose_at(recording, extra.t), score
+        )
+    if len(found) < len(wanted):
+        missing = quoted(wanted[len(found)])
+        what = (
+            _instead(chosen or lines, deed) if not found else f"{missing} did not come after {quoted(found[-1].text)}"
+        )
+        at = found[-1].t if found else None
+        pose = pose_at(recording, at) if at is not None else None
+        return failed(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score)
+    end = found[-1]
+    return passed(f"{deed.who.capitalize()} {deed.past} {listed(wanted)} in order.", end.t, pose_at(recording, end.t))
+
+
+def _judge_count(
+    criterion: Sequenced, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
+) -> Outcome:
+    least, most = _bounds(criterion)
+    what = conditions(criterion) or "something"
+    count = len(chosen)
+    last = chosen[-1] if chosen else None
+    at = last.t if last else None
+    pose = pose_at(recording, last.t) if last else None
+    if count >= least and (most is None or count <= most):
+        if last is None:
+            return passed(f"{deed.who.capitalize()} {deed.past} nothing that it should not have.")
+        again = f" ({count} times such a text)" if count > 1 else ""
+        return passed(f"{deed.who.capitalize()} {deed.past} {quoted(last.text)}{again}.", at, pose)
+    times = _times(least, most)
+    expected = f"Expected {deed.who} to {deed.verb} {what}{times}"
+    if count == 0:
+        return failed(f"{expected}, but {_instead(lines, deed)}.")
+    score = Fraction(count, least) if count < least else Fraction(most or 0, count)
+    return failed(f"{expected}, but it {deed.past} {count} such, the last {quoted(chosen[-1].text)}.", at, pose, score)
+
+
+def _bounds(criterion: Sequenced) -> tuple[int, int | None]:
+    if criterion.exactly is not None:
+        return criterion.exactly, criterion.exactly
+    if criterion.at_least is None and criterion.at_most is None:
+        return 1, None
+    return criterion.at_least or 0, criterion.at_most
+
+
+def _times(least: int, most: int | None) -> str:
+    if most is None:
+        return "" if least == 1 else f" at least {least} times"
+    if most == least:
+        return " exactly once" if least == 1 else f" exactly {least} times"
+    return f" at most {most} times" if least == 0 else f" {least} to {most} times"
+
+
+def _instead(lines: Sequence[Line], deed: Deed) -> str:
+    if not lines:
+        return f"it {deed.past} nothing"
+    if len(lines) == 1:
+        return f"it {deed.past} {quoted(lines[0].text)}"
+    return f"it {deed.past} {len(lines)} other texts, the last {quoted(lines[-1].text)}"
+
+
+def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
+    if not criterion.json_queue:
+        sent = [Line(message.t, message.text) for message in recording.messages if message.sender == "robot"]
+        return judge_sequence(criterion, sent, _SEND, recording)
+    queue = []
+    for message in _queue(recording):
+        value = parsed(message.text)
+        value = value if criterion.path is None else at_path(value, criterion.path)
+        if value is not NOTHING:
+            queue.append(Line(message.delivered or 0.0, as_text(value)))
+    return judge_sequence(criterion, queue, _RECEIVE, recording)
+
+
+def _queue(recording: Recording) -> list[Message]:
+    """What joined the robot's queue, in order of arrival."""
+    return sorted(filter(_joined, recording.messages), key=lambda message: message.delivered or 0.0)
+
+
+def _joined(message: Message) -> bool:
+    """Whether it is an answer that joined the robot's queue."""
+    well_formed = message.text.startswith(JSON) and message.note != "malformed"
+    return message.sender == "responder" and message.delivered is not None and well_formed
+
+
+def _queue_grows(recording: Recording) -> Outcome:
+    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending."""
+    asked = [
+        (index, message)
+        for index, message in enumerate(recording.messages)
+        if message.sender == "robot" and message.text.startswith(PY) and message.delivered is not None
+    ]
+    expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
+    if not asked:
+        return failed(f"{expected}, but the robot sent no PY:: message.")
+    answers = Answers(recording)
+    replies = [(message, answers.to(index)) for index, message in asked]
+    arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
+    score = Fraction(len(arrivals), len(asked))
+    for message, reply in replies:
+        if reply is None or not _joined(reply):
+            happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
+            if reply is not None and reply.delivered is None and reply.note == "undelivered":
+                happened = "got its answer only after the program had ended"
+            return failed(
+                f"{expected}, but {quoted(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
+                message.t,
+                pose_at(recording, message.t),
+                score,
+            )
+    times = [arrived or 0.0 for arrived in arrivals]
+    if times != sorted(times):
+        return failed(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
+    return passed(
+        f"The robot's queue grew by one for each of {len(asked)} messages.", times[-1], pose_at(recording, times[-1])
+    )
+
+
+def _compares(criterion: Sequenced, text: str, wanted: str) -> bool:
+    fold = criterion.ignore_case
+    match criterion.compare:
+        case "equals":
+            return same_text(text, wanted, fold)
+        case "contains":
+            return _plain(wanted, fold) in _plain(text, fold)
+        case "starts_with":
+            return _plain(text, fold).startswith(_plain(wanted, fold))
+        case "matches":
+            return _matches(wanted, text, fold)
+
+
+def _matches(pattern: str, text: str, ignore_case: bool) -> bool:
+    return re.search(pattern, text[:LONGEST_MATCHED_TEXT], re.IGNORECASE if ignore_case else 0) is not None
+
+
+def _plain(text: str, ignore_case: bool) -> str:
+    plain = " ".join(text.split())
+    return plain.casefold() if ignore_case else plain

@@ -1,0 +1,89 @@
+"""Judging how long something took, and what a figure that another criterion measured is worth.
+
+All times are simulated: how fast the machine was makes no difference.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import CriterionResult, Evidence, Measure, TrialResult
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import spoken_until
+from sim.recording import Recording
+from submissions.criteria.timing import Ranking, Timing
+
+_STILL = 1e-6  # mm or degrees a tick
+
+
+def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    seconds, what = _seconds(criterion, recording)
+    least, most = criterion.between
+    measures = (Measure("time", seconds, "s"),)
+    if least - 1e-9 <= seconds <= most + 1e-9:
+        return passed(f"{what} took {seconds:.2f} s.", recording.end_t, recording.end, measures)
+    return failed(
+        f"Expected {what[0].lower()}{what[1:]} to take from {least:g} to {most:g} s, but it took {seconds:.2f} s.",
+        recording.end_t,
+        recording.end,
+        measures=measures,
+    )
+
+
+def judge_ranking(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
+    """What the figure of trial ``place`` is worth; nothing where the other criterion failed."""
+    evidence = next((each for each in other.evidence if each.trial == place), None) if other else None
+    measure = _measure(criterion, evidence)
+    if evidence is None or measure is None:
+        return failed(f"Expected a {criterion.measure}, but none was measured.")
+    unit = f" {measure.unit}" if measure.unit else ""
+    found = f"{criterion.measure}: {measure.value:.2f}{unit}"
+    if not evidence.passed:
+        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose, measures=(measure,))
+    share = _share(criterion, measure.value)
+    best = criterion.steps[0][0]
+    if share == 1:
+        return passed(f"The {found}.", evidence.t, evidence.pose, (measure,))
+    bound = "at least" if criterion.highest else "at most"
+    return failed(
+        f"The {found} is worth {float(share):.0%} of the marks; all are given for {bound} {best:g}{unit}.",
+        evidence.t,
+        evidence.pose,
+        share,
+        (measure,),
+    )
+
+
+def _share(criterion: Ranking, value: float) -> Fraction:
+    for limit, share in criterion.steps:
+        if (value >= limit - 1e-9) if criterion.highest else (value <= limit + 1e-9):
+            return Fraction(str(share))
+    return Fraction(0)
+
+
+def _measure(criterion: Ranking, evidence: Evidence | None) -> Measure | None:
+    measures = evidence.measures if evidence is not None else ()
+    return next((measure for measure in measures if measure.name == criterion.measure), None)
+
+
+def _seconds(criterion: Timing, recording: Recording) -> tuple[float, str]:
+    match criterion.of:
+        case "program":
+            return recording.end_t, "The program"
+        case "moving":
+            return _moving(recording), "The movement"
+        case "speech":
+            return max(spoken_until(recording.spoken), default=0.0), "The speech"
+
+
+def _moving(recording: Recording) -> float:
+    ticks = recording.ticks
+    if not len(ticks):
+        return 0.0
+    start = recording.start
+    columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
+    changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
+    return int(np.logical_or.reduce(changes).sum()) / 30

@@ -1,0 +1,41 @@
+"""Where and when in a grade something happened, and why a run ended early, in words for a student.
+
+What went wrong is said by the modules of the kinds.
+"""
+
+from __future__ import annotations
+
+from service.grading.grade import TrialResult
+from service.grading.judging.outcome import Outcome, cut, fault_words
+from sim.recording import Verdict
+from submissions.sweep import CONDITIONS
+
+
+def place_words(trial: TrialResult, t: float | None) -> str:
+    """``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
+    start = trial.recording.start
+    x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
+    words = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
+    if trial.light_noise:
+        words.append(f"with light noise {trial.light_noise:g}")
+    if trial.motor_noise:
+        words.append(f"with motor noise {trial.motor_noise:g}")
+    for condition, level in trial.sweep:
+        if condition in ("loss", "delay") and level:
+            about = CONDITIONS[condition]
+            words.append(f"with a {about.words} of {level:g}" + (f" {about.unit}" if condition == "delay" else ""))
+    if t is not None:
+        words.append(f"at {t:.2f} s")
+    return ", ".join(words)
+
+
+def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
+    """Why the run ended before its time, unless the outcome tells already."""
+    fault = cut(trial.recording)
+    if fault is None or (outcome is not None and fault_words(fault) in outcome.message):
+        return ""
+    if fault.verdict is Verdict.TIME_LIMIT:
+        if outcome is not None and "still running" in outcome.message:
+            return ""
+        return f" The program was still running when the time was up, at {fault.t:g} s."
+    return f" The run ended early, at {fault.t:.2f} s."

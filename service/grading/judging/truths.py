@@ -1,0 +1,108 @@
+"""What each picture shows: as the floor, its grey patch, the instructor's places or the assignment's list has it.
+
+Which pictures count, too; what was answered is none of this module's business.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from service.grading.grade import TrialResult
+from service.grading.judging.patches import decoded
+from service.grading.judging.places import part_at
+from sim.backgrounds import label_names
+from sim.recording import Pose, Recording
+from submissions.assignment import Assignment
+from submissions.criteria.classification import LabelledPlace, Recognition
+
+#: Stands for the truth of a picture that was never sent, where the assignment does not tell it.
+NO_PICTURE = "(no picture)"
+
+#: The number of a picture in its recording, and what it shows.
+Shown = tuple[int, str]
+
+
+def shown_in(
+    criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
+) -> Mapping[int, Sequence[Shown]]:
+    """For each trial (by its index in the grade) the pictures that count, in the order in which they were sent.
+
+    Pictures of floor that has no name show nothing to name, and do not count.
+    """
+    told = _told(criterion, assignment)
+    return {index: _counted(criterion, _known(criterion, trial, told)) for index, trial in trials}
+
+
+def missing_truth(criterion: Recognition, assignment: Assignment, trial: TrialResult) -> str:
+    """What a trial without a picture should have shown, where the assignment tells it."""
+    return _told(criterion, assignment).get((trial.scenario, trial.index), NO_PICTURE)
+
+
+def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[str]) -> tuple[str, ...]:
+    """All that can be named: as the criterion lists it, else what the floor, the truths and the aliases have."""
+    if criterion.labels:
+        return criterion.labels
+    # The instructor's own places have labels of their own; everything else may be what the floor has.
+    on_floor = () if criterion.truth == "places" else label_names(assignment.world.background)
+    listed = criterion.truth if isinstance(criterion.truth, tuple) else ()
+    placed = tuple(label for _, _, label in _places(criterion))
+    return tuple(dict.fromkeys([*on_floor, *listed, *placed, *truths, *criterion.aliases]))
+
+
+def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
+    match criterion.pictures:
+        case "first":
+            return known[:1]
+        case "last":
+            return known[-1:]
+        case "all":
+            return known
+
+
+def _known(criterion: Recognition, trial: TrialResult, told: Mapping[tuple[str, int], str]) -> list[Shown]:
+    recording = trial.recording
+    found: list[Shown] = []
+    for number, image in enumerate(recording.images):
+        if criterion.near_start is not None and _way_from_start(recording, image.pose) > criterion.near_start:
+            continue
+        truth: str | None
+        match criterion.truth:
+            case "label":
+                truth = image.truth
+            case "grey":
+                truth = decoded(image, recording.background, trial.light_noise)
+            case "places":
+                truth = _nearest(_places(criterion), part_at(recording, "left", image.pose), criterion.within)
+            case _:
+                truth = told.get((trial.scenario, trial.index))
+        if truth is not None:
+            found.append((number, truth))
+    return found
+
+
+def _way_from_start(recording: Recording, pose: Pose) -> float:
+    """How far the robot at ``pose`` is from where it started, mm."""
+    return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y))
+
+
+def _told(criterion: Recognition, assignment: Assignment) -> Mapping[tuple[str, int], str]:
+    """The label for the pose that each trial starts from, by scenario and index; empty if the criterion lists none."""
+    truths = criterion.truth
+    if not isinstance(truths, tuple):
+        return {}
+    return {
+        (trial.scenario.id, trial.index): truths[trial.place]
+        for trial in assignment.trials()
+        if trial.place < len(truths)
+    }
+
+
+def _places(criterion: Recognition) -> Sequence[LabelledPlace]:
+    """The instructor's places; a file's name has been replaced by its rows when the assignment was read."""
+    return () if isinstance(criterion.places, str) else criterion.places
+
+
+def _nearest(places: Sequence[LabelledPlace], where: tuple[float, float], within: float) -> str | None:
+    near = min(places, key=lambda place: math.dist(place[:2], where), default=None)
+    return near[2] if near is not None and math.dist(near[:2], where) <= within else None
