@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from models.intervals import wilson
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.answers import NOTHING, at_path, parsed, same_value
-from service.grading.judging.classification import NO_PICTURE, wilson
 from service.grading.judging.judge import judge
 from service.grading.judging.marks import Over, earned, share_of, share_of_accuracy
 from service.grading.judging.outcome import Outcome
+from service.grading.judging.truths import NO_PICTURE
 from sim.errors import HostError
 from sim.recording import Fault, Image, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 import report_builders as build
 from service.grading.grade import Accuracy, Confidence, CriterionResult, TrialResult
-from service.grading.judging.classification import NO_PICTURE
 from service.grading.judging.judge import judge
 from service.grading.judging.patches import decoded
 from service.grading.judging.per_class import class_scores
+from service.grading.judging.truths import NO_PICTURE
 from service.reports.audience import student_view
 from service.reports.recognition_table import recognition_tables
 from sim.backgrounds import SHAPES

@@ -14,8 +14,8 @@ from itertools import pairwise
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from models.intervals import wilson
 from service.grading.grade import Sight, TrialResult
-from service.grading.judging.classification import wilson
 from service.grading.judging.places import part_at
 from service.reports.curve_plot import Curve, draw_curve
 from service.reports.figure import (

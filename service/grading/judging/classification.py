@@ -16,6 +16,7 @@ from models.intervals import wilson
 from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Sight, TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.judging.labels import LabelFinder
+from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import by_pattern
 from service.grading.judging.tally import Fate, Reply, reply_to
@@ -23,24 +24,6 @@ from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, 
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
-
-__all__ = ["NO_PICTURE", "Classified", "Naming", "classify", "told", "wilson"]
-
-
-@dataclass(frozen=True, slots=True)
-class Naming:
-    """One picture that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
-
-    trial: int  # index into the grade's trials
-    image: Image | None
-    truth: str
-    answer: str | None
-    words: str  # what happened, for a sentence
-    confidence: float | None = None
-
-    @property
-    def right(self) -> bool:
-        return self.answer == self.truth
 
 
 @dataclass(frozen=True, slots=True)

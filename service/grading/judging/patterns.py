@@ -9,12 +9,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import listed
-
-if TYPE_CHECKING:
-    from service.grading.judging.classification import Naming
 
 How = Literal["first", "any", "majority"]
 

@@ -10,8 +10,9 @@ from dataclasses import replace
 from fractions import Fraction
 
 from service.grading.grade import AccuracyCurve, Counts, CriterionResult, TrialResult
-from service.grading.judging.classification import Classified, Naming, classify, told
+from service.grading.judging.classification import Classified, classify, told
 from service.grading.judging.marks import earned, share_of_accuracy, share_of_steps
+from service.grading.judging.naming import Naming
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, range_above, share_of_robustness
 from service.grading.judging.trial_words import early_end, place_words
 from submissions.assignment import Assignment

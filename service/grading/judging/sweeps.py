@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 
+from models.intervals import wilson
 from service.grading.grade import AccuracyCurve, Level, TrialResult
-from service.grading.judging.classification import Naming, wilson
+from service.grading.judging.naming import Naming
 from submissions.criteria.classification import Robustness
 from submissions.sweep import CONDITIONS
 
