@@ -23,6 +23,7 @@ from submissions.assignment_file import assignment_folder
         ("run x.py --seconds nan", "invalid value for '--seconds'"),
         ("grade x --format foo", "'foo' is not one of 'text', 'json', 'gradescope', 'junit'"),
         ("grade nothing-there -a echo-responder", "nothing-there: does not exist"),
+        ("run x.py --picture out.gif", "--picture out.gif: expected a name that ends in .png"),
         ("grade x -a /usr", "/usr: has no assignment.toml in it"),
         ("grade x -a echo-responder --report /proc/x", "the folder /proc/x cannot be used for reports"),
         (

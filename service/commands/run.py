@@ -83,6 +83,8 @@ def run(
     ] = False,
 ) -> None:
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise UsageError(f"--picture {picture}: expected a name that ends in .png")
     values = {
         "b": background,
         "r": robot_setup,

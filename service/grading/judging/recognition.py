@@ -119,7 +119,8 @@ def _robustness_words(criterion: Robustness, curve: AccuracyCurve) -> str:
     held = range_above(levels, criterion.level)
     if held is None:
         return f"{words} It is below {criterion.level:g} at the easiest level already."
-    return f"{words} It is at least {criterion.level:g} from {held[0].at:g} to {held[1].at:g} {about.unit}."
+    where = f"only at {held[0].at:g}" if held[0].at == held[1].at else f"from {held[0].at:g} to {held[1].at:g}"
+    return f"{words} It is at least {criterion.level:g} {where} {about.unit}."
 
 
 def _first_wrong(namings: Sequence[Naming], trials: dict[int, TrialResult]) -> str:
