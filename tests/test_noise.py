@@ -1,0 +1,101 @@
+"""Noise of light sensors and wheels: mean and spread as the original's formulas have them, and the same for a seed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from running import run_program
+from service.grading.rig import Rig
+from sim.camera import CachedCamera
+from sim.chance import Stream
+from sim.recording import Pose
+from sim.robot import LightSensor
+from sim.sensors import LightReader, Look
+from sim.world import Noise
+
+TICKS = 200
+AHEAD = "tank_drive.on_for_seconds(50, 50, 20)"
+BACK = "tank_drive.on_for_seconds(-50, -50, 20)"
+STILL = "tank_drive.on_for_seconds(0, 0, 20)"
+
+
+def expected_pixel(value: int, amplitude: float) -> tuple[float, float]:
+    """Mean and spread of clamp(round(value + U(-N, N)), 0, 255), computed from the formula."""
+    drawn = np.clip(np.floor(value + np.linspace(-amplitude, amplitude, 2_000_001) + 0.5), 0, 255)
+    return float(drawn.mean()), float(drawn.std())
+
+
+def pixels(value: int, amplitude: float, seed: int) -> np.ndarray:
+    """What a left sensor's 305 pixels read over a plain floor, shape (ticks, 305, 3)."""
+    camera = CachedCamera(np.full((1143, 2362, 3), value, np.uint8))
+    reader = LightReader(LightSensor(-20, 30), camera, amplitude, Stream(seed, "left light"))
+    where = Look(500, 500, 510, 633)
+    seen = [np.frombuffer(reader.image(where, tick), np.uint8).reshape(20, 20, 4) for tick in range(1, TICKS + 1)]
+    camera.close()
+    rows, columns = np.mgrid[0:20, 0:20]
+    inside = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
+    return np.stack([image[inside][:, :3] for image in seen])
+
+
+@pytest.mark.parametrize("amplitude", [10, 64, 128])
+@pytest.mark.parametrize("value", [0, 128, 255])
+def test_each_pixel_has_the_mean_and_the_spread_of_the_formula(value: int, amplitude: float) -> None:
+    drawn = pixels(value, amplitude, 3)
+    mean, spread = expected_pixel(value, amplitude)
+    of_the_mean = 5 * spread / math.sqrt(drawn.size)
+    assert drawn.mean() == pytest.approx(mean, abs=of_the_mean)
+    assert drawn.std() == pytest.approx(spread, rel=0.02)
+    if value != 128:
+        # The original's bias: 255 - N/4 on white, N/4 on black.
+        assert mean == pytest.approx(abs(value - amplitude / 4), abs=0.3)
+    assert drawn.mean(axis=(1, 2)).std() < spread / 15  # 915 draws a reading
+
+
+def test_light_noise_is_the_same_for_a_seed_and_another_for_another() -> None:
+    assert np.array_equal(pixels(128, 32, 3), pixels(128, 32, 3))
+    assert not np.array_equal(pixels(128, 32, 3), pixels(128, 32, 4))
+
+
+def speeds(rig: Rig, program: str, amplitude: float, seed: int = 1) -> np.ndarray:
+    """Degrees per second of the left wheel at each tick, after the first second."""
+    recording = run_program(rig, program, Pose(1100, 500, 0), noise=Noise(motor=amplitude), seed=seed, seconds=30)
+    return np.diff(recording.ticks.left_position)[30:590] * 30
+
+
+def wavering(amplitude: float, ticks: int) -> np.ndarray:
+    """The original's speed update: towards 525 by at most 27.8, noise, rounded and capped where positive."""
+    chance = np.random.default_rng(1).uniform(-amplitude, amplitude, ticks)
+    speed, most, drawn = 525.0, 5000 / 6 / 30, np.empty(ticks)
+    for tick in range(ticks):
+        speed += max(-most, min(most, 525 - speed))
+        noisy = speed + chance[tick]
+        if noisy >= 0:
+            speed = min(math.floor(noisy + 0.5), 1050)
+        drawn[tick] = speed
+    return drawn
+
+
+def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(rig: Rig) -> None:
+    """Seen in the original with W = 100 at 525 degrees a second: 262 to 732, 530 on the whole."""
+    drawn = np.concatenate([speeds(rig, AHEAD, 100, seed) for seed in range(20)])
+    formula = wavering(100, 100_000)
+    assert drawn.mean() == pytest.approx(formula.mean(), abs=20)
+    assert drawn.std() == pytest.approx(formula.std(), rel=0.15)
+    assert np.quantile(drawn, [0.02, 0.98]) == pytest.approx(np.quantile(formula, [0.02, 0.98]), abs=40)
+    fast = drawn[drawn > 100]  # a speed that has been negative is not whole
+    assert fast == pytest.approx(np.round(fast), abs=1e-6)
+
+
+def test_a_noisy_wheel_creeps_when_it_should_stand_and_is_exact_backwards(rig: Rig) -> None:
+    creeping = speeds(rig, STILL, 20)
+    assert creeping.min() >= 0
+    assert creeping.mean() > 1
+    assert speeds(rig, BACK, 100) == pytest.approx(speeds(rig, BACK, 0), abs=1e-6)
+
+
+def test_wheel_noise_is_the_same_for_a_seed_and_another_for_another(rig: Rig) -> None:
+    assert np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50))
+    assert not np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50, seed=2))
