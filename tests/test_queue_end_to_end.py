@@ -16,6 +16,7 @@ from sqlalchemy import func, select
 
 from builders import comparable, hand_in, settings_in
 from databases import fresh_database
+from processes import command_line, descendants
 from service.commands.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.rig import Rig
@@ -111,14 +112,6 @@ def _pool_children(worker: int) -> list[int]:
     return [int(pid) for pid in pids if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
-def _descendants(pid: int) -> list[int]:
-    try:
-        children = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except FileNotFoundError:
-        return []
-    return children + [below for child in children for below in _descendants(child)]
-
-
 def _spinning(count: int) -> list[HandIn]:
     return [hand_in(f"spinner-{number}", SPIN) for number in range(count)]
 
@@ -184,7 +177,7 @@ def test_a_killed_broker_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(1) + [hand_in(f"quick-{number}") for number in range(4)])
     service.until_running(batch)
     (broker,) = [
-        pid for pid in _descendants(os.getpid()) if b"valkey-server" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        pid for pid in descendants(os.getpid()) if b"valkey-server" in Path(f"/proc/{pid}/cmdline").read_bytes()
     ]
     os.kill(broker, signal.SIGKILL)
     service.wait(batch)
@@ -226,8 +219,9 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
 
 
 def _has_student(pool_child: int) -> bool:
-    """Whether a student's process runs below this pool child: a zygote has a child."""
-    return any(_descendants(zygote) for zygote in _descendants(pool_child))
+    """Whether a student's process runs below this pool child: some zygote, in bubblewrap or not, has a child."""
+    below = [(pid, command_line(pid)) for pid in descendants(pool_child)]
+    return any(descendants(pid) for pid, command in below if "inside.zygote" in command and "bwrap" not in command)
 
 
 def test_a_cancelled_job_stops(service: Service) -> None:
