@@ -49,13 +49,12 @@ class Arena:
         blocks = walls() | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
         self._blocks = [(name, box, self._add_block(box)) for name, box in blocks.items()]
         self._bodies: dict[str, int] = {}
-        self._motions: dict[tuple[str, Physics], FreeMotion | SolidMotion | RigidWheels] = {}
+        self._motions: dict[tuple[str, Physics], Motion] = {}
 
     def close(self) -> None:
         self._client.close()
         for motion in self._motions.values():
-            if not isinstance(motion, FreeMotion):
-                motion.close()
+            motion.close()
 
     def motion(self, robot: Robot, physics: Physics, x: float, y: float, heading: float) -> Motion:
         """What moves ``robot`` from this pose on, among these walls and obstacles; heading in radians.
@@ -68,7 +67,7 @@ class Arena:
         self._motions[key].place(x, y, heading)
         return self._motions[key]
 
-    def _make_motion(self, robot: Robot, physics: Physics) -> FreeMotion | SolidMotion | RigidWheels:
+    def _make_motion(self, robot: Robot, physics: Physics) -> Motion:
         if physics.drive == "wheels":
             return RigidWheels(robot, (*walls().values(), *self.obstacles) if physics.solid else ())
         return SolidMotion(robot, self.obstacles) if physics.solid else FreeMotion(robot)

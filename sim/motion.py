@@ -30,6 +30,10 @@ class Motion(Protocol):
         """Begin at a pose."""
         ...
 
+    def close(self) -> None:
+        """Give back what it holds."""
+        ...
+
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """The new x and y, and by how many radians it turned; ``left`` and ``right`` are mm rolled by the wheels."""
         ...
@@ -52,6 +56,9 @@ class FreeMotion:
 
     def __init__(self, robot: Robot) -> None:
         self._spacing = robot.wheel_spacing
+
+    def close(self) -> None:
+        """It holds nothing."""
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Nothing is remembered from tick to tick."""

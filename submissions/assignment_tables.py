@@ -16,11 +16,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 from pydantic_core import ErrorDetails
 
 from sim.backgrounds import OBSTACLE_PRESETS
+from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
-Rectangle = tuple[float, float, float, float]
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 

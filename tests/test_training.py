@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from service.grading.grade import Grade
-from service.grading.grader import check_parts, grade
+from service.grading.grader import grade
 from service.grading.judging.collecting import pairs
 from service.grading.rig import Rig
 from sim.errors import UsageError
@@ -129,10 +129,10 @@ def test_unseen_images_do_not_come_in_the_order_of_the_track(rig: Rig, training:
     assert neighbours < 10
 
 
-def test_a_notebook_is_no_function_that_trains(training: Assignment) -> None:
+def test_a_notebook_is_no_function_that_trains(rig: Rig, training: Assignment) -> None:
     notebook = Notebook("work.ipynb", (Cell(1, "def train(images, labels): pass"),))
     with pytest.raises(UsageError, match=r"work.ipynb: is a notebook, expected responder.py with a function train"):
-        check_parts(Submission("s", notebook=notebook), training)
+        grade(Submission("s", notebook=notebook), training, rig=rig)
 
 
 def collected(rig: Rig, name: str) -> Recording:

@@ -90,12 +90,6 @@ def example_names(name_or_path: str) -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (name != REFERENCE, name)))
 
 
-def check_example(name_or_path: str, name: str, *, rig: Rig) -> ExampleResult:
-    """Grade one example and say what is not as expected."""
-    wanted = expected(name_or_path).examples.get(name)
-    return _check_example(name_or_path, name, find_assignment(name_or_path), wanted, rig)[0]
-
-
 def _check_example(
     name_or_path: str, name: str, assignment: Assignment, wanted: Expectation | None, rig: Rig
 ) -> tuple[ExampleResult, Grade | None]:

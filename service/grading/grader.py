@@ -130,11 +130,6 @@ def _cell_notes(parts: _Parts, results: Sequence[TrialResult]) -> tuple[str, ...
     return next(visible, ()) if parts.notebook is not None else ()
 
 
-def check_parts(submission: Submission, assignment: Assignment) -> None:
-    """Raise UsageError, naming it, when a part is missing that the assignment asks for."""
-    _parts(submission, assignment)
-
-
 def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
     """What is looked at without driving; of a notebook what is no robot program stands for the responder."""
     responder = parts.responder

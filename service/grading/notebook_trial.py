@@ -14,12 +14,11 @@ from responders.notebook_process import NotebookOrder
 from responders.sandbox.running_child import ChildLimits
 from service.grading.notebook_stage import NotebookStage, Program, UnmarkedRuns, program_order
 from service.grading.rig import Rig
+from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
 from submissions.magics import Flags, Setup
 from submissions.marked_cell import LAST, Site, marked_site
 from submissions.submission import Notebook
-
-Rectangle = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
