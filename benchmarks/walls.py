@@ -18,7 +18,8 @@ from benchmarks.measurement import Measurement
 from responders import wire
 from responders.sandbox.inside import grants, lockdown
 from responders.sandbox.manager import Role, Sandboxes
-from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
+from responders.sandbox.meter import ChildStopped
+from responders.sandbox.running_child import Child, ChildLimits
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder": ChildLimits(2, 512 << 20)}
 _SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
@@ -133,7 +134,7 @@ def _turns(sandboxes: Sandboxes) -> list[float]:
 def _echo(sandboxes: Sandboxes) -> Child:
     child = _spawn(sandboxes, "responder")
     _start(child, "responder", _ECHO)
-    while child.receive(wire.RESPONDER, lambda: None)["do"] != "ready":
+    while child.receive(wire.RESPONDER)["do"] != "ready":
         pass
     return child
 
@@ -145,7 +146,7 @@ def _start(child: Child, role: Role, text: str) -> None:
 
 def _turn(child: Child) -> None:
     child.send({"do": "message", "t": 0, "text": "hello"})
-    child.receive(wire.RESPONDER, lambda: None)
+    child.receive(wire.RESPONDER)
 
 
 def _lockdown_alone() -> float:
@@ -187,7 +188,7 @@ def _run_to_its_end(sandboxes: Sandboxes, text: str, limits: ChildLimits) -> Non
     _start(child, "robot", text)
     try:
         while True:
-            child.receive(wire.ROBOT, lambda: None)
+            child.receive(wire.ROBOT)
     except ChildStopped:
         child.close()
 
@@ -209,7 +210,7 @@ def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
     _start(child, "robot", _FLOOD)
     heard = 0
     while heard <= _OUTPUT:
-        heard += len(child.receive(wire.ROBOT, lambda: None)["text"]) + 1
+        heard += len(child.receive(wire.ROBOT)["text"]) + 1
     child.close()
     with (folder / "count").open("rb") as file, mmap.mmap(file.fileno(), 8, prot=mmap.PROT_READ) as count:
         return int.from_bytes(count[:], "little") - _OUTPUT

@@ -7,14 +7,15 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, Responder, ResponderOrder, error_fault, refusal
-from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
+from responders.conversation import Code, Collected, Conversation, Responder, ResponderOrder
+from responders.faults import error_fault, refusal, stopped, surprise
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.running_child import Child, ChildLimits
 from sim.arena import Arena
 from sim.backgrounds import Floor
 from sim.camera import LightCamera
@@ -80,15 +81,15 @@ class Bridge:
         camera: LightCamera,
         child: Child,
         responder: Responder | None,
-        pulse: Callable[[], None],
+        meter: JobMeter,
     ) -> None:
         self._order = order
         self._child = child
-        self._pulse = pulse
+        self._meter = meter
         self.now = 0
         self.chain = Chain()
         self.world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, self.chain, order.physics)
-        self.conversation = Conversation(order.channel, order.seed, self.chain, responder)
+        self.conversation = Conversation(order.channel, order.seed, self.chain, responder, meter)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
@@ -96,7 +97,7 @@ class Bridge:
         self.notes: list[str] = []
         self._limit = round(order.seconds * SECOND)
         self._said_until = 0
-        self._arrived: list[Any] = []
+        self._arrived: list[str] = []
         self._free_acts = 0
         self._values: dict[str, Any] = {}
         self._encoded: dict[str, bytes] = {}
@@ -108,31 +109,33 @@ class Bridge:
 
     def run(self) -> Fault | None:
         """Serve the program until it ends. What cut it short or went wrong, if anything."""
-        order = self._order
         try:
-            self._child.send(
-                {
-                    "name": order.program.code.name,
-                    "text": order.program.code.text,
-                    "preamble": order.program.preamble,
-                    "seed": Stream(order.seed, "program").integer(0),
-                }
-            )
-            while True:
-                frame = self._child.receive(wire.ROBOT, self._pulse)
-                if frame["do"] == "end":
-                    return None if frame["error"] is None else error_fault(frame["error"], self.now, "program")
-                self._serve(frame)
+            return self._run()
         except ChildStopped as stop:
-            return Fault(
-                self.now / SECOND,
-                stop.verdict,
-                "program",
-                f"the program was stopped: {stop.message}",
-                stop.line,
-            )
+            return self._stopped(stop)
         except _Cut as cut:
             return cut.fault
+        except Exception as error:
+            return self._stopped(surprise(error))
+
+    def _run(self) -> Fault | None:
+        order = self._order
+        self._child.send(
+            {
+                "name": order.program.code.name,
+                "text": order.program.code.text,
+                "preamble": order.program.preamble,
+                "seed": Stream(order.seed, "program").integer(0),
+            }
+        )
+        while True:
+            frame = self._child.receive(wire.ROBOT)
+            if frame["do"] == "end":
+                return None if frame["error"] is None else error_fault(frame["error"], self.now, "program")
+            self._serve(frame)
+
+    def _stopped(self, stop: ChildStopped) -> Fault:
+        return stopped(stop, "program", self.now)
 
     def collected(self) -> Collected:
         """What the program has logged since this was last asked, data and images."""
@@ -210,7 +213,7 @@ class Bridge:
             self.world.tick()
             due += TICK
             if self.world.clock % 3000 == 0:
-                self._pulse()
+                self._meter.pulse()
         if end > self._limit:
             self.now = self._limit
             sentence = f"the program was still running after {self._order.seconds:g} seconds of simulated time"
@@ -291,10 +294,7 @@ class Bridge:
 
     def _print(self, text: str) -> None:
         self._free_act()
-        self._output_left -= len(text.encode()) + 1
-        if self._output_left < 0:
-            sentence = f"the program printed more than {self._order.program.output_bytes} bytes"
-            raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
+        self._spend(len(text.encode()) + 1, "printed")
         self.chain.add("print", self.now, text.encode())
         kind = messages.kind(text)
         if kind == "log image":
@@ -308,9 +308,11 @@ class Bridge:
 
     def _send_image(self) -> None:
         left, right = self.world.images()
-        self._output_left -= len(left) + len(right)
+        self._spend(len(left) + len(right), "sent images of")
         where = self.world.left_look
-        number = self.conversation.send(messages.image_message(left, right), self.now)
+        text = messages.image_message(left, right)
+        self._meter.keep(len(text) + len(left) + len(right))
+        number = self.conversation.send(text, self.now)
         self.images.append(
             Image(
                 self.now / SECOND,
@@ -330,18 +332,27 @@ class Bridge:
         self.printed.append(Line(self.now / SECOND, f"{word} image data logged..."))
         images = dict(zip(("left", "right"), self.world.images(), strict=True))
         for side in sides:
-            self._output_left -= len(images[side])
+            self._spend(len(images[side]), "logged images of")
             self.chain.add("image", self.now, images[side])
-            self.image_log.append((side, messages.csv(images[side]), self.world.clock))
+            pixels = messages.csv(images[side])
+            self._meter.keep(len(pixels))
+            self.image_log.append((side, pixels, self.world.clock))
 
     def _say(self, text: str) -> None:
         """Utterances queue up; each lasts as long as its words at 130 a minute."""
         self._free_act()
-        self._output_left -= len(text.encode())
+        self._spend(len(text.encode()) + 1, "said")
         self.chain.add("say", self.now, text.encode())
         self.spoken.append(Line(self.now / SECOND, text))
         length = len(text.split()) * 60 * SECOND // _WORDS_A_MINUTE
         self._said_until = max(self._said_until, self.now) + length
+
+    def _spend(self, size: int, did: str) -> None:
+        """Count what the program says, before it is kept; beyond its limit the trial ends."""
+        self._output_left -= size
+        if self._output_left < 0:
+            sentence = f"the program {did} more than {self._order.program.output_bytes} bytes"
+            raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
 
     def _free_act(self) -> None:
         self._free_acts += 1

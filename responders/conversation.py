@@ -5,20 +5,24 @@ It keeps the messages of one trial and asks the responder's process for answers;
 
 from __future__ import annotations
 
-import errno
 import heapq
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from responders import messages, wire
 from responders.channel import Channel, Line
+from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.running_child import Child, ChildLimits
 from sim.chance import Stream
 from sim.recording import SECOND, Call, Fault, Message, Verdict
 from sim.world import Chain
+
+_MOST_NOTES = 200
+#: Of the calls that are shown, and of the characters of each of their parts.
+_MOST_CALLS, _MOST_SHOWN = 10_000, 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +64,8 @@ class Responder:
 
     _schema = wire.RESPONDER
 
-    def __init__(
-        self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, pulse: Callable[[], None]
-    ) -> None:
+    def __init__(self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
         self._order = order
-        self._pulse = pulse
         self._folder = folder
         self.output: list[str] = []
         self._output_left = order.output_bytes
@@ -74,7 +75,7 @@ class Responder:
         self.collected: Callable[[], Collected] = _nothing_collected
         for name, data in order.files.items():
             (folder / name).write_bytes(data)
-        self._child: Child | None = sandboxes.spawn("responder", order.limits, folder)
+        self._child: Child | None = sandboxes.spawn("responder", order.limits, folder, meter)
         self.walls = self._child.walls
         self._seed = seed
 
@@ -93,6 +94,8 @@ class Responder:
             frame = self._until("ready", -1, [])
         except ChildStopped as stop:
             return self._stopped(stop, 0)
+        except Exception as error:
+            return self._stopped(surprise(error), 0)
         if frame["error"] is not None:
             self.close()
             return error_fault(frame["error"], 0, "responder")
@@ -115,6 +118,8 @@ class Responder:
             self._spend(said, "printed and answered")
         except ChildStopped as stop:
             return None, 0, self._stopped(stop, t)
+        except Exception as error:
+            return None, 0, self._stopped(surprise(error), t)
         answered = t + sum(slept)
         if frame["kind"] == "text":
             return frame["text"], sum(slept), None
@@ -123,7 +128,7 @@ class Responder:
         what = (
             f"an answer of {frame['length']} characters; the most is about 60000"
             if frame["kind"] == "long"
-            else f"{frame['type']} instead of a text; an answer has to be a str"
+            else f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
         )
         sentence = f"the responder returned {what}"
         return None, 0, Fault(answered / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence)
@@ -136,7 +141,7 @@ class Responder:
     def _until(self, last: str, message: int, slept: list[int]) -> wire.Frame:
         assert self._child is not None
         while True:
-            frame = self._child.receive(self._schema, self._pulse)
+            frame = self._child.receive(self._schema)
             if frame["do"] == last:
                 return frame
             self._take(frame, message, slept)
@@ -172,18 +177,19 @@ class Responder:
 
     def _stopped(self, stop: ChildStopped, t: int) -> Fault:
         self.close()
-        verdict = Verdict.RESPONDER_ERROR if stop.verdict is Verdict.PROGRAM_ERROR else stop.verdict
-        return Fault(t / SECOND, verdict, "responder", f"the responder was stopped: {stop.message}", stop.line)
+        return stopped(stop, "responder", t)
 
 
 class Conversation:
     """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: Chain, responder: Responder | None) -> None:
+    def __init__(self, channel: Channel, seed: int, chain: Chain, responder: Responder | None, meter: JobMeter) -> None:
+        self._meter = meter
         self._line = Line(channel, seed)
         self._chain = chain
         self._responder = responder
         self._under_way: list[tuple[int, int, int]] = []  # due, order, index of the message
+        self._queued: dict[int, str] = {}  # by index of the message: what joins the robot's queue, as JSON
         self._texts = 0
         self.messages: list[Message] = []
         self.faults: list[Fault] = []
@@ -208,15 +214,15 @@ class Conversation:
             self._answer(text, now, index, number, copy)
         return index
 
-    def deliver(self, now: int) -> list[Any]:
-        """Everything due at the tick at ``now``, in order; the objects that join the robot's queue."""
+    def deliver(self, now: int) -> list[str]:
+        """Everything due at the tick at ``now``, in order; what joins the robot's queue of it, as JSON."""
         arrived = []
         while self._under_way and self._under_way[0][0] <= now:
             _, _, index = heapq.heappop(self._under_way)
             message = self.messages[index] = replace(self.messages[index], delivered=now / SECOND)
             self._chain.add("answer", now, message.text.encode())
-            if message.text.startswith(messages.JSON) and message.note != "malformed":
-                arrived.append(messages.parsed_answer(message.text))
+            if index in self._queued:
+                arrived.append(self._queued.pop(index))
         return arrived
 
     def finish(self) -> None:
@@ -224,17 +230,20 @@ class Conversation:
         for _, _, index in self._under_way:
             self.messages[index] = replace(self.messages[index], note="undelivered")
         self._under_way.clear()
+        self._queued.clear()
 
     def _answer(self, text: str, now: int, question: int, number: int, copy: int) -> None:
-        answer: str | None = f"pingpong {text}"
-        slept, fault = 0, None
-        if self._responder is not None:
+        answer: str | None
+        if self._responder is None:
+            answer, slept, fault = f"pingpong {text}", 0, None
+            self._meter.keep(len(answer))
+        else:
             answer, slept, fault = self._responder.answer(text, now, question)
         if fault is not None:
             self.faults.append(fault)
         if answer is None:
             return
-        note = self._malformed(answer, now + slept)
+        queued, note = self._queue_entry(answer, now + slept)
         t = (now + slept) / SECOND
         arrivals = self._line.arrivals(number, copy, now, slept)
         if not arrivals:
@@ -244,50 +253,19 @@ class Conversation:
             self.messages.append(
                 Message(t, "responder", answer, None, question, note or ("duplicated" if place else ""))
             )
+            if queued is not None:
+                self._queued[index] = queued
             heapq.heappush(self._under_way, (due, index, index))
 
-    def _malformed(self, answer: str, now: int) -> str:
+    def _queue_entry(self, answer: str, now: int) -> tuple[str | None, str]:
+        """What joins the robot's queue when the answer arrives, if anything does; and a note if it is malformed."""
         if not answer.startswith(messages.JSON):
-            return ""
+            return None, ""
         try:
-            messages.parsed_answer(answer)
+            entry = messages.queue_entry(answer)
         except ValueError as error:
             sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
             self.faults.append(Fault(now / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence))
-            return "malformed"
-        return ""
-
-
-_MOST_NOTES = 200
-#: Of the calls that are shown, and of the characters of each of their parts.
-_MOST_CALLS, _MOST_SHOWN = 10_000, 200
-_PYTHON_2 = (
-    "Missing parentheses in call to",
-    "leading zeros in decimal integer literals",
-    "multiple exception types must be parenthesized",
-)
-
-
-def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
-    """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
-    out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
-    if error["type"] == "MemoryError" or out_of_memory:
-        sentence = f"the {who} asked for more memory than it may have"
-        return Fault(now / SECOND, Verdict.MEMORY_LIMIT, _who(who), sentence, error["line"])
-    verdict = Verdict.RESPONDER_ERROR if who == "responder" else Verdict.PROGRAM_ERROR
-    words = error["text"]
-    sentence = f"{error['type']}: {words}" if words else str(error["type"])
-    hint = ""
-    if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
-        hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
-    return Fault(now / SECOND, verdict, _who(who), sentence, error["line"], hint)
-
-
-def refusal(who: str, frame: wire.Frame) -> str:
-    """What the walls refused, as a sentence for the report."""
-    where = f"line {frame['line']} of the {who}" if frame["line"] is not None else f"the {who}"
-    return f"{where}: {frame['what'][:200]}"
-
-
-def _who(who: str) -> Any:
-    return "responder" if who == "responder" else "program"
+            return None, "malformed"
+        self._meter.keep(len(entry))
+        return entry, ""

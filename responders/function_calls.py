@@ -7,15 +7,17 @@ is judged elsewhere.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderOrder, error_fault
+from responders.conversation import Code, Responder, ResponderOrder
+from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.running_child import ChildLimits, ChildStopped
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.running_child import ChildLimits
 from sim.recording import Fault, Verdict
 
 #: Tells the child that no function of the module has to be a responder.
@@ -61,15 +63,17 @@ def call_functions(
     output_bytes: int,
     sandboxes: Sandboxes,
     seed: int,
-    pulse: Callable[[], None] = lambda: None,
+    meter: JobMeter,
 ) -> Called:
     """Load ``code`` with ``files`` in its folder, and make the calls. ``limits`` are for all of them together.
+
+    ``meter`` counts what their job costs.
 
     Raises HostError when the machine, not the module, fails.
     """
     with sandboxes.private_folder() as folder:
         order = ResponderOrder(code, files, limits, output_bytes, _NO_RESPONDER)
-        caller = _Caller(order, sandboxes, folder, seed, pulse)
+        caller = _Caller(order, sandboxes, folder, seed, meter)
         try:
             walls = caller.walls
             fault = caller.load()
@@ -84,10 +88,8 @@ class _Caller(Responder):
 
     _schema = wire.CALLS
 
-    def __init__(
-        self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, pulse: Callable[[], None]
-    ) -> None:
-        super().__init__(order, sandboxes, folder, seed, pulse)
+    def __init__(self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
+        super().__init__(order, sandboxes, folder, seed, meter)
         assert self._child is not None
         self.walls = self._child.walls
         self._ended: Fault | None = None
@@ -104,10 +106,12 @@ class _Caller(Responder):
             needed = _NEEDED.get(frame["kind"])
             if needed is not None and needed not in frame:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the process sent a value without its content")
+            return _read(frame, call.function)
         except ChildStopped as stop:
             self._ended = self._stopped(stop, 0)
-            return Returned(fault=self._ended)
-        return _read(frame, call.function)
+        except Exception as error:
+            self._ended = self._stopped(surprise(error), 0)
+        return Returned(fault=self._ended)
 
 
 def _read(frame: wire.Frame, function: str) -> Returned:

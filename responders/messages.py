@@ -98,3 +98,11 @@ def parsed_answer(text: str) -> Any:
         raise ValueError(f"{error.msg} at character {error.pos + 1}") from None
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def queue_entry(text: str) -> str:
+    """The same object as JSON for the robot's queue, as short as the answer. Raises ValueError as ``parsed_answer``."""
+    try:
+        return json.dumps(parsed_answer(text), separators=(",", ":"), ensure_ascii=False)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None

@@ -13,6 +13,7 @@ from responders import wire
 from responders.bridge import Bridge, TrialOrder
 from responders.notebook_process import NotebookOrder, NotebookProcess
 from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import JobMeter
 from responders.trial import MOST_NOTES, read_log, recording_of
 from sim.arena import Arena
 from sim.camera import LightCamera
@@ -101,23 +102,20 @@ class Played:
         )
 
 
-def play_notebook(
-    order: NotebookOrder, stage: Stage, ground: Ground, sandboxes: Sandboxes, pulse: Callable[[], None]
-) -> Played:
-    """Play the notebook in a fresh process and folder.
+def play_notebook(order: NotebookOrder, stage: Stage, ground: Ground, sandboxes: Sandboxes, meter: JobMeter) -> Played:
+    """Play the notebook in a fresh process and folder; ``meter`` counts what its job costs.
 
-    ``pulse`` is called several times a second of real time and may raise to stop the play.
     Raises HostError when the machine, not the student, fails.
     """
     with sandboxes.private_folder() as folder:
-        process = NotebookProcess(order, sandboxes, folder, pulse)
+        process = NotebookProcess(order, sandboxes, folder, meter)
         try:
-            play = _Play(process, stage, ground, sandboxes, pulse)
+            play = _Play(process, stage, ground, sandboxes, meter)
             process.play(play.perform)
             play.finish()
         finally:
             process.close()
-        log = read_log(folder)
+        log, unread = read_log(folder, meter)
     return Played(
         tuple(play.runs),
         "\n".join(process.output),
@@ -125,7 +123,7 @@ def play_notebook(
         tuple(process.notes),
         process.walls,
         tuple(process.raised),
-        process.stopped,
+        process.stopped or unread,
     )
 
 
@@ -159,13 +157,13 @@ class _Play:
         stage: Stage,
         ground: Ground,
         sandboxes: Sandboxes,
-        pulse: Callable[[], None],
+        meter: JobMeter,
     ) -> None:
         self._process = process
         self._stage = stage
         self._ground = ground
         self._sandboxes = sandboxes
-        self._pulse = pulse
+        self._meter = meter
         self._unmarked_cpu = self._unmarked_seconds = 0.0
         self.runs: list[Run] = []
 
@@ -207,9 +205,9 @@ class _Play:
         answers = order.collaborative and (process.missing is None or staged.needs_responder)
         first_call = len(process.calls)
         arena, camera = self._ground(order, staged.obstacles)
-        program = self._sandboxes.spawn("robot", order.program.limits)
+        program = self._sandboxes.spawn("robot", order.program.limits, meter=self._meter)
         try:
-            bridge = Bridge(order, arena, camera, program, process if answers else None, self._pulse)
+            bridge = Bridge(order, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()
             if not staged.marked:
                 self._unmarked_cpu += program.cpu_seconds()

@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderOrder, error_fault
+from responders.conversation import Code, Responder, ResponderOrder
+from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.running_child import ChildLimits, ChildStopped
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.running_child import ChildLimits
 from sim.chance import Stream
 from sim.recording import Fault, Verdict
 
@@ -39,9 +41,9 @@ class NotebookProcess(Responder):
 
     _schema = wire.NOTEBOOK
 
-    def __init__(self, order: NotebookOrder, sandboxes: Sandboxes, folder: Path, pulse: Callable[[], None]) -> None:
+    def __init__(self, order: NotebookOrder, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
         parts = ResponderOrder(Code(order.name, ""), order.files, order.limits, order.output_bytes)
-        super().__init__(parts, sandboxes, folder, order.seed, pulse)
+        super().__init__(parts, sandboxes, folder, order.seed, meter)
         self._notebook = order
         self._first_lines = [1]
         for source in order.cells:
@@ -68,7 +70,7 @@ class NotebookProcess(Responder):
                 }
             )
             while True:
-                frame = self._child.receive(self._schema, self._pulse)
+                frame = self._child.receive(self._schema)
                 if frame["do"] == "played":
                     self.missing = frame["missing"]
                     return
@@ -77,6 +79,8 @@ class NotebookProcess(Responder):
                     return
         except ChildStopped as stop:
             self._stopped(stop, 0)
+        except Exception as error:
+            self._stopped(surprise(error), 0)
 
     def placed(self, fault: Fault) -> Fault:
         """A fault of the process with the cell, and the line in it, where that is known."""

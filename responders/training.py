@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned, call_functions
 from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from sim.recording import Fault, Verdict
 
@@ -52,7 +53,7 @@ class Trained:
     model: str = ""  # the type of what was trained
 
 
-def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, pulse: Callable[[], None] = lambda: None) -> Trained:
+def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, meter: JobMeter) -> Trained:
     """One child: the student's module is loaded, trained, and asked. The limits are for all of it together.
 
     Raises HostError when the machine, not the student, fails.
@@ -70,7 +71,7 @@ def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, pulse: Callable[[
         order.output_bytes,
         sandboxes,
         order.seed,
-        pulse,
+        meter,
     )
     return _trained(called, chunks, order)
 

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from responders import messages
 from responders.bridge import Bridge, TrialOrder
 from responders.conversation import Responder
+from responders.faults import stopped
 from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict
@@ -29,31 +30,30 @@ def run_trial(
     arena: Arena,
     camera: LightCamera,
     sandboxes: Sandboxes,
-    pulse: Callable[[], None] = lambda: None,
+    meter: JobMeter,
 ) -> Recording:
-    """One run of a program from start to end, in fresh children.
+    """One run of a program from start to end, in fresh children; ``meter`` counts what their job costs.
 
-    ``pulse`` is called several times a second of real time and may raise to stop the trial.
     Raises HostError when the machine, not the student, fails.
     """
     with sandboxes.private_folder() as folder:
         responder = None
         if order.responder is not None:
-            responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
+            responder = Responder(order.responder, sandboxes, folder, order.seed, meter)
         try:
-            program = sandboxes.spawn("robot", order.program.limits)
+            program = sandboxes.spawn("robot", order.program.limits, meter=meter)
             try:
                 unloadable = responder.load() if responder is not None else None
-                bridge = Bridge(order, arena, camera, program, responder, pulse)
+                bridge = Bridge(order, arena, camera, program, responder, meter)
                 fault = bridge.run()
             finally:
                 program.close()
         finally:
             if responder is not None:
                 responder.close()
-        log = read_log(folder) if responder is not None else ""
+        log, unread = read_log(folder, meter) if responder is not None else ("", None)
     bridge.conversation.finish()
-    faults = [*([unloadable] if unloadable else []), *bridge.conversation.faults, *([fault] if fault else [])]
+    faults = [each for each in (unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
     faults.sort(key=lambda each: each.t)
     recording = recording_of(order, bridge, tuple(faults), program.walls)
     if responder is None:
@@ -97,16 +97,21 @@ def recording_of(order: TrialOrder, bridge: Bridge, faults: tuple[Fault, ...], w
     )
 
 
-def read_log(folder: Path) -> str:
-    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped."""
+def read_log(folder: Path, meter: JobMeter) -> tuple[str, Fault | None]:
+    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped and paid for."""
     directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
     except OSError:
-        return ""
+        return "", None
     finally:
         os.close(directory)
     with os.fdopen(fd, "rb") as file:
         if not stat.S_ISREG(os.fstat(fd).st_mode):
-            return ""
-        return file.read(_LOG_BYTES).decode("utf-8", "replace")
+            return "", None
+        data = file.read(_LOG_BYTES)
+    try:
+        meter.keep(len(data))
+    except ChildStopped as stop:
+        return "", stopped(stop, "responder", 0)
+    return data.decode("utf-8", "replace"), None

@@ -171,6 +171,7 @@ class Fault:
     line: int | None = None
     hint: str = ""
     cell: int | None = None
+    staff: str = ""  # what our own code stumbled over, for staff to look at
 
     @property
     def place(self) -> str:

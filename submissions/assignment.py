@@ -91,13 +91,23 @@ class Training:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a trial may use, for each child: CPU seconds, MB, bytes of output."""
+    """What a trial may use, for each child: CPU seconds, MB, bytes of output; and all trials of a submission together.
+
+    ``all_cpu`` is, where none is given, enough for ten trials at their limits and a second for each.
+    """
 
     program_cpu: float = 5.0
     responder_cpu: float = 10.0
     program_memory_mb: int = 128
     responder_memory_mb: int = 512
     output_bytes: int = 1_000_000
+    all_cpu: float | None = None
+    all_sleep: float = 20.0  # seconds of real time in which a process does nothing; half a second of each is free
+    all_output_mb: int = 64  # of what is kept: texts, messages, images, calls
+
+    def all_cpu_of(self, trials: int) -> float:
+        """CPU seconds for ``trials`` trials together."""
+        return self.all_cpu if self.all_cpu is not None else 10 * (self.program_cpu + self.responder_cpu) + trials
 
 
 @dataclass(frozen=True, slots=True)

@@ -178,6 +178,9 @@ class LimitsTable(Table):
     program_memory_mb: int = Field(default=128, ge=64, le=4096)
     responder_memory_mb: int = Field(default=512, ge=64, le=4096)
     output_bytes: int = Field(default=1_000_000, ge=1000, le=50_000_000)
+    all_cpu: float | None = Field(default=None, gt=0, le=3600)
+    all_sleep: float = Field(default=20.0, ge=1, le=600)
+    all_output_mb: int = Field(default=64, ge=1, le=1024)
 
 
 @dataclass(frozen=True, slots=True)

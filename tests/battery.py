@@ -21,7 +21,8 @@ from filter_machine import listed
 from responders import wire
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import NONE, Role, Sandboxes, Walls
-from responders.sandbox.running_child import ChildLimits, ChildStopped
+from responders.sandbox.meter import ChildStopped
+from responders.sandbox.running_child import ChildLimits
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
@@ -214,7 +215,7 @@ def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple
         job = {"name": f"{role}.py", "text": text, "seed": 1}
         child.send(job | ({"preamble": "none"} if role == "robot" else {"function": None}))
         while True:
-            frame = child.receive(SCHEMAS[role], lambda: None)
+            frame = child.receive(SCHEMAS[role])
             if frame["do"] == "print":
                 said.append(frame["text"])
             elif frame["do"] in ("end", "ready"):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from responders.bridge import Preamble, ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.rig import Rig
 from sim.backgrounds import floor
@@ -36,7 +37,7 @@ def run_program(
     seed: int = 1,
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
-    pulse: Callable[[], None] = lambda: None,
+    meter: JobMeter | None = None,
 ) -> Recording:
     """One trial; the start is the background's own unless given."""
     ground = floor(background)
@@ -55,4 +56,4 @@ def run_program(
         seed=seed,
         physics=physics,
     )
-    return rig.run(order, obstacles, pulse)
+    return rig.run(order, obstacles, meter)

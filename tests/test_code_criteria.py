@@ -9,6 +9,7 @@ import pytest
 
 from responders.conversation import Code
 from responders.function_calls import FunctionCall, call_functions
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at
 from service.grading.grade import Grade
@@ -38,7 +39,7 @@ def without_robot(*criteria: Criterion) -> Assignment:
 
 def facts_of(text: str, rig: Rig) -> SourceFacts:
     asked = without_robot(criterion("source", uses=["for"]))
-    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, lambda: None).facts["program"]
+    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, JobMeter()).facts["program"]
 
 
 def graded(text: str, rig: Rig, *criteria: Criterion) -> Grade:

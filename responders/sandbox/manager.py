@@ -17,6 +17,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -24,8 +25,9 @@ from typing import Any, Literal
 
 from responders import wire
 from responders.sandbox import bubblewrap
+from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
-from responders.sandbox.running_child import Child, ChildLimits, ChildStopped
+from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from sim.errors import HostError
 
 Role = Literal["robot", "responder"]
@@ -42,7 +44,7 @@ class WallsMissing(HostError):
     """This machine cannot put up the walls that student code needs."""
 
 
-class _ZygoteEnded(HostError):
+class _ZygoteEnded(KilledFromOutside):
     """A zygote is gone, and with it every child of its."""
 
 
@@ -86,7 +88,14 @@ class Zygote:
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
 
-    def spawn(self, limits: ChildLimits, folder: Path | None = None, play: Play = "role") -> Child:
+    def spawn(
+        self,
+        limits: ChildLimits,
+        folder: Path | None = None,
+        meter: JobMeter | None = None,
+        play: Play = "role",
+        blamed: bool = False,
+    ) -> Child:
         """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
         if folder is not None and folder.parent != self._folders.path:
             raise ValueError(f"{folder} is not a private folder")
@@ -95,7 +104,7 @@ class Zygote:
         self._forks += 1
         for attempt in (1, 2):
             try:
-                return self._spawn(limits, folder, play)
+                return self._spawn(limits, folder, meter or JobMeter(), play, blamed)
             except (OSError, EOFError, _ZygoteEnded) as error:
                 self.close()
                 if attempt == 2:
@@ -110,7 +119,7 @@ class Zygote:
             return child.walls
         child = self.spawn(_BATTERY_LIMITS, play="battery")
         try:
-            told = child.receive(wire.BATTERY, lambda: None)
+            told = child.receive(wire.BATTERY)
         except ChildStopped as stop:
             raise _walls_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
@@ -144,7 +153,7 @@ class Zygote:
             self._folders_inside = -1
         self._forks = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None, play: Play) -> Child:
+    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, play: Play, blamed: bool) -> Child:
         self._start()
         descriptors = []
         if folder is not None:
@@ -176,19 +185,21 @@ class Zygote:
             ours.close()
             raise _walls_missing(answer["missing"])
         inside = answer["pid"]  # what the zygote calls it
-        child = Child(functools.partial(self.reap, inside), _pid(received[0]), received[0], ours, limits, folder)
+        reap = functools.partial(self.reap, inside)
+        child = Child(reap, _pid(received[0]), received[0], ours, limits, folder)
         try:
             _try_to_signal(received[0])
             self._check_walls(child)
         except BaseException:
             child.close()
             raise
+        child.begin(meter, blamed)
         return child
 
     def _check_walls(self, child: Child) -> None:
         """The child's first words, before any student code: every wall asked for must stand."""
         try:
-            standing = child.receive(wire.WALLS, lambda: None)
+            standing = child.receive(wire.WALLS)
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
         if standing["missing"] is not None:
@@ -289,10 +300,25 @@ class Sandboxes:
         self._walls = walls
         self._zygotes: dict[Role, Zygote] = {}
         self._folders = PrivateFolders()
+        self._blamed = False
 
-    def spawn(self, role: Role, limits: ChildLimits, folder: Path | None = None) -> Child:
-        """A fresh child for a robot program or a responder, in a ``private_folder`` or without one."""
-        return self._zygote(role).spawn(limits, folder)
+    def spawn(
+        self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
+    ) -> Child:
+        """A fresh child for a robot program or a responder, in a ``private_folder`` or without one.
+
+        What it costs is counted by ``meter``, that of its job.
+        """
+        return self._zygote(role).spawn(limits, folder, meter, blamed=self._blamed)
+
+    @contextlib.contextmanager
+    def blaming(self) -> Iterator[None]:
+        """Meanwhile a child that is killed from outside is to blame for it."""
+        self._blamed = True
+        try:
+            yield
+        finally:
+            self._blamed = False
 
     def check(self, role: Role = "robot") -> str:
         """Put up the walls round a child that tries to get out; say which hold. Raises WallsMissing if any does not."""

@@ -9,6 +9,7 @@ import contextlib
 import itertools
 import math
 import os
+import select
 import signal
 import socket
 import time
@@ -18,22 +19,25 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
+from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.errors import HostError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
 #: What a child is charged for a frame at least; made by our own code there, one costs it several times this. It keeps
 #: a child that writes thousands of frames at a stroke from holding up the worker, to which each costs more.
-_FRAME_CPU_SECONDS = 1e-6
+_FRAME_CPU_SECONDS = 5e-6
 _STALLED_SECONDS = 5.0
 #: Of the child's own time, and of real time once it does not even wait for a processor.
 _LAST_WORD_CPU_SECONDS = 0.04
 _LAST_WORD_SECONDS = 0.1
 #: What is read at most while a child that is to be stopped has its last word.
 _UNREAD_BYTES = 1 << 20
+#: How long a process that has closed the wire may take to be gone.
+_END_SECONDS = 1.0
 #: Frames that a program sends thousands of times to the letter; each is checked once.
 _REPEATED = frozenset({"read", "wait", "motor_state", "until"})
-_MOST_KNOWN = 100
+_MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 #: What a responder may keep in its folder, beside the files that it was given.
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
@@ -48,12 +52,8 @@ class ChildLimits:
     memory_bytes: int
 
 
-class ChildStopped(Exception):
-    """A child that will say no more: why, in a sentence, and the line of its file where that is known."""
-
-    def __init__(self, verdict: Verdict, message: str, line: int | None = None) -> None:
-        super().__init__(message)
-        self.verdict, self.message, self.line = verdict, message, line
+class KilledFromOutside(HostError):
+    """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
 
 
 class Child:
@@ -77,6 +77,8 @@ class Child:
         self._pidfd = pidfd
         self._socket = connection
         self._limits = limits
+        self._meter = JobMeter()
+        self._blamed = False
         self._pending = b""
         self._sent = self._received = 0  # frames
         self._known: dict[bytes, wire.Frame] = {}
@@ -85,6 +87,13 @@ class Child:
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
         connection.settimeout(_POLL_SECONDS)
+
+    def begin(self, meter: JobMeter, blamed: bool) -> None:
+        """From now on student code may run in it, and what it costs is counted by ``meter``.
+
+        With ``blamed`` being killed is its own fault, as it runs alone on this machine and was killed before.
+        """
+        self._meter, self._blamed = meter, blamed
 
     def send(self, frame: dict[str, Any]) -> None:
         """Send one frame; a child that does not read it shows up at the next ``receive``."""
@@ -102,11 +111,11 @@ class Child:
                 return
         self._waited += time.monotonic() - began
 
-    def receive(self, schema: wire.Schema, pulse: Callable[[], None]) -> wire.Frame:
-        """The next frame; ``pulse`` is called now and then while waiting. Raises ChildStopped."""
+    def receive(self, schema: wire.Schema) -> wire.Frame:
+        """The next frame, paid for if anything of it may be kept. Raises ChildStopped, or KilledFromOutside."""
         line, newline, rest = self._pending.partition(b"\n")
         if not newline:
-            line, rest = self._read_line(pulse)
+            line, rest = self._read_line()
         self._pending = rest
         try:
             number, line = wire.unnumbered(line)
@@ -125,7 +134,9 @@ class Child:
             ) from None
         if frame["do"] == "busy":
             raise self._too_busy(frame["line"])
-        if frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN:
+        if frame["do"] not in wire.NOTHING_KEPT:
+            self._meter.keep(len(line))
+        elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
             self._known[line] = frame
         return frame
 
@@ -140,14 +151,11 @@ class Child:
         """Kill the child and wait until it is gone."""
         if self._closed:
             return
-        self._closed = True
-        self._kill()
-        self._socket.close()
-        os.close(self._pidfd)
+        self._leave()
         with contextlib.suppress(HostError):
             self._reap()
 
-    def _read_line(self, pulse: Callable[[], None]) -> tuple[bytes, bytes]:
+    def _read_line(self) -> tuple[bytes, bytes]:
         last_cpu, still_since = -1.0, time.monotonic()
         pieces = [self._pending]
         size = len(self._pending)
@@ -157,7 +165,7 @@ class Child:
                 data = self._socket.recv(wire.MOST)
             except TimeoutError:
                 self._waited += time.monotonic() - began
-                pulse()
+                self._meter.pulse()
                 used = self._check_cpu()
                 self._check_sleep()
                 if used != last_cpu or self._runnable():
@@ -173,7 +181,7 @@ class Child:
             self._waited += now - began
             if now - self._checked > _POLL_SECONDS:
                 self._checked = now
-                pulse()
+                self._meter.pulse()
                 self._check_cpu()
                 self._check_sleep()
             pieces.append(data)
@@ -188,8 +196,10 @@ class Child:
         """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
         self._check_folder()
         used = self.cpu_seconds()
-        if max(used, self._received * _FRAME_CPU_SECONDS) > self._limits.cpu_seconds:
+        charged = max(used, self._received * _FRAME_CPU_SECONDS)
+        if charged > self._limits.cpu_seconds:
             raise self._too_busy(self._last_word())
+        self._meter.check_cpu(charged)
         return used
 
     def _check_sleep(self) -> None:
@@ -197,8 +207,13 @@ class Child:
 
         Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker.
         """
-        if self._waited > 2 * _STALLED_SECONDS and self._waited - self._busy_seconds() > 2 * _STALLED_SECONDS:
+        slept = self._slept_seconds()
+        if slept > 2 * _STALLED_SECONDS:
             raise self._stalled()
+        self._meter.check_sleep(slept)
+
+    def _slept_seconds(self) -> float:
+        return max(0.0, self._waited - self._busy_seconds())
 
     def _busy_seconds(self) -> float:
         """What it has run, and waited for a processor; endless where the kernel does not say."""
@@ -267,25 +282,54 @@ class Child:
         return state == "R"
 
     def _gone(self) -> ChildStopped:
-        """What the wait status says of a child that has closed the wire."""
-        self._kill()
+        """What the wait status says of a child that has closed the wire. Raises KilledFromOutside."""
+        used = self.cpu_seconds()
+        ended = self._has_ended()
+        self._leave()
+        status = self._reap()
+        if not os.WIFSIGNALED(status):
+            return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
+        number = os.WTERMSIG(status)
+        # The kernel's own limit on processor time, a second or two behind ours, ends with SIGKILL too.
+        if number == signal.SIGXCPU or (number == signal.SIGKILL and used > self._limits.cpu_seconds):
+            return self._too_busy(None)
+        if number == signal.SIGSYS:
+            return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
+        if number != signal.SIGKILL:
+            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({_signal_name(number)})")
+        if not ended:
+            # It was alive until we ended it ourselves just now: it had only closed the wire.
+            return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
+        if self._blamed:
+            sentence = "its process was killed, again and with nothing else running: it takes more memory than there is"
+            return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
+        raise KilledFromOutside("something on this machine killed a student's process: is there enough memory?")
+
+    def _has_ended(self) -> bool:
+        """Whether it is gone already: a process that dies closes its socket a moment before."""
+        began = time.monotonic()
+        ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
+        self._waited += time.monotonic() - began
+        return ended
+
+    def _leave(self) -> None:
+        """End the child, and tell the meter what it has cost."""
         self._closed = True
+        self._meter.child_ended(self.cpu_seconds(), self._slept_seconds())
+        self._kill()
         self._socket.close()
         os.close(self._pidfd)
-        status = self._reap()
-        if os.WIFSIGNALED(status):
-            number = os.WTERMSIG(status)
-            if number in (signal.SIGXCPU,):
-                return self._too_busy(None)
-            if number == signal.SIGSYS:
-                return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
-            name = signal.Signals(number).name
-            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({name})")
-        return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
 
     def _kill(self) -> None:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _content(folder: Path, most: int) -> tuple[int, int]:

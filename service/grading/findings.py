@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, Protocol
 
 from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
 from service.grading.judging.function_checks import calls_of, checked
@@ -65,7 +66,7 @@ class Caller(Protocol):
         limits: ChildLimits,
         output_bytes: int,
         seed: int,
-        pulse: Callable[[], None],
+        meter: JobMeter,
     ) -> Called: ...
 
 
@@ -74,7 +75,7 @@ def look_at(
     assignment: Assignment,
     trials: Sequence[TrialResult],
     caller: Caller,
-    pulse: Callable[[], None],
+    meter: JobMeter,
 ) -> Findings:
     """Everything that the criteria ask for beside the recordings.
 
@@ -82,18 +83,18 @@ def look_at(
     """
     sources = {"program": handed_in.program, "responder": handed_in.responder}
     parts: set[str] = {criterion.part for criterion in assignment.criteria if isinstance(criterion, SourceRules)}
-    facts = {part: _facts(source, caller, pulse) for part in sorted(parts) if (source := sources[part]) is not None}
+    facts = {part: _facts(source, caller, meter) for part in sorted(parts) if (source := sources[part]) is not None}
     reads_modules = "responder" in facts
-    modules = {each.name: _facts(each, caller, pulse) for each in handed_in.modules} if reads_modules else {}
+    modules = {each.name: _facts(each, caller, meter) for each in handed_in.modules} if reads_modules else {}
     called: dict[str, Called] = {}
     checks: dict[tuple[str, int], Outcome] = {}
     for criterion in assignment.criteria:
         if isinstance(criterion, Functions) and handed_in.responder is not None:
-            called[criterion.id] = _called(criterion, handed_in, assignment, caller, pulse)
+            called[criterion.id] = _called(criterion, handed_in, assignment, caller, meter)
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, pulse)
+                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, meter)
     walls = next((each.walls for each in called.values()), "")
     return Findings(facts, handed_in.flags, called, checks, walls, modules)
 
@@ -132,11 +133,11 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
     }
 
 
-def _facts(source: Source, caller: Caller, pulse: Callable[[], None]) -> SourceFacts:
+def _facts(source: Source, caller: Caller, meter: JobMeter) -> SourceFacts:
     reader = resources.files("responders") / "library" / "source_facts.py"
     code = Code("source_facts.py", reader.read_text("utf-8"))
     calls = [FunctionCall("facts", [source.text])]
-    called = caller.call(code, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, pulse)
+    called = caller.call(code, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:
         return SourceFacts(error=f"it cannot be taken apart ({fault_words(fault)})")
@@ -144,7 +145,7 @@ def _facts(source: Source, caller: Caller, pulse: Callable[[], None]) -> SourceF
 
 
 def _called(
-    criterion: Functions, handed_in: HandedIn, assignment: Assignment, caller: Caller, pulse: Callable[[], None]
+    criterion: Functions, handed_in: HandedIn, assignment: Assignment, caller: Caller, meter: JobMeter
 ) -> Called:
     limits, responder = assignment.limits, handed_in.responder
     assert responder is not None
@@ -155,7 +156,7 @@ def _called(
         ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
         limits.output_bytes,
         _seed(assignment, criterion.id),
-        pulse,
+        meter,
     )
 
 
@@ -165,7 +166,7 @@ def _seed(assignment: Assignment, criterion: str) -> int:
 
 
 def _check(
-    criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: Caller, pulse: Callable[[], None]
+    criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: Caller, meter: JobMeter
 ) -> Outcome:
     limits = assignment.limits
     called = caller.call(
@@ -175,7 +176,7 @@ def _check(
         ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
         limits.output_bytes,
         trial.seed,
-        pulse,
+        meter,
     )
     return checked(criterion, called.returned[0] if called.returned else Returned(fault=called.fault))
 

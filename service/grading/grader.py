@@ -14,6 +14,7 @@ from typing import Protocol
 from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
+from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at, reads_program
 from service.grading.grade import Grade, TrialResult
@@ -86,9 +87,10 @@ def grade(
     trials = tuple(assignment.trials())
     results: list[TrialResult] = []
     watch = _Watch(observe or _nobody, len(trials))
+    meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.pulse)
     for trial in trials:
         order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed))
-        recording = _recording(order, parts, assignment, rig, watch.pulse)
+        recording = _recording(order, parts, assignment, rig, meter)
         results.append(
             TrialResult(
                 trial.scenario.id,
@@ -104,9 +106,9 @@ def grade(
         watch.finished_one()
     if assignment.training is not None and parts.responder is not None:
         results = with_models_answers(
-            results, assignment, assignment.training, parts.responder, parts.files, rig, watch.pulse
+            results, assignment, assignment.training, parts.responder, parts.files, rig, meter
         )
-    findings = look_at(_handed_in(submission, parts), assignment, results, rig, watch.pulse)
+    findings = look_at(_handed_in(submission, parts), assignment, results, rig, meter)
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
@@ -136,6 +138,11 @@ def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
     return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission))
+
+
+def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
+    limits = assignment.limits
+    return JobLimits(limits.all_output_mb * _MEGABYTE, limits.all_cpu_of(trials), limits.all_sleep)
 
 
 class _Watch:
@@ -243,16 +250,14 @@ def _own_floor(name: str, picture: bytes) -> Floor:
     return floor_from_picture(name, picture)
 
 
-def _recording(
-    order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Rig, pulse: Callable[[], None]
-) -> Recording:
+def _recording(order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Rig, meter: JobMeter) -> Recording:
     limits, obstacles = assignment.limits, assignment.world.obstacles
     if parts.notebook is not None:
         child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE)
         hand_in = NotebookHandIn(parts.notebook, parts.files, child_limits, limits.output_bytes)
         as_read = parts.marked_cell is not None and reads_program(assignment)
-        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, pulse)
-    recording = rig.run(order, obstacles, pulse)
+        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, meter)
+    recording = rig.run(order, obstacles, meter)
     if parts.program_cell is None:
         return recording
     faults = (

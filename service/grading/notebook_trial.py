@@ -5,12 +5,13 @@ What is marked is the assignment's to say; what the magics come to is ``notebook
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from responders.bridge import TrialOrder
 from responders.notebook_play import Played, Staged
 from responders.notebook_process import NotebookOrder
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.notebook_stage import NotebookStage, Program, UnmarkedRuns, program_order
 from service.grading.rig import Rig
@@ -45,17 +46,17 @@ class Marking:
     as_read: bool = False
 
 
-def run_notebook_trial(hand_in: NotebookHandIn, marking: Marking, rig: Rig, pulse: Callable[[], None]) -> Recording:
+def run_notebook_trial(hand_in: NotebookHandIn, marking: Marking, rig: Rig, meter: JobMeter) -> Recording:
     """The recording of the marked run, with what the whole notebook told.
 
     Where the last robot program is marked and was never come to, the last that did run is marked instead.
-    Raises HostError when the machine fails, and whatever ``pulse`` raises.
+    Raises HostError when the machine fails, and whatever the meter's pulse raises.
     """
     site = None if marking.which is None else marked_site(hand_in.notebook, marking.which)
-    played, stage = _play(hand_in, marking, site, rig, pulse)
+    played, stage = rig.undisturbed(lambda: _play(hand_in, marking, site, rig, meter), meter)
     if played.marked is None and marking.which == LAST and stage.started:
-        site = stage.started[-1]
-        played, stage = _play(hand_in, marking, site, rig, pulse)
+        last = site = stage.started[-1]
+        played, stage = rig.undisturbed(lambda: _play(hand_in, marking, last, rig, meter), meter)
     if played.marked is not None:
         recording = played.marked.recording
         faults = recording.faults
@@ -68,7 +69,7 @@ def run_notebook_trial(hand_in: NotebookHandIn, marking: Marking, rig: Rig, puls
 
 
 def _play(
-    hand_in: NotebookHandIn, marking: Marking, site: Site | None, rig: Rig, pulse: Callable[[], None]
+    hand_in: NotebookHandIn, marking: Marking, site: Site | None, rig: Rig, meter: JobMeter
 ) -> tuple[Played, NotebookStage]:
     order = marking.order
     staged = Staged(order, marking.obstacles, None, True, True)
@@ -98,7 +99,7 @@ def _play(
             order.seed,
         ),
         stage,
-        pulse,
+        meter,
     )
     return played, stage
 

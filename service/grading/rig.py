@@ -5,9 +5,12 @@ A rig holds no result and no state that one trial could leave for the next.
 
 from __future__ import annotations
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
+from typing import TypeVar
 
 from responders.bridge import TrialOrder
 from responders.conversation import Code
@@ -15,23 +18,31 @@ from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_play import Played, Stage, never_ran, play_notebook
 from responders.notebook_process import NotebookOrder
 from responders.sandbox.manager import FULL, Sandboxes, Walls
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
-from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.running_child import ChildLimits, KilledFromOutside
 from responders.training import Trained, TrainingOrder, train_and_name
 from responders.trial import run_trial
+from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording
 
+_log = logging.getLogger(__name__)
 _MOST_ARENAS = 4
+Result = TypeVar("Result")
 
 
 class Rig:
-    """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed."""
+    """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
 
-    def __init__(self, walls: Walls = FULL) -> None:
+    ``slots`` are those of the machine's graders; without them there is no other. A ``meter`` counts what one job costs.
+    """
+
+    def __init__(self, walls: Walls = FULL, slots: Slots | None = None) -> None:
         remove_left_overs()
+        self._slots = slots
         self._sandboxes = Sandboxes(walls)
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
@@ -40,14 +51,19 @@ class Rig:
         self,
         order: TrialOrder,
         obstacles: tuple[Rectangle, ...] = (),
-        pulse: Callable[[], None] = lambda: None,
+        meter: JobMeter | None = None,
     ) -> Recording:
-        """One trial. Raises HostError when the machine fails, and whatever ``pulse`` raises."""
-        return run_trial(order, *self._ground(order, obstacles), self._sandboxes, pulse)
+        """One trial. Raises HostError when the machine fails, and whatever the meter's pulse raises."""
+        meter = meter or JobMeter()
+        ground = self._ground(order, obstacles)
+        return self.undisturbed(lambda: run_trial(order, *ground, self._sandboxes, meter), meter)
 
-    def play(self, order: NotebookOrder, stage: Stage, pulse: Callable[[], None] = lambda: None) -> Played:
-        """A notebook from top to bottom, with all its runs. Raises as ``run`` does."""
-        return play_notebook(order, stage, self._ground, self._sandboxes, pulse)
+    def play(self, order: NotebookOrder, stage: Stage, meter: JobMeter | None = None) -> Played:
+        """A notebook from top to bottom, with all its runs; ``stage`` serves for one play, so ``undisturbed`` is apart.
+
+        Raises as ``run`` does.
+        """
+        return play_notebook(order, stage, self._ground, self._sandboxes, meter or JobMeter())
 
     def never_ran(self, order: TrialOrder, obstacles: tuple[Rectangle, ...], fault: Fault, walls: str) -> Recording:
         """The recording of a run that did not come about because of ``fault``."""
@@ -56,9 +72,10 @@ class Rig:
     def _ground(self, order: TrialOrder, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
         return self._arena(obstacles), self._cameras.camera(order.floor.picture)
 
-    def train(self, order: TrainingOrder, pulse: Callable[[], None] = lambda: None) -> Trained:
+    def train(self, order: TrainingOrder, meter: JobMeter | None = None) -> Trained:
         """A hand-in's model, trained and asked. Raises as ``run`` does."""
-        return train_and_name(order, self._sandboxes, pulse)
+        meter = meter or JobMeter()
+        return self.undisturbed(lambda: train_and_name(order, self._sandboxes, meter), meter)
 
     def call(
         self,
@@ -68,10 +85,13 @@ class Rig:
         limits: ChildLimits,
         output_bytes: int,
         seed: int,
-        pulse: Callable[[], None] = lambda: None,
+        meter: JobMeter | None = None,
     ) -> Called:
         """Functions of a module, called in a fresh child without a robot. Raises as ``run`` does."""
-        return call_functions(code, files, calls, limits, output_bytes, self._sandboxes, seed, pulse)
+        meter = meter or JobMeter()
+        return self.undisturbed(
+            lambda: call_functions(code, files, calls, limits, output_bytes, self._sandboxes, seed, meter), meter
+        )
 
     def check_walls(self) -> str:
         """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""
@@ -95,6 +115,30 @@ class Rig:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def undisturbed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
+        """Do ``work``; where a child in it is killed by neither us nor itself, again, and with nothing else running.
+
+        Other people's children may have taken the memory; one that is killed alone twice is itself to blame.
+        """
+        before = meter.spent
+        try:
+            with self._slots.beside_others(meter.pulse) if self._slots is not None else nullcontext():
+                return work()
+        except KilledFromOutside as killed:
+            _log.warning("the trial is run again, alone: %s", killed)
+        meter.give_back(before)
+        try:
+            with self._alone(meter):
+                return work()
+        except KilledFromOutside as killed:
+            _log.warning("the trial is run a last time, alone: %s", killed)
+        meter.give_back(before)
+        with self._alone(meter), self._sandboxes.blaming():
+            return work()
+
+    def _alone(self, meter: JobMeter) -> AbstractContextManager[None]:
+        return self._slots.alone(meter.pulse) if self._slots is not None else nullcontext()
 
     def _arena(self, obstacles: tuple[Rectangle, ...]) -> Arena:
         arena = self._arenas.pop(obstacles, None) or Arena(obstacles)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from responders.conversation import Code
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.training import Images, Trained, TrainingOrder
 from service.grading.grade import TrialResult
@@ -37,12 +38,12 @@ def with_models_answers(
     hand_in: Source,
     files: Mapping[str, bytes],
     rig: Rig,
-    pulse: Callable[[], None] = lambda: None,
+    meter: JobMeter,
 ) -> list[TrialResult]:
     """The trials, those that are tested on with the answers of the hand-in's model to their pictures.
 
     What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
-    machine fails, and whatever ``pulse`` raises.
+    machine fails, and whatever the meter's pulse raises.
     """
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
@@ -66,7 +67,7 @@ def with_models_answers(
             limits.output_bytes,
             seed,
         ),
-        pulse,
+        meter,
     )
     by_place = dict(zip(order, trained.names, strict=True))
     names = iter([by_place[place] for place in range(len(unseen))])

@@ -15,6 +15,7 @@ from celery import Task, current_app, shared_task, signals
 
 from responders.sandbox.manager import FULL, NONE
 from service.grading.rig import Rig
+from service.grading.slots import Slots
 from service.queue.canaries import Watch
 from service.queue.celery_app import GRADE_TASK, NO_WALLS, PLOT_TASK
 from service.queue.grading_job import Outcome, grade_next, plot_next
@@ -64,7 +65,8 @@ class _Children:
     @cached_property
     def child(self) -> PoolChild:
         settings = load_settings()
-        store, rig = open_store(settings), Rig(NONE if current_app.conf.get(NO_WALLS) else FULL)
+        walls = NONE if current_app.conf.get(NO_WALLS) else FULL
+        store, rig = open_store(settings), Rig(walls, Slots(settings.home / "run"))
         watch = Watch(store, rig, worker_name(), settings.canary_seconds)
         watch.keep_looking()
         return PoolChild(settings, store, rig, watch)

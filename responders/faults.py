@@ -1,0 +1,73 @@
+"""From what a child did to a fault: an exception it told of, an end it came to, and what our own code stumbled over.
+
+It decides nothing over marks; when a child is stopped is decided where it is served.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+from responders import wire
+from responders.sandbox.meter import ChildStopped
+from sim.errors import RobomarkError
+from sim.recording import SECOND, Fault, Verdict
+
+_log = logging.getLogger(__name__)
+_PYTHON_2 = (
+    "Missing parentheses in call to",
+    "leading zeros in decimal integer literals",
+    "multiple exception types must be parenthesized",
+)
+
+
+class Surprise(ChildStopped):
+    """A child that has sent what our own code stumbled over; ``cause`` is for staff."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(Verdict.SANDBOX_VIOLATION, "its process sent something that cannot be handled")
+        self.cause = f"{type(error).__name__}: {error}"[:300]
+
+
+def surprise(error: Exception) -> Surprise:
+    """For whatever was raised while something of a child's was handled. Raises ``error`` if the machine is to blame."""
+    if isinstance(error, RobomarkError | OSError | MemoryError):
+        raise error
+    _log.error("a child has sent what our own code stumbled over", exc_info=error)
+    return Surprise(error)
+
+
+def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
+    """The fault of a child that was stopped, or ended, at ``now`` in units of simulated time."""
+    verdict = stop.verdict
+    if who == "responder" and verdict is Verdict.PROGRAM_ERROR:
+        verdict = Verdict.RESPONDER_ERROR
+    cause = stop.cause if isinstance(stop, Surprise) else ""
+    return Fault(now / SECOND, verdict, _who(who), f"the {who} was stopped: {stop.message}", stop.line, staff=cause)
+
+
+def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
+    """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
+    out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
+    if error["type"] == "MemoryError" or out_of_memory:
+        sentence = f"the {who} asked for more memory than it may have"
+        return Fault(now / SECOND, Verdict.MEMORY_LIMIT, _who(who), sentence, error["line"])
+    verdict = Verdict.RESPONDER_ERROR if who == "responder" else Verdict.PROGRAM_ERROR
+    words = error["text"]
+    sentence = f"{error['type']}: {words}" if words else str(error["type"])
+    hint = ""
+    if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
+        hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
+    return Fault(now / SECOND, verdict, _who(who), sentence, error["line"], hint)
+
+
+def refusal(who: str, frame: wire.Frame) -> str:
+    """What the walls refused, as a sentence for the report."""
+    where = f"line {frame['line']} of the {who}" if frame["line"] is not None else f"the {who}"
+    return f"{where}: {frame['what'][:200]}"
+
+
+def _who(who: str) -> Any:
+    return "responder" if who == "responder" else "program"

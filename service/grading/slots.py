@@ -1,0 +1,55 @@
+"""Who of the graders on one machine runs student code now: usually all beside each other, and sometimes one alone.
+
+Locks on two files, so that the kernel gives back what a grader held that was killed. It runs nothing itself.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from sim.errors import HostError
+
+_POLL_SECONDS = 0.02
+
+
+class Slots:
+    """The locks in ``folder``, which all graders of one home share."""
+
+    def __init__(self, folder: Path) -> None:
+        self._gate, self._running = folder / "gate.lock", folder / "slots.lock"
+
+    @contextmanager
+    def beside_others(self, pulse: Callable[[], None]) -> Iterator[None]:
+        """Run unless somebody runs alone, or waits to; ``pulse`` is called while waiting."""
+        with ExitStack() as running:
+            with _locked(self._gate, fcntl.LOCK_SH, pulse):
+                running.enter_context(_locked(self._running, fcntl.LOCK_SH, pulse))
+            yield
+
+    @contextmanager
+    def alone(self, pulse: Callable[[], None]) -> Iterator[None]:
+        """Run when nobody else does, and let nobody else begin."""
+        with _locked(self._gate, fcntl.LOCK_EX, pulse), _locked(self._running, fcntl.LOCK_EX, pulse):
+            yield
+
+
+@contextmanager
+def _locked(path: Path, how: int, pulse: Callable[[], None]) -> Iterator[None]:
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        file = path.open("a")
+    except OSError as error:
+        raise HostError(f"the lock file cannot be used: {path}: {error.strerror}") from None
+    with file:
+        while True:
+            try:
+                fcntl.flock(file, how | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                pulse()
+                time.sleep(_POLL_SECONDS)
+        yield

@@ -1,0 +1,263 @@
+"""How a child's end is read: what it did itself is the submission's, what was done to it is not.
+
+A child that is killed from outside is run again, alone; what our own code stumbles over is a verdict and a sentence.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hostile import FIND_WIRE, forged
+from processes import children, until
+from responders.bridge import Bridge
+from responders.conversation import Conversation
+from responders.sandbox.meter import JobLimits, JobMeter
+from running import run_program
+from service.grading.rig import Rig
+from service.grading.slots import Slots
+from sim.errors import Cancelled, HostError
+from sim.recording import Verdict
+
+HONEST = 'from time import sleep\nprint("PY::a")\nsleep(1)\ntank_drive.on_for_seconds(20, 20, 1)\n'
+BUSY = f"sum(range(10**7))\n{HONEST}"
+ECHO = "def responder(text): return text\n"
+COUNTS = """
+from time import sleep
+from ev3dev2_glue import pyState
+print('PY::x')
+sleep(1)
+print(len(pyState()['messages']))
+"""
+_STOPPING = {signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU}
+#: What some signals come to; any other ends the program with an error, or does nothing to it.
+_VERDICTS = {signal.SIGXCPU: Verdict.CPU_LIMIT, signal.SIGSYS: Verdict.SANDBOX_VIOLATION}
+
+
+@pytest.mark.parametrize("number", sorted(set(range(1, 65)) - _STOPPING - {32, 33}))
+def test_a_program_that_signals_itself_is_at_fault(number: int, rig: Rig) -> None:
+    recording = run_program(rig, f"import os\nos.kill(os.getpid(), {number})\nimport time; time.sleep(1)")
+    expected = {_VERDICTS[number]} if number in _VERDICTS else {Verdict.FINISHED, Verdict.PROGRAM_ERROR}
+    assert recording.verdict in expected, recording.faults
+    assert "again" not in "".join(fault.message for fault in recording.faults)
+
+
+@pytest.mark.parametrize(
+    "responder",
+    [
+        "import os\nos.kill(os.getpid(), 40)\n",
+        "import os\ndef responder(text): os.kill(os.getpid(), 40)\n",
+        "import os\ndef responder(text): os._exit(3)\n",
+        "import ctypes\ndef responder(text): ctypes.string_at(0)\n",
+        "import os\ndef responder(text):\n    os.close(3)\n    import select; select.select([], [], [], 0.1)\n",
+    ],
+)
+def test_a_responder_that_ends_itself_is_at_fault(responder: str, rig: Rig) -> None:
+    recording = run_program(rig, HONEST, responder=responder)
+    assert [fault.verdict for fault in recording.faults] == [Verdict.RESPONDER_ERROR]
+
+
+class _Killer:
+    """Kills the newest child of the zygotes, so often at most."""
+
+    def __init__(self, times: int) -> None:
+        self.left = times
+        self._killed: set[int] = set()
+
+    def __call__(self) -> None:
+        for child in (child for zygote in children(os.getpid()) for child in children(zygote)):
+            if self.left and child not in self._killed:
+                self._killed.add(child)
+                self.left -= 1
+                os.kill(child, signal.SIGKILL)
+
+
+@pytest.fixture
+def plain_rig() -> Iterator[Rig]:
+    """Without bubblewrap, in which a child's number is another."""
+    from responders.sandbox.manager import Walls
+
+    with Rig(Walls(bubblewrap=False)) as made:
+        yield made
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_child_that_is_killed_from_outside_is_run_again(times: int, plain_rig: Rig) -> None:
+    undisturbed = run_program(plain_rig, BUSY, responder=ECHO)
+    killer = _Killer(times)
+    meter = JobMeter(pulse=killer)
+    recording = run_program(plain_rig, BUSY, responder=ECHO, meter=meter)
+    assert killer.left == 0
+    assert (recording.verdict, recording.sha256) == (Verdict.FINISHED, undisturbed.sha256)
+
+
+def test_what_was_spent_on_a_killed_run_is_given_back(plain_rig: Rig) -> None:
+    program = f"print({'x' * 40_000!r})\nsum(range(10**7))"
+    meter = JobMeter(JobLimits(kept_bytes=60_000), pulse=_Killer(2))
+    assert run_program(plain_rig, program, meter=meter).verdict is Verdict.FINISHED
+
+
+def test_a_child_that_is_killed_whenever_it_runs_alone_is_to_blame(plain_rig: Rig) -> None:
+    recording = run_program(plain_rig, BUSY, responder=ECHO, meter=JobMeter(pulse=_Killer(1000)))
+    assert recording.verdict is Verdict.MEMORY_LIMIT
+    assert "with nothing else running" in recording.faults[0].message
+
+
+def test_whoever_runs_alone_waits_for_the_others_and_lets_nobody_begin(tmp_path: Path) -> None:
+    slots = Slots(tmp_path)
+    other = """
+import sys, time
+from pathlib import Path
+from service.grading.slots import Slots
+folder = Path(sys.argv[1])
+with getattr(Slots(folder), sys.argv[2])(lambda: None):
+    (folder / sys.argv[3]).touch()
+    sys.stdin.read()
+(folder / (sys.argv[3] + " ended")).touch()
+"""
+
+    def start(how: str, name: str) -> subprocess.Popen[str]:
+        arguments = [sys.executable, "-c", other, str(tmp_path), how, name]
+        return subprocess.Popen(arguments, stdin=subprocess.PIPE, text=True)
+
+    beside = start("beside_others", "beside")
+    until((tmp_path / "beside").exists)
+    with slots.beside_others(lambda: None):
+        alone = start("alone", "alone")
+        beside.communicate("")
+        assert not (tmp_path / "alone").exists()
+    until((tmp_path / "alone").exists)
+    pulses: list[None] = []
+
+    def count() -> None:
+        pulses.append(None)
+        if len(pulses) == 3:
+            raise Cancelled("the lease is lost")
+
+    with pytest.raises(Cancelled), slots.beside_others(count):
+        raise AssertionError
+    alone.communicate("")
+    with slots.beside_others(lambda: None):
+        pass
+
+
+def _raising(error: Exception) -> Callable[..., Any]:
+    def raise_it(*_: object, **__: object) -> None:
+        raise error
+
+    return raise_it
+
+
+#: Where our own code may stumble while something of a child's is in its hands, and a program that leads there.
+_STUMBLES = [
+    pytest.param(Bridge, "_set_motor", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
+    pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
+    pytest.param(Bridge, "_print", "print('x')", None, id="a line"),
+    pytest.param(Conversation, "_queue_entry", "print('PY::x')", ECHO, id="an answer"),
+    pytest.param(Conversation, "deliver", "from time import sleep\nprint('PY::x')\nsleep(1)", ECHO, id="a delivery"),
+]
+
+
+@pytest.mark.parametrize(("where", "what", "program", "responder"), _STUMBLES)
+def test_what_our_code_stumbles_over_is_a_verdict(
+    where: type, what: str, program: str, responder: str | None, rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(where, what, _raising(ValueError("41 is not a valid Signals")))
+    recording = run_program(rig, program, responder=responder)
+    (fault,) = recording.faults
+    assert (fault.verdict, fault.staff) == (Verdict.SANDBOX_VIOLATION, "ValueError: 41 is not a valid Signals")
+    assert "Signals" not in fault.message
+
+
+@pytest.mark.parametrize("error", [OSError("no space left"), MemoryError(), HostError("the camera is gone")])
+def test_what_the_machine_stumbles_over_is_not(error: Exception, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bridge, "_print", _raising(error))
+    with pytest.raises(type(error)):
+        run_program(rig, "print('x')")
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        FIND_WIRE + forged('{"do":"motor","port":"outB","command":"run-to-rel-pos","position_sp":1e308}'),
+        FIND_WIRE + forged('{"do":"motor","port":"outB","position":-1e308,"time_sp":1e308,"command":"run-timed"}'),
+        FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff\\\\u0000","line":10000000}}'),
+        FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null}'),
+        "print('Light_left: ' + '9' * 400 + ' 1e999')\nprint('Gyro: nan inf')",
+        "print('\\ud800\\x00')\nprint('PY::\\ud800')",
+        "raise Exception('\\ud800\\x00' * 1000)",
+    ],
+)  # fmt: skip
+def test_numbers_and_texts_at_the_edge_are_no_surprise(program: str, rig: Rig) -> None:
+    recording = run_program(rig, f"{program}\nfrom time import sleep\nsleep(2)", responder=ECHO)
+    assert all(not fault.staff for fault in recording.faults)
+    str(recording).encode("utf-8", "strict")
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        '"JSON::" + "[" * 900 + "]" * 900',
+        '"JSON::" + "[" * 20_000 + "]" * 20_000',
+        '"JSON::" + "9" * 5000',
+        '"JSON::1e999"',
+        '"JSON::" + chr(0xd800)',
+        '\'JSON::{"a": "\\\\ud800"}\'',
+    ],
+)
+def test_answers_at_the_edge_are_delivered_or_malformed(answer: str, rig: Rig) -> None:
+    recording = run_program(rig, COUNTS, responder=f"def responder(text): return {answer}")
+    assert {fault.verdict for fault in recording.faults} <= {Verdict.PROTOCOL_ERROR}
+    assert recording.printed[-1].text == str(1 - len(recording.faults))
+
+
+NAP = "import select\nselect.select([], [], [], 0.9)\n"
+
+
+def test_naps_in_all_trials_together_are_counted(rig: Rig) -> None:
+    meter = JobMeter(JobLimits(sleep_seconds=1.0))
+    verdicts = [run_program(rig, NAP, meter=meter).verdict for _ in range(6)]
+    assert verdicts[:2] == [Verdict.FINISHED] * 2
+    assert verdicts[-1] is Verdict.STALLED
+    assert meter.spent.sleep_seconds < 2.5
+
+
+@pytest.mark.parametrize(
+    "responder",
+    [
+        f"{NAP}def responder(text): return text",
+        f"def responder(text):\n    {NAP.splitlines()[0]}\n    {NAP.splitlines()[1]}\n    return text",
+        "import select\ndef responder(text):\n    for _ in range(90): select.select([], [], [], 0.01)\n    return text",
+        "import signal\ndef responder(text):\n    signal.setitimer(signal.ITIMER_REAL, 0.9)\n"
+        "    signal.signal(signal.SIGALRM, lambda *_: None)\n    signal.pause()\n    return text",
+        "import os\nread, write = os.pipe()\ndef responder(text):\n    import select\n"
+        "    select.select([read], [], [], 0.9)\n    return text",
+    ],
+)
+def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, rig: Rig) -> None:
+    meter = JobMeter(JobLimits(sleep_seconds=0.7))
+    verdicts = [run_program(rig, HONEST, responder=responder, meter=meter).verdict for _ in range(4)]
+    assert verdicts[0] is Verdict.FINISHED
+    assert verdicts[-1] is Verdict.STALLED
+
+
+def test_computing_in_all_trials_together_is_counted(rig: Rig) -> None:
+    meter = JobMeter(JobLimits(cpu_seconds=0.5))
+    recordings = [run_program(rig, "sum(range(10**7))", meter=meter) for _ in range(8)]
+    assert recordings[0].verdict is Verdict.FINISHED
+    assert recordings[-1].verdict is Verdict.CPU_LIMIT
+    assert "all trials together" in recordings[-1].faults[0].message
+
+
+def test_honest_trials_sleep_next_to_nothing(rig: Rig) -> None:
+    meter = JobMeter()
+    for _ in range(5):
+        run_program(rig, HONEST, responder=ECHO, meter=meter)
+    assert meter.spent.sleep_seconds < 0.5

@@ -1,0 +1,227 @@
+"""No sequence of frames, of whatever kind and number, makes the worker keep more than its budget, hang, or raise.
+
+The frames are written by a process that is no child of a zygote: it may say anything at all.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from responders import wire
+from responders.bridge import Bridge, ProgramOrder, TrialOrder
+from responders.channel import Channel
+from responders.conversation import Code, Responder, ResponderOrder
+from responders.notebook_play import Staged, play_notebook
+from responders.notebook_process import NotebookOrder
+from responders.sandbox import running_child
+from responders.sandbox.meter import JobLimits, JobMeter
+from responders.sandbox.running_child import Child, ChildLimits
+from sim.arena import Arena
+from sim.backgrounds import floor
+from sim.camera import Cameras
+from sim.recording import Recording
+from sim.robot import robot
+from sim.world import Noise
+
+BUDGET = 60_000
+LIMITS = ChildLimits(2.0, 1 << 26)
+SECONDS = 2.0
+
+
+def _texts() -> st.SearchStrategy[str]:
+    words = st.sampled_from(
+        ["PY::x", "IMG_DATA", "image_data both", "JSON::[[],{}]", "JSON::", "Light_left: 1e999 nan", "\ud800\0", "::"]
+    )
+    long = st.sampled_from([300, 5000, 60_000]).map(lambda length: "x" * length)
+    return st.one_of(words, st.text(max_size=20), long)
+
+
+def _numbers() -> st.SearchStrategy[Any]:
+    edges = st.sampled_from([0, -1, 1, 10**15, 10**16, 1e308, -1e308, 5e-324, 10**400, -0.0])
+    return st.one_of(edges, st.integers(), st.floats())
+
+
+def _anything() -> st.SearchStrategy[Any]:
+    return st.one_of(_texts(), _numbers(), st.none(), st.booleans(), st.lists(_numbers(), max_size=3))
+
+
+def _maybe(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    return st.one_of(st.none(), strategy)
+
+
+def _one_of(*words: str) -> st.SearchStrategy[str]:
+    return st.sampled_from(words)
+
+
+#: After these nothing more is heard.
+_LAST = {"busy", "ready", "end", "stuck", "played"}
+_ERROR = st.fixed_dictionaries({"type": _texts(), "text": _texts(), "line": st.none()})
+#: What fields hold that a schema allows; texts, where a field is not named here.
+_NAMED = {
+    "read what": _one_of("left", "right", "gyro"),
+    "line": _maybe(st.integers(0, 99)),
+    "port": _one_of("outB", "outC"),
+    "command": _one_of("run-forever", "run-timed", "run-to-rel-pos", "reset", ""),
+    "state": _one_of("running", "still"),
+    "kind": _one_of("text", "error", "other", "long", "value", "missing"),
+    "name": _one_of("sim_magic", "sim_magic_preloaded"),
+    "units": st.integers(0, 10**7),
+    "times": st.integers(1, 2),
+    "timeout": _maybe(st.integers(0, 10**7)),
+    "missing": _maybe(_texts()),
+    "error": _maybe(_ERROR),
+    **{name: _numbers() for name in ("speed_sp", "position_sp", "position", "time_sp")},
+    **{name: st.integers(0, 9) for name in ("depth", "place", "length")},
+}
+
+
+@st.composite
+def _frames(draw: st.DrawFn, schema: wire.Schema) -> bytes:
+    """One frame: mostly what the schema allows, sometimes anything, sometimes no frame at all."""
+    how = draw(st.integers(0, 39))
+    if how == 0:
+        return draw(st.binary(max_size=100))
+    last = draw(st.integers(0, 9)) == 0
+    do = draw(st.sampled_from(sorted(schema if last else schema.keys() - _LAST)))
+    required, optional = schema[do]
+    names = [*required, *draw(st.lists(st.sampled_from(sorted(optional)), unique=True) if optional else st.just([]))]
+    frame = {"do": do} | {
+        name: draw(_anything() if how == 1 else _NAMED.get(f"{do} {name}", _NAMED.get(name, _texts())))
+        for name in names
+    }
+    return json.dumps(frame).encode()
+
+
+def _sequences(schema: wire.Schema) -> st.SearchStrategy[list[bytes]]:
+    """Frames, each of them so often in a row."""
+    repeated = st.tuples(_frames(schema), st.sampled_from([1, 1, 2, 40, 400]))
+    return st.lists(repeated, min_size=1, max_size=12).map(lambda runs: [frame for frame, n in runs for _ in range(n)])
+
+
+@contextmanager
+def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child]:
+    """A process that writes these frames, numbered as is due, and listens to nothing."""
+    ours, theirs = socket.socketpair()
+    with tempfile.TemporaryFile() as file:
+        for number, frame in enumerate(frames):
+            file.write(b'{"n":%d,' % number + frame[1:] + b"\n" if frame.startswith(b"{") else frame + b"\n")
+        file.seek(0)
+        command = ["sh", "-c", "cat <&3 >/dev/null & exec cat >&3"]
+        process = subprocess.Popen(command, stdin=file, preexec_fn=lambda: os.dup2(theirs.fileno(), 3), close_fds=False)
+    theirs.close()
+    child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ours, LIMITS, folder)
+    child.begin(meter, blamed=True)
+    try:
+        yield child
+    finally:
+        child.close()
+
+
+def _status(process: subprocess.Popen[bytes]) -> int:
+    status = process.wait()
+    return status << 8 if status >= 0 else -status
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 0.3)
+    monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
+
+
+class _Sandboxes:
+    """Hands out the processes that a test has made."""
+
+    def __init__(self, folder: Path, *children: Child) -> None:
+        self._folder, self._children = folder, list(children)
+
+    def spawn(self, *_: object, **__: object) -> Child:
+        return self._children.pop(0)
+
+    @contextmanager
+    def private_folder(self) -> Iterator[Path]:
+        yield self._folder
+
+
+@pytest.fixture(scope="module")
+def ground() -> Iterator[tuple[Arena, Any]]:
+    cameras, arena = Cameras(), Arena(())
+    yield arena, cameras.camera(floor("Empty_Map").picture)
+    arena.close()
+    cameras.close()
+
+
+def _order() -> TrialOrder:
+    program = ProgramOrder(Code("robot.py", ""), "none", LIMITS, 1 << 40)
+    ground = floor("Empty_Map")
+    noise, channel = Noise(), Channel()
+    return TrialOrder(
+        program, None, True, ground, robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1
+    )
+
+
+@given(frames=_sequences(wire.ROBOT))
+@settings(max_examples=60)
+def test_of_a_robot_program(
+    frames: list[bytes], ground: tuple[Arena, Any], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    meter = JobMeter(JobLimits(kept_bytes=BUDGET))
+    with _child(frames, tmp_path_factory.mktemp("folder"), meter) as child:
+        bridge = Bridge(_order(), *ground, child, None, meter)
+        fault = bridge.run()
+    assert fault is None or not fault.staff, fault
+    kept = (bridge.printed, bridge.spoken, bridge.images, bridge.image_log, bridge.notes, bridge.conversation.messages)
+    assert len(pickle.dumps((kept, fault))) < 2 * BUDGET
+
+
+@given(frames=_sequences(wire.RESPONDER))
+@settings(max_examples=60)
+def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> None:
+    meter = JobMeter(JobLimits(kept_bytes=BUDGET))
+    folder = tmp_path_factory.mktemp("folder")
+    with _child([b'{"do":"ready","error":null}', *frames], folder, meter) as child:
+        order = ResponderOrder(Code("responder.py", ""), {}, LIMITS, 1 << 40)
+        responder = Responder(order, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
+        faults = [responder.load()]
+        faults += [responder.answer("PY::x", n, n)[2] for n in range(len(frames)) if responder.alive]
+    assert not any(fault.staff for fault in faults if fault is not None), faults
+    assert len(pickle.dumps((responder.output, responder.calls, responder.notes, faults))) < 2 * BUDGET
+
+
+class _NoStage:
+    """Nothing that a notebook calls starts a robot."""
+
+    def call(self, call: object) -> Staged:
+        return Staged(notes=("noted",))
+
+    def ran(self, recording: Recording) -> None:
+        raise AssertionError
+
+    def last(self) -> Staged:
+        return Staged()
+
+
+@given(frames=_sequences(wire.NOTEBOOK))
+@settings(max_examples=60)
+def test_of_a_notebook(
+    frames: list[bytes], ground: tuple[Arena, Any], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    meter = JobMeter(JobLimits(kept_bytes=BUDGET))
+    folder = tmp_path_factory.mktemp("folder")
+    with _child(frames, folder, meter) as child:
+        order = NotebookOrder("n.ipynb", ("pass", "pass"), {}, LIMITS, 1 << 40, 1)
+        played = play_notebook(order, _NoStage(), lambda *_: ground, _Sandboxes(folder, child), meter)  # type: ignore[arg-type]
+    assert played.stopped is None or not played.stopped.staff, played.stopped
+    assert len(pickle.dumps(played)) < 2 * BUDGET
