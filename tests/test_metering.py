@@ -6,12 +6,12 @@ Each flood is one submission; what the worker holds of it afterwards is measured
 from __future__ import annotations
 
 import pickle
-from dataclasses import dataclass
 
 import pytest
 
 import running
-from hostile import FIND_WIRE, flood, forged
+from floods import CALL, ECHO, FLOODS, Flood, long
+from hostile import flood
 from responders.conversation import Code
 from responders.function_calls import FunctionCall
 from responders.notebook_play import Played, Staged
@@ -23,68 +23,6 @@ from service.grading.rig import Rig
 from sim.recording import Fault, Recording, Verdict
 
 BUDGET = 2 << 20
-BIG = "x" * 60_000
-
-
-def _long(frame: str, length: int = len(BIG)) -> str:
-    """A frame with its ``@`` as long as that."""
-    return frame.replace("@", "x" * length)
-
-
-ECHO = "def responder(text): return text\n"
-NOISY = 'for i in range(100_000): print(f"PY::{i}")'
-CALL = _long('{"do":"call","depth":0,"caller":"a","callee":"b","argument":"@","result":"d"}')
-DEEP_LIST = "JSON::[" + "[]," * 15_000 + "[]]"
-
-
-@dataclass(frozen=True)
-class Flood:
-    """A submission that sends without end, and how that ends."""
-
-    name: str
-    program: str
-    responder: str | None = None
-    verdicts: tuple[Verdict, ...] = (Verdict.OUTPUT_LIMIT,)
-
-
-def _program(name: str, frame: str, *verdicts: Verdict) -> Flood:
-    return Flood(name, f"{flood(frame)}flood()", None, verdicts or (Verdict.OUTPUT_LIMIT,))
-
-
-def _responder(name: str, frame: str, *verdicts: Verdict) -> Flood:
-    text = f"{flood(frame)}def responder(text): flood()"
-    return Flood(name, 'print("PY::x")', text, verdicts or (Verdict.OUTPUT_LIMIT,))
-
-
-FLOODS = [
-    _program("utterances", _long('{"do":"say","text":"@"}')),
-    _program("short utterances", '{"do":"say","text":"x"}'),
-    _program("lines", _long('{"do":"print","text":"@"}')),
-    _program("short lines", '{"do":"print","text":""}'),
-    _program("messages to nobody", '{"do":"print","text":"PY::"}'),
-    _program("images that are sent", '{"do":"print","text":"IMG_DATA"}'),
-    _program("images that are logged", '{"do":"print","text":"image_data both"}'),
-    _program("refusals", _long('{"do":"refused","what":"@","line":1}')),
-    _program("refusals that differ in length", _long('{"do":"refused","what":"@","line":null}', 1000)),
-    _program(
-        "padded waits", '{"do":"wait",@"units":0}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
-    ),
-    _program(
-        "motor commands", _long('{"do":"motor","port":"outB","polarity":"@"}'), Verdict.CPU_LIMIT, Verdict.STALLED
-    ),
-    _responder("lines of a responder", _long('{"do":"print","text":"@"}')),
-    _responder("calls", CALL),
-    _responder("refusals of a responder", _long('{"do":"refused","what":"@","line":1}')),
-    _responder("naps", '{"do":"sleep","units":0}', Verdict.CPU_LIMIT, Verdict.STALLED),
-    Flood("long answers", NOISY, f"def responder(text): return {BIG!r}"),
-    Flood("answers of a long type", NOISY, f"long = type({BIG!r}, (), {{}})\ndef responder(text): return long()"),
-    Flood("errors with long words", NOISY, f"{FIND_WIRE}def responder(text):\n    "
-        + forged(_long('{"do":"answer","kind":"error","error":{"type":"@","text":"@","line":1}}', 30_000))
-        + "\n    line._sent += 1\n    line.send = lambda frame: None\n    raise ValueError"),
-    Flood("answers that are many objects", NOISY, f"def responder(text): return {DEEP_LIST!r}"),
-    Flood("short answers", NOISY, "def responder(text): return ''"),
-    Flood("short errors", NOISY, "def responder(text): raise ValueError"),
-]  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -107,14 +45,14 @@ def test_a_flood_ends_at_the_budget(each: Flood, rig: Rig) -> None:
 @pytest.mark.parametrize(
     "frame",
     [
-        pytest.param(_long('{"do":"raised","error":{"type":"E","text":"@","line":null}}'), id="cells that raise"),
-        pytest.param(_long('{"do":"note","text":"@","line":null}'), id="notes"),
-        pytest.param(_long('{"do":"print","text":"@"}'), id="lines"),
+        pytest.param(long('{"do":"raised","error":{"type":"E","text":"@","line":null}}'), id="cells that raise"),
+        pytest.param(long('{"do":"note","text":"@","line":null}'), id="notes"),
+        pytest.param(long('{"do":"print","text":"@"}'), id="lines"),
         pytest.param(CALL, id="calls"),
         pytest.param(
-            _long('{"do":"magic","name":"sim_magic","arguments":"","body":"@","line":null,"missing":null}'), id="magics"
+            long('{"do":"magic","name":"sim_magic","arguments":"","body":"@","line":null,"missing":null}'), id="magics"
         ),
-        pytest.param(_long('{"do":"refused","what":"@","line":null}'), id="refusals"),
+        pytest.param(long('{"do":"refused","what":"@","line":null}'), id="refusals"),
     ],
 )
 def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, rig: Rig) -> None:

@@ -1,0 +1,74 @@
+"""Submissions that send without end, one for each kind of thing that a worker might keep of a child.
+
+What becomes of one alone is ``test_metering.py``'s, what of many among honest ones ``test_crowd.py``'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hostile import FIND_WIRE, flood, forged
+from sim.recording import Verdict
+
+BIG = "x" * 60_000
+
+
+def long(frame: str, length: int = len(BIG)) -> str:
+    """A frame with its ``@`` as long as that."""
+    return frame.replace("@", "x" * length)
+
+
+ECHO = "def responder(text): return text\n"
+NOISY = 'for i in range(100_000): print(f"PY::{i}")'
+CALL = long('{"do":"call","depth":0,"caller":"a","callee":"b","argument":"@","result":"d"}')
+DEEP_LIST = "JSON::[" + "[]," * 15_000 + "[]]"
+
+
+@dataclass(frozen=True)
+class Flood:
+    """A submission that sends without end, and how that ends."""
+
+    name: str
+    program: str
+    responder: str | None = None
+    verdicts: tuple[Verdict, ...] = (Verdict.OUTPUT_LIMIT,)
+
+
+def _program(name: str, frame: str, *verdicts: Verdict) -> Flood:
+    return Flood(name, f"{flood(frame)}flood()", None, verdicts or (Verdict.OUTPUT_LIMIT,))
+
+
+def _responder(name: str, frame: str, *verdicts: Verdict) -> Flood:
+    text = f"{flood(frame)}def responder(text): flood()"
+    return Flood(name, 'print("PY::x")', text, verdicts or (Verdict.OUTPUT_LIMIT,))
+
+
+FLOODS = [
+    _program("utterances", long('{"do":"say","text":"@"}')),
+    _program("short utterances", '{"do":"say","text":"x"}'),
+    _program("lines", long('{"do":"print","text":"@"}')),
+    _program("short lines", '{"do":"print","text":""}'),
+    _program("messages to nobody", '{"do":"print","text":"PY::"}'),
+    _program("images that are sent", '{"do":"print","text":"IMG_DATA"}'),
+    _program("images that are logged", '{"do":"print","text":"image_data both"}'),
+    _program("refusals", long('{"do":"refused","what":"@","line":1}')),
+    _program("refusals that differ in length", long('{"do":"refused","what":"@","line":null}', 1000)),
+    _program(
+        "padded waits", '{"do":"wait",@"units":0}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
+    ),
+    _program(
+        "motor commands", long('{"do":"motor","port":"outB","polarity":"@"}'), Verdict.CPU_LIMIT, Verdict.STALLED
+    ),
+    _responder("lines of a responder", long('{"do":"print","text":"@"}')),
+    _responder("calls", CALL),
+    _responder("refusals of a responder", long('{"do":"refused","what":"@","line":1}')),
+    _responder("naps", '{"do":"sleep","units":0}', Verdict.CPU_LIMIT, Verdict.STALLED),
+    Flood("long answers", NOISY, f"def responder(text): return {BIG!r}"),
+    Flood("answers of a long type", NOISY, f"long = type({BIG!r}, (), {{}})\ndef responder(text): return long()"),
+    Flood("errors with long words", NOISY, f"{FIND_WIRE}def responder(text):\n    "
+        + forged(long('{"do":"answer","kind":"error","error":{"type":"@","text":"@","line":1}}', 30_000))
+        + "\n    line._sent += 1\n    line.send = lambda frame: None\n    raise ValueError"),
+    Flood("answers that are many objects", NOISY, f"def responder(text): return {DEEP_LIST!r}"),
+    Flood("short answers", NOISY, "def responder(text): return ''"),
+    Flood("short errors", NOISY, "def responder(text): raise ValueError"),
+]  # fmt: skip

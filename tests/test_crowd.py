@@ -1,0 +1,139 @@
+"""Honest submissions among floods of every kind, in a worker with little memory: no honest mark is another for that."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from sqlalchemy import func, select
+
+from builders import PROGRAM, echo, settings_in
+from floods import FLOODS, Flood
+from memory_group import MemoryGroup, memory_group
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.queue.broker import EmbeddedBroker
+from service.queue.celery_app import make_celery
+from service.queue.nudges import Nudger
+from service.queue.processes import end_processes
+from service.settings import Settings
+from service.store.engine import Store, open_store
+from service.store.intake import HandIn, accept_batch
+from service.store.models import UNFINISHED, Enrolment, Job, JobState, Lane
+from sim.recording import Verdict
+from submissions.submission import Source, Submission
+
+MEMORY = 1_500_000_000
+HONEST = """
+from time import sleep
+for number in range(5):
+    print(f'Robot says {number}')
+    print(f'PY::{number}')
+    sleep(1)
+"""
+ECHO = "def responder(msg):\n    return msg\n"
+#: What is no flood of frames, and as little the honest students' business.
+OTHERS = [
+    Flood("memory of a program", "held = []\nwhile True: held.append(bytearray(1 << 20))"),
+    Flood("memory of a responder", PROGRAM, "import numpy\nheld = [numpy.ones(1 << 20) for _ in range(1000)]"),
+    Flood("killing itself", "import os\nos.kill(os.getpid(), 9)"),
+    Flood("a signal without a name", "import os\nos.kill(os.getpid(), 40)"),
+    Flood("naps", "import select\nwhile True: select.select([], [], [], 0.9); print('x')"),
+    Flood("digits", f"print({'1' * 20_000!r})\nprint({'1' * 20_000 + 'x'!r})"),
+]
+
+
+def _submission(student: str, program: str, responder: str | None) -> HandIn:
+    parts = Source("robot.py", program), Source("responder.py", responder or ECHO)
+    return HandIn(Submission(student, *parts), echo(), student)
+
+
+def _honest(number: int) -> HandIn:
+    return _submission(f"honest-{number:03}", f"# {number}\n{HONEST}", None)
+
+
+def _floods(each: int, kinds: list[Flood]) -> list[HandIn]:
+    return [
+        _submission(f"flood-{place}-{number}", f"# {number}\n{kind.program}", kind.responder)
+        for place, kind in enumerate(kinds)
+        for number in range(each)
+    ]
+
+
+@contextmanager
+def _worker(settings: Settings, group: MemoryGroup | None) -> Iterator[None]:
+    with (settings.home / "worker.log").open("wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "service.queue.worker"],
+            env=os.environ | settings.environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+            preexec_fn=group.enter if group is not None else None,
+        )
+    try:
+        yield
+    finally:
+        end_processes([process], 20)
+
+
+def _run(settings: Settings, store: Store, hand_ins: list[HandIn], patience_seconds: float) -> str:
+    """Take them in, in one batch and in a random order, and wait for the end of all; the batch."""
+    random.Random(1).shuffle(hand_ins)
+    batch = accept_batch(store, "crowd", hand_ins, [], max_attempts=3).id
+    with EmbeddedBroker(settings) as broker, memory_group(MEMORY) as group, _worker(broker.settings, group):
+        nudger = Nudger(make_celery(broker.settings), store, broker.settings)
+        nudger.grade(Lane.BATCH, len(hand_ins))
+        until = time.monotonic() + patience_seconds
+        open_jobs = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
+        while True:
+            with store.reading() as session:
+                left = session.scalar(open_jobs)
+            if not left:
+                break
+            assert time.monotonic() < until, f"{left} of {len(hand_ins)} have not ended"
+            time.sleep(0.5)
+        if group is not None:
+            print(f"most memory {group.most_bytes >> 20} MB, processes killed for it {group.killed}")
+    return batch
+
+
+def _check(store: Store, batch: str, honest: int) -> None:
+    with Rig() as rig:
+        one = _honest(0)
+        right = grade(one.submission, one.assignment, rig=rig)
+    query = select(Enrolment.student, Job).join(Job, Job.enrolment_id == Enrolment.id).where(Job.batch_id == batch)
+    with store.reading() as session:
+        rows = [(student, job) for student, job in session.execute(query)]
+    assert Counter(job.state for _, job in rows) == {JobState.DONE: len(rows)}, [job.error for _, job in rows]
+    marks = [(job.verdict, job.marks) for student, job in rows if student.startswith("honest")]
+    assert marks == [(Verdict.FINISHED.value, Decimal(right.marks))] * honest
+    floods = [job for student, job in rows if student.startswith("flood")]
+    assert Verdict.HOST_ERROR.value not in {job.verdict for job in floods}
+
+
+def test_a_few_of_every_sort(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path)
+    kinds = [each for each in [*FLOODS, *OTHERS] if each.name in {"utterances", "calls", *(o.name for o in OTHERS)}]
+    with open_store(settings) as store:
+        batch = _run(settings, store, [*map(_honest, range(15)), *_floods(1, kinds)], 240)
+        _check(store, batch, 15)
+
+
+@pytest.mark.long
+def test_a_hundred_and_fifty_among_ten_floods_of_every_kind(
+    service_settings: Settings, store: Store, tmp_path: Path
+) -> None:
+    floods = _floods(10, [*FLOODS, *OTHERS])
+    batch = _run(service_settings, store, [*map(_honest, range(150)), *floods], 1500)
+    _check(store, batch, 150)
