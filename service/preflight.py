@@ -10,9 +10,9 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path, PurePosixPath
 
@@ -21,9 +21,9 @@ from service.store.intake import HandIn
 from sim.errors import UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import catalogue, find_assignment, find_in_catalogue, read_assignment
-from submissions.bundle import clean_name, fit_parts, read_submission
+from submissions.bundle import fit_parts, named_by, read_submission
+from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
 from submissions.raw_files import shown
-from submissions.submission import Submission
 
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
@@ -42,9 +42,10 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """A row by the name it is spoken of, and how its hand-in is read; that raises UsageError."""
+    """A row by the name it is spoken of, its student as written, and how it is read; that raises UsageError."""
 
     name: str
+    student: str
     read: Callable[[], HandIn]
 
 
@@ -61,52 +62,70 @@ def preflight(path: Path, assignment: str | None) -> Preflight:
         return _read(
             _Row(
                 shown(f"line {row.line}: {row.student}" if row.student else f"line {row.line}"),
+                row.student,
                 partial(_roster_hand_in, path.parent, row, asked, find),
             )
             for row in read_roster(path)
         )
     with _opened(path) as folder:
         find_own = cache(find_in_catalogue)
-        return _read([_Row(shown(entry.name), partial(_hand_in, entry, asked, find_own)) for entry in _entries(folder)])
+        return _read(
+            _Row(shown(entry.name), named_by(entry), partial(_hand_in, entry, asked, find_own))
+            for entry in _entries(folder)
+        )
 
 
 def _read(rows: Iterable[_Row]) -> Preflight:
-    hand_ins: list[HandIn] = []
-    problems: list[tuple[str, str]] = []
-    first: dict[tuple[str, str], str] = {}
+    rows = list(rows)
+    near = alike(row.student for row in rows if row.student)
+    found: list[HandIn | str] = []
     for row in rows:
         try:
-            hand_in = row.read()
+            if row.student in near:
+                raise UsageError(f"{cannot_be_told(near[row.student])}; expected names that can be told apart.")
+            found.append(row.read())
         except UsageError as error:
-            problems.append((row.name, " ".join(str(error).split())))
+            found.append(" ".join(str(error).split()))
+    found = _one_each(rows, found)
+    return Preflight(
+        tuple(each for each in found if isinstance(each, HandIn)),
+        tuple((row.name, each) for row, each in zip(rows, found, strict=True) if isinstance(each, str)),
+    )
+
+
+def _one_each(rows: Sequence[_Row], found: Sequence[HandIn | str]) -> list[HandIn | str]:
+    """One hand-in of a student for an assignment; of several that differ nobody here knows which is meant."""
+    places: dict[tuple[str, str], dict[int, HandIn]] = {}
+    for place, each in enumerate(found):
+        if isinstance(each, HandIn):
+            places.setdefault((each.submission.student, each.assignment.id), {})[place] = each
+    left = list(found)
+    for (_, assignment), same in places.items():
+        first, *others = same
+        if len({each.submission.sha256 for each in same.values()}) == 1:
+            sentence = f"{rows[first].name} is already this student's hand-in for {assignment}; this one is left out."
+            for place in others:
+                left[place] = sentence
             continue
-        key = (hand_in.submission.student, hand_in.assignment.id)
-        if key in first:
-            sentence = f"{first[key]} is already this student's hand-in for {key[1]}; this one is left out."
-            problems.append((row.name, sentence))
-            continue
-        first[key] = row.name
-        hand_ins.append(hand_in)
-    return Preflight(tuple(hand_ins), tuple(problems))
+        for place, other in ((first, others[0]), *((other, first) for other in others)):
+            left[place] = (
+                f"{rows[other].name} is this student's submission for {assignment}, too, "
+                "and not the same; expected one."
+            )
+    return left
 
 
 def _hand_in(entry: Path, asked: Assignment | None, find: Callable[[str], Assignment]) -> HandIn:
+    length = len(shown_name(named_by(entry)))
+    if not 0 < length <= LONGEST_NAME:
+        raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
     if asked is not None:
-        return HandIn(_named(read_submission(entry, asked=asked.parts), entry), asked, shown(entry.name))
+        return HandIn(read_submission(entry, asked=asked.parts), asked, shown(entry.name), written=named_by(entry))
     submission = read_submission(entry)
     if submission.assignment is None:
         raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
     own = find(submission.assignment)
-    return HandIn(_named(fit_parts(submission, own.parts), entry), own, shown(entry.name))
-
-
-def _named(submission: Submission, entry: Path) -> Submission:
-    """By the name of its file or folder: in a batch nobody hands in for somebody else."""
-    student = clean_name(entry.name if entry.is_dir() else entry.stem)
-    if submission.student == student:
-        return submission
-    note = f"submission.toml names the student {submission.student}; in a batch the name of the file or folder counts."
-    return replace(submission, student=student, notes=(*submission.notes, note))
+    return HandIn(fit_parts(submission, own.parts), own, shown(entry.name), written=named_by(entry))
 
 
 def _roster_hand_in(
@@ -118,8 +137,8 @@ def _roster_hand_in(
         raise UsageError("names no assignment; name it with -a, or in a column assignment.")
     path = file_inside(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
-    submission = read_submission(path, asked=assignment.parts)
-    return HandIn(replace(submission, student=row.student), assignment, shown(row.file), row.handed_in)
+    submission = read_submission(path, student=row.student, asked=assignment.parts)
+    return HandIn(submission, assignment, shown(row.file), row.handed_in)
 
 
 def _roster_assignment(folder: Path, name: str) -> Assignment:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from service.queue.plotting import PREFIX, draw
 from service.reports.html import BatchRow, batch_index, staff_report, student_report
-from service.reports.written import file_name, write_page
-from service.store import artifacts, grades, intake, policies
+from service.reports.written import file_stems, write_page
+from service.store import artifacts, batches, grades, intake, policies
 from service.store.batches import JobLine
 from service.store.engine import Store
 from service.store.models import Job, JobState, PlotState, Submission
@@ -30,20 +30,18 @@ class Written:
 
 
 def write_reports(store: Store, job_ids: Iterable[str], folder: Path) -> list[Written]:
-    """A page for each graded job, named after its student; two of one name keep apart by the job's id.
+    """A page for each graded job, named after its student, and after its assignment where one student has several.
 
     Raises UsageError when the folder cannot be written to.
     """
-    used = {_INDEX}
-    written = []
-    for job_id in job_ids:
-        student, page = _page(store, job_id)
-        name = file_name(student)
-        if name.casefold() in used:
-            name = f"{name.removesuffix('.html')}-{job_id}.html"
-        used.add(name.casefold())
-        written.append(Written(job_id, write_page(folder, name, page)))
-    return written
+    job_ids = list(job_ids)
+    with store.reading() as session:
+        lines = [batches.job_line(session, job_id) for job_id in job_ids]
+    stems = file_stems([(line.student, line.assignment) for line in lines])
+    return [
+        Written(job_id, write_page(folder, f"{stem}.html", _page(store, job_id)))
+        for job_id, stem in zip(job_ids, stems, strict=True)
+    ]
 
 
 def write_batch(
@@ -77,7 +75,7 @@ def _remark(line: JobLine) -> str:
     return "" if line.state is JobState.DONE else line.state.value
 
 
-def _page(store: Store, job_id: str) -> tuple[str, str]:
+def _page(store: Store, job_id: str) -> str:
     with store.reading() as session:
         grade = grades.load(session, job_id)
         hand_in = intake.load_hand_in(session, job_id)
@@ -88,5 +86,5 @@ def _page(store: Store, job_id: str) -> tuple[str, str]:
     files = kept if job.plots is PlotState.DONE else draw(grade, hand_in.assignment)
     plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
     if staff_only is not None:
-        return grade.student, staff_report(grade, plots, hand_in.submission)
-    return grade.student, student_report(grade, plots, hand_in.submission, released)
+        return staff_report(grade, plots, hand_in.submission)
+    return student_report(grade, plots, hand_in.submission, released)

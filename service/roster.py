@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import csv
 import io
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
+from submissions.names import LONGEST_NAME, shown_name
 from submissions.raw_files import shown
 
 COLUMNS = ("student", "file", "assignment", "handed_in")
 _MOST_BYTES = 10_000_000
-_LONGEST_NAME = 100
 _SEPARATORS = (",", ";", "\t")
 
 
@@ -145,7 +144,7 @@ def _row(record: _Record, places: Mapping[str, int], columns: int) -> RosterRow:
             record.line, problem=f"has {len(record.cells)} cells for {columns} columns; quote a cell with a separator."
         )
     found = {column: record.cells[at] if at < len(record.cells) else "" for column, at in places.items()}
-    student = _student(found["student"])
+    student = shown_name(found["student"])
     problem = _problem(student, found["file"])
     try:
         handed_in = moment(found["handed_in"]) if found.get("handed_in") else None
@@ -169,18 +168,6 @@ def moment(text: str, *, end_of_day: bool = False) -> datetime:
 def _problem(student: str, file: str) -> str:
     if not student:
         return "names no student."
-    if len(student) > _LONGEST_NAME:
-        return f"has a student's name of {len(student)} characters, expected at most {_LONGEST_NAME}."
+    if len(student) > LONGEST_NAME:
+        return f"has a student's name of {len(student)} characters, expected at most {LONGEST_NAME}."
     return "" if file else "names no file."
-
-
-def _student(name: str) -> str:
-    """The name as it can be shown: one line, no control characters. It is never a path, so a slash may stay."""
-    normal = unicodedata.normalize("NFC", name)
-    kept = "".join(" " if c.isspace() else c for c in normal if c.isspace() or _can_be_shown(c))
-    return " ".join(kept.split())
-
-
-def _can_be_shown(character: str) -> bool:
-    # The two joiners count as control characters, but emoji and some scripts are written with them.
-    return unicodedata.category(character)[0] != "C" or character in "\u200c\u200d"

@@ -51,8 +51,8 @@ class Wheel:
         elif command == "run-forever":
             self.state = "running"
 
-    def change_speed(self, most: float, noise: float) -> None:
-        """Move the speed towards its set point. Only speeds that are not negative are rounded and noisy.
+    def change_speed(self, most: float, noise: float, both_directions: bool = False) -> None:
+        """Move the speed towards its set point. Unless ``both_directions``, no negative speed is rounded and noisy.
 
         The original does not cap negative speeds either; a program that asks for more than a motor can do, past the
         brick's own checks, would win every race there.
@@ -64,6 +64,8 @@ class Wheel:
         noisy = self.speed + noise
         if noisy >= 0:
             self.speed = min(round_half_up(noisy), MAX_SPEED)
+        elif both_directions:
+            self.speed = -min(round_half_up(-noisy), MAX_SPEED)
 
     def travel(self, clock: int) -> float:
         """Wheel degrees moved in this tick. A move to a position counts on the encoder twice, as in the original."""
@@ -97,6 +99,7 @@ class Drive:
     y: float
     heading: float
     noise: float = 0.0
+    both_directions: bool = False  # noise for negative speeds, too
     left_chance: Stream | None = None
     right_chance: Stream | None = None
     turns: int = 0
@@ -113,8 +116,9 @@ class Drive:
     def tick(self, clock: int) -> None:
         """Advance a thirtieth of a second: speeds, travel, then the pose."""
         most = self.robot.acceleration
-        self.left.change_speed(most, self._noise(self.left_chance, clock))
-        self.right.change_speed(most, self._noise(self.right_chance, clock))
+        both = self.both_directions and self.noise > 0
+        self.left.change_speed(most, self._noise(self.left_chance, clock), both)
+        self.right.change_speed(most, self._noise(self.right_chance, clock), both)
         mm_per_degree = math.pi * self.robot.wheel_diameter / 360
         left = self.left.travel(clock) * mm_per_degree
         right = self.right.travel(clock) * mm_per_degree

@@ -29,10 +29,14 @@ _RIGHT_ANGLE = math.pi / 2
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Amplitudes: grey levels for each pixel of a light sensor, degrees per second for each wheel."""
+    """Amplitudes: grey levels for each pixel of a light sensor, degrees per second for each wheel.
+
+    In the original a wheel at a negative speed has no noise; with ``both_directions`` it has.
+    """
 
     light: float = 0.0
     motor: float = 0.0
+    both_directions: bool = False
 
 
 class Chain:
@@ -75,6 +79,7 @@ class World:
             pose.y,
             math.radians(pose.heading),
             noise.motor,
+            noise.both_directions,
             Stream(seed, "left wheel"),
             Stream(seed, "right wheel"),
         )

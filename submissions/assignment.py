@@ -31,6 +31,7 @@ class WorldSpec:
     robot: str = "Default_Robot"
     solid: bool = False  # walls and obstacles stop the robot
     drive: Literal["course", "wheels"] = "course"  # who moves it: the course's equations, or rigid-body wheels
+    noise: Literal["course", "both directions"] = "course"  # of the wheels: of positive speeds alone, or of all
     sheet: int | None = 0  # the seed of the digits on a digit sheet; None: each trial's own seed
 
 

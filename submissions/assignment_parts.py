@@ -166,6 +166,7 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
         robot=robot,
         solid=table.solid,
         drive=table.drive,
+        noise=table.noise,
         sheet=_sheet(table),
     )
 

@@ -51,6 +51,7 @@ class WorldTable(Table):
     robot: str = "Default_Robot"
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
+    noise: Literal["course", "both directions"] = "course"
     sheet: int | str = 0
 
     @field_validator("sheet", mode="before")

@@ -10,7 +10,6 @@ import json
 import os
 import re
 import tomllib
-import unicodedata
 import zipfile
 from collections.abc import Mapping
 from io import BytesIO
@@ -21,6 +20,7 @@ from typing import Literal
 from sim.errors import UsageError
 from submissions.assignment import Parts
 from submissions.marked_cell import marked_site, sites
+from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
 from submissions.source_text import decode_source
@@ -43,13 +43,14 @@ _LOOKS_LIKE_RESPONDER = re.compile(
     re.MULTILINE,
 )
 _MAX_META_BYTES = 64 * 1024
+UNNAMED = "unnamed"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 
 
 def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
     """What one student handed in at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
-    ``student`` wins over the hand-in's own submission.toml, and that over the name of the file or folder.
+    ``student`` says whose it is, else the name of the file or folder; what its own submission.toml says is noted.
     With ``asked`` a lone .py is the part that the assignment asks for, and a missing part is refused;
     without it what a lone .py is follows from its name or its text.
 
@@ -63,23 +64,25 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
         raise UsageError(f"{where}: does not exist, expected a .py file, a notebook, a folder or a .zip.")
     suffix = path.suffix.lower()
     if path.is_dir():
-        raw, name, candidate = read_folder(path), path.name, path.parent.name
+        raw = read_folder(path)
     elif suffix == ".zip":
-        raw, name, candidate = read_zip(path), path.stem, path.parent.name
-    elif suffix == ".py":
-        raw = RawFiles({path.name: read_single_file(path)})
-        candidate = path.parent.name
-        name = candidate if path.name.lower() in _NAMES else path.stem
-    elif suffix == _NOTEBOOK:
-        raw, name, candidate = RawFiles({path.name: read_single_file(path)}), path.stem, path.parent.name
+        raw = read_zip(path)
+    elif suffix in (".py", _NOTEBOOK):
+        raw = RawFiles({os.fsencode(path.name).decode("utf-8", "replace"): read_single_file(path)})
     else:
         raise UsageError(
             f"{where}: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip."
         )
-    submission = _assemble(raw, where, name, candidate)
-    if student is not None:
-        submission = dataclasses.replace(submission, student=clean_name(student))
+    submission = _assemble(raw, where, student or named_by(path), path.parent.name)
     return submission if asked is None else fit_parts(submission, asked, where=where)
+
+
+def named_by(path: Path) -> str:
+    """The student that a file or folder names, as it is written there; a robot.py by itself, that of its folder."""
+    path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
+    if path.suffix.lower() == ".py" and path.name.lower() in _NAMES:
+        return path.parent.name
+    return path.name if path.is_dir() else path.stem
 
 
 def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None) -> Submission:
@@ -141,14 +144,6 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
-
-
-def clean_name(name: str) -> str:
-    """A student's name as it can be shown, sorted and filed: one line, no control characters, no slashes."""
-    normal = unicodedata.normalize("NFC", name).replace("/", "_").replace("\\", "_")
-    kept = "".join(" " if c.isspace() else c for c in normal if c.isspace() or unicodedata.category(c)[0] != "C")
-    clean = " ".join(kept.split())[:100].strip()
-    return clean if clean.strip(". ") else "unnamed"
 
 
 def pack_submission(submission: Submission) -> bytes:
@@ -222,12 +217,16 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         if decoded.note:
             notes.append(decoded.note)
     assignment = _text_of(meta, "assignment", where)
+    student = shown_name(name)[:LONGEST_NAME].strip() or UNNAMED
+    named = shown_name(_text_of(meta, "student", where) or student)
+    if named != student:
+        notes.append(f"{_META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
     return Submission(
-        student=clean_name(_text_of(meta, "student", where) or name),
+        student=student,
         program=sources.get("program"),
         responder=sources.get("responder"),
         files=MappingProxyType(dict(sorted(files.items()))),
-        assignment=clean_name(assignment or candidate),
+        assignment=shown_name(assignment or candidate) or UNNAMED,
         notes=tuple(notes),
         notebook=notebook,
     )

@@ -6,7 +6,7 @@ Plain data; reading archives and folders is ``bundle.py``, deciding what to do w
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -52,14 +52,29 @@ class Submission:
     def sha256(self) -> str:
         """Hash of what was handed in, whoever handed it in and however it was packed."""
         digest = hashlib.sha256()
+        for piece in self.hashed():
+            digest.update(piece)
+        return digest.hexdigest()
+
+    def hashed(self) -> Iterator[bytes]:
+        """What the hash is over: records of fields, each told how long it is before it comes, so that no two
+        submissions have the same bytes. Names count, for a program and its report can tell them.
+        """
+        yield b"robomark submission 2\n"
+        for record in self._records():
+            yield b"%d fields\n" % len(record)
+            for part in record:
+                data = part if isinstance(part, bytes) else part.encode("utf-8", "surrogatepass")
+                yield b"%d bytes\n" % len(data)
+                yield data
+
+    def _records(self) -> Iterator[tuple[str | bytes, ...]]:
         for part, source in (("program", self.program), ("responder", self.responder)):
             if source is not None:
-                data = source.text.encode("utf-8", "surrogatepass")
-                digest.update(f"{part}:{len(data)}:".encode() + data)
-        for cell in self.notebook.cells if self.notebook is not None else ():
-            data = cell.source.encode("utf-8", "surrogatepass")
-            tags = "\n".join(cell.tags).encode("utf-8", "surrogatepass")
-            digest.update(f"cell:{len(data)}:{len(tags)}:".encode() + data + tags)
+                yield part, source.name, source.text
+        if self.notebook is not None:
+            yield "notebook", self.notebook.name
+            for cell in self.notebook.cells:
+                yield "cell", str(cell.number), cell.source, *cell.tags
         for name in sorted(self.files):
-            digest.update(f"file:{len(self.files[name])}:{name}:".encode() + self.files[name])
-        return digest.hexdigest()
+            yield "file", name, self.files[name]

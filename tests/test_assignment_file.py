@@ -256,6 +256,7 @@ check = "pose"
         (HEAD + '[world]\nsheet = "per-seed"\n' + SCENARIO + FINISHES, 4, "Empty_Map is not drawn from a seed"),
         (HEAD + SCENARIO.replace("[[100, 800, 0]]", "[100, 800, 0]") + FINISHES, 5, "[[x, y, heading], ...]"),
         (HEAD + SCENARIO + 'motor_noise = "10"\n' + FINISHES, 6, "expected a number or a list of numbers"),
+        (HEAD + '[world]\nnoise = "both"\n' + SCENARIO + FINISHES, 4, 'expected "course" or "both directions"'),
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "timing") + "between = [3, 2]\n",
             10,

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from sim.errors import UsageError
 from submissions.assignment import Parts
-from submissions.bundle import clean_name, fit_parts, pack_submission, read_submission, unpack_submission
+from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
+from submissions.names import shown_name
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip
 from submissions.submission import Source, Submission
 
@@ -132,11 +133,12 @@ def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
     assert fitted.notes == ("robot.py was left out: a robot program is not asked for.",)
 
 
-def test_submission_toml_names_assignment_and_student(tmp_path: Path) -> None:
+def test_submission_toml_names_the_assignment_and_not_the_student(tmp_path: Path) -> None:
     meta = 'assignment = "echo-responder"\nstudent = "Zoë\\u0007 Q"\n'
     path = folder(tmp_path / "json-queue" / "h1", {**BOTH, "submission.toml": meta})
     submission = read_submission(path)
-    assert (submission.assignment, submission.student) == ("echo-responder", "Zoë Q")
+    assert (submission.assignment, submission.student) == ("echo-responder", "h1")
+    assert submission.notes == ("submission.toml names the student Zoë Q; the student is h1, whatever it says.",)
     assert not submission.files
     assert read_submission(path, student="s1").student == "s1"
     (path / "submission.toml").unlink()
@@ -152,14 +154,13 @@ def test_submission_toml_that_cannot_be_used_is_refused(tmp_path: Path, meta: st
     ("name", "clean"),
     [
         ("Ann\u202e\x1b[31m Li", "Ann[31m Li"),
-        ("../../etc", ".._.._etc"),
-        ("\n\t", "unnamed"),
-        ("..", "unnamed"),
-        ("x" * 500, "x" * 100),
+        ("../../etc", "../../etc"),
+        ("\n\t", ""),
+        ("..", ""),
     ],
 )
 def test_student_names_are_cleaned(name: str, clean: str) -> None:
-    assert clean_name(name) == clean
+    assert shown_name(name) == clean
 
 
 # Encodings
@@ -359,7 +360,7 @@ sources = st.none() | st.builds(Source, names.map(lambda name: name + ".py"), te
 @given(
     st.builds(
         Submission,
-        student=texts.map(clean_name),
+        student=texts.map(shown_name),
         program=sources,
         responder=sources,
         files=st.dictionaries(names, st.binary(max_size=40), max_size=3),
@@ -380,7 +381,7 @@ def test_packed_hand_in_can_be_handed_in(tmp_path: Path) -> None:
         pack_submission(Submission("Zoë", Source("z.py", PROGRAM), Source("responder.py", RESPONDER), assignment="x"))
     )
     again = read_submission(tmp_path / "kept.zip")
-    assert (again.student, again.assignment, again.program) == ("Zoë", "x", Source("robot.py", PROGRAM))
+    assert (again.student, again.assignment, again.program) == ("kept", "x", Source("robot.py", PROGRAM))
 
 
 def test_bytes_that_were_not_packed_here_are_refused() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from running import run_program
+from service.grading.grader import grade
 from service.grading.rig import Rig
 from sim.camera import CachedCamera
 from sim.chance import Stream
@@ -15,6 +16,8 @@ from sim.recording import Pose
 from sim.robot import LightSensor
 from sim.sensors import LightReader, Look
 from sim.world import Noise
+from submissions.assignment_file import find_assignment
+from submissions.submission import Source, Submission
 
 TICKS = 200
 AHEAD = "tank_drive.on_for_seconds(50, 50, 20)"
@@ -99,3 +102,66 @@ def test_a_noisy_wheel_creeps_when_it_should_stand_and_is_exact_backwards(rig: R
 def test_wheel_noise_is_the_same_for_a_seed_and_another_for_another(rig: Rig) -> None:
     assert np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50))
     assert not np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50, seed=2))
+
+
+#: Ways to turn wheels at negative speeds, where the original has no noise; the last three drive the robot forwards.
+BACKWARDS = {
+    "timed": "tank_drive.on_for_seconds(-50, -50, 4)",
+    "until told to stop": "import time\ntank_drive.on(-50, -50)\ntime.sleep(4)\ntank_drive.off()",
+    "on a curve": "tank_turn.on_for_seconds(20, -50, 4)",
+    "one motor after the other": """
+from ev3dev2.motor import LargeMotor
+for port in (OUTPUT_B, OUTPUT_C) * 5:
+    LargeMotor(port).on_for_seconds(-40, 0.3)
+""",
+    "both motors reversed": """
+tank_drive.left_motor.polarity = tank_drive.right_motor.polarity = "inversed"
+tank_drive.on_for_seconds(-50, -50, 4)
+""",
+    "set points by hand": """
+import time
+from ev3dev2.motor import LargeMotor
+for port in (OUTPUT_B, OUTPUT_C):
+    LargeMotor(port).run_forever(polarity="inversed", speed_sp=-525)
+time.sleep(4)
+""",
+    "a move to a place behind, at a negative speed": """
+import time
+from ev3dev2.motor import LargeMotor
+for port in (OUTPUT_B, OUTPUT_C):
+    LargeMotor(port).run_to_rel_pos(position_sp=-4000, speed_sp=-525)
+time.sleep(4)
+""",
+}
+
+
+@pytest.mark.parametrize("program", BACKWARDS.values(), ids=BACKWARDS)
+def test_noise_in_both_directions_cannot_be_driven_round(rig: Rig, program: str) -> None:
+    def ends(noise: Noise) -> set[Pose]:
+        start = Pose(1100, 500, 0)
+        return {run_program(rig, program, start, noise=noise, seed=seed, seconds=10).end for seed in (1, 2, 3)}
+
+    assert len(ends(Noise(motor=20))) == 1  # as in the original
+    assert len(ends(Noise(motor=20, both_directions=True))) == 3
+    assert ends(Noise(motor=0, both_directions=True)) == ends(Noise())
+
+
+def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(rig: Rig) -> None:
+    def of(program: str, *, both: bool) -> np.ndarray:
+        noise = Noise(motor=20, both_directions=both)
+        recordings = (run_program(rig, program, Pose(1100, 500, 0), noise=noise, seed=s, seconds=9) for s in range(6))
+        return np.concatenate([np.diff(each.ticks.left_position)[30:240] * 30 for each in recordings])
+
+    ahead, back = of(AHEAD, both=True), of(BACK, both=True)
+    assert np.array_equal(ahead, of(AHEAD, both=False))
+    assert back.mean() == pytest.approx(-ahead.mean(), abs=20)
+    assert back.std() == pytest.approx(ahead.std(), rel=0.3)
+    assert of(STILL, both=True).mean() == pytest.approx(0, abs=5)  # no creeping either way
+
+
+@pytest.mark.parametrize("name", ["dead-reckoning-with-noise", "lollipop-with-noise"])
+def test_in_the_catalogue_backwards_is_noisy(rig: Rig, name: str) -> None:
+    backwards = Submission("eve", Source("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
+    trials = grade(backwards, find_assignment(name), rig=rig).trials
+    noisy = [trial.recording.end for trial in trials if trial.motor_noise]
+    assert len(set(noisy)) == len(noisy)

@@ -57,6 +57,18 @@ def test_an_identical_hand_in_has_the_grade_at_once_and_says_whose(store: Store)
     assert _accept(store, "eve").copied_from == first
 
 
+def test_a_copy_tells_how_its_own_files_were_read_and_not_anothers(store: Store) -> None:
+    def of(student: str) -> HandIn:
+        taken = hand_in()
+        return replace(taken, submission=replace(taken.submission, notes=(f"read from the folder {student} King",)))
+
+    _accept(store, "ada", of("Ada"))
+    first = _grade_next(store, replace(GRADE, notes=("read from the folder Ada King", "the program has no magic line")))
+    second = _accept(store, "bob", of("Bob"))
+    assert second.copied_from == first
+    assert _job(store, second.job_id).notes == ["read from the folder Bob King", "the program has no magic line"]
+
+
 def test_what_waits_is_copied_when_its_turn_comes(store: Store) -> None:
     ids = [_accept(store, student).job_id for student in ("ada", "bob")]
     first = _grade_next(store)

@@ -12,9 +12,10 @@ import report_builders
 from builders import hand_in
 from service.store import batches, grades, jobs, policies, regrades
 from service.store.engine import Store, now
-from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of, enrolment
+from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
 from service.store.models import Job, JobState, Lane, Submission
 from service.store.policies import Limits
+from service.store.students import Students
 from sim.recording import Verdict
 
 GRADE = report_builders.faulty_grade()
@@ -31,7 +32,7 @@ def _extend(store: Store, student: str, due_at: datetime | None = None, more: in
     with store.transaction() as session:
         at = now(session)
         policies.extend(
-            session, enrolment(session, course_of(session, "default", at), student, at), assignment, due_at, more
+            session, Students(session, course_of(session, "default", at)).enrol(student, at), assignment, due_at, more
         )
 
 

@@ -76,7 +76,7 @@ def _submit(hand_ins: Path, assignment: str | None, *, again: bool) -> int:
             _nudger(settings, store).grade(Lane.BATCH, _new(accepted))
     if accepted.batch is not None and not settings.broker_url:
         console.print("A worker grades them: robomark worker", highlight=False)
-    return len(checked.problems)
+    return len(checked.problems) + len(accepted.refused)
 
 
 def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | None, again: bool = True) -> int:
@@ -100,7 +100,8 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
             where = f"status {accepted.batch.id}" if accepted.batch else "list"
             raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
         if report is not None:
-            page = write_batch(store, f"Batch {hand_ins.name}", lines, checked.problems, report)
+            problems = (*checked.problems, *accepted.refused)
+            page = write_batch(store, f"Batch {hand_ins.name}", lines, problems, report)
             console.print(f"report: {page}", highlight=False, soft_wrap=True)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
@@ -108,7 +109,7 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
     cancelled = [line for line in lines if line.state is JobState.CANCELLED]
     if cancelled:
         raise Cancelled(f"{len(cancelled)} of {len(lines)} not graded; {cancelled[0].source}: {cancelled[0].error}")
-    return len(checked.problems)
+    return len(checked.problems) + len(accepted.refused)
 
 
 @batch_app.command("list")
@@ -171,14 +172,18 @@ def _accept(
     """Take in what passed, and say what was new of it."""
     batch = (path.name, checked.hand_ins, checked.problems)
     if again:
-        accepted = intake.AcceptedNew(intake.accept_batch(store, *batch, max_attempts=settings.max_attempts), ())
+        made = intake.accept_batch(store, *batch, max_attempts=settings.max_attempts)
+        accepted = intake.AcceptedNew(made, (), made.refused)
     else:
         accepted = intake.accept_new(store, *batch, max_attempts=settings.max_attempts)
+    _print_problems(accepted.refused, console)
     if accepted.known:
         table = Table("nothing new of", "why", box=None, pad_edge=False)
         for known in accepted.known:
             table.add_row(Text(known.student), Text(f"already handed in as {known.job_id}{_hint(known)}"))
         console.print(table)
+    if accepted.batch is None and not accepted.known:
+        raise UsageError(f"{path}: none of {len(checked.hand_ins)} hand-ins can be taken in")
     if accepted.batch is None:
         console.print("nothing new; --again grades it again", highlight=False)
     else:

@@ -22,7 +22,7 @@ from service.reports.csv_output import marks_csv, moodle_csv
 from service.reports.gradescope import gradescope_text
 from service.reports.json_output import json_document
 from service.reports.junit import junit_text
-from service.reports.written import file_name
+from service.reports.written import file_stems
 from service.settings import load_settings
 from service.store import batches, grades, regrades
 from service.store.batches import JobLine
@@ -93,19 +93,15 @@ def _exported(lines: Sequence[JobLine], *, published: bool) -> list[JobLine]:
 
 
 def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: Path) -> None:
-    """A file a hand-in, named after its student; two of one name keep apart by the grade's id."""
+    """A file a hand-in, named after its student, and after its assignment where one student has several."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
-    used: set[str] = set()
-    for line, grade in _grades(store, lines):
-        name = file_name(grade.student).removesuffix(".html")
-        if name.casefold() in used:
-            name = f"{name}-{line.id}"
-        used.add(name.casefold())
-        _write(folder / f"{name}{each.suffix}", each.text(grade))
-    print(f"{len(used)} files in {folder}")
+    stems = file_stems([(line.student, line.assignment) for line in lines])
+    for stem, (_, grade) in zip(stems, _grades(store, lines), strict=True):
+        _write(folder / f"{stem}{each.suffix}", each.text(grade))
+    print(f"{len(stems)} files in {folder}")
 
 
 def _write(path: Path, text: str) -> None:

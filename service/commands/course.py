@@ -16,9 +16,11 @@ from service.roster import moment
 from service.settings import load_settings
 from service.store import audit, policies
 from service.store.engine import Store, now, open_store
-from service.store.intake import DEFAULT_COURSE, course_of, enrolment
+from service.store.intake import DEFAULT_COURSE, course_of
 from service.store.policies import Limits
+from service.store.students import Students
 from sim.errors import UsageError
+from submissions.names import shown_name
 
 course_app = typer.Typer(help="When and how often students may hand in.", no_args_is_help=True)
 
@@ -59,10 +61,11 @@ def extend(
     if due is None and not more_attempts:
         raise UsageError("say what to allow: --due, --more-attempts, or both")
     due_at = _due(due)
+    student = shown_name(student)
     with open_store(load_settings()) as store, store.transaction() as session:
         at = now(session)
         course_id = course_of(session, DEFAULT_COURSE, at)
-        enrolment_id = enrolment(session, course_id, student, at)
+        enrolment_id = Students(session, course_id).enrol(student, at)
         policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
         detail = {"student": student, **_told(assignment, Limits(due_at, attempts=more_attempts))}
         audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)

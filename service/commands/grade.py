@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
@@ -25,7 +26,9 @@ from service.reports.written import prepare_folder, write_report
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment, find_in_catalogue
-from submissions.bundle import fit_parts, read_submission
+from submissions.bundle import fit_parts, named_by, read_submission
+from submissions.names import alike, cannot_be_told
+from submissions.raw_files import shown
 from submissions.submission import Submission
 
 
@@ -70,12 +73,15 @@ def grade(
     """Grade hand-ins now; exit status 0 when all were graded, whatever the marks."""
     if report is not None:
         prepare_folder(report)
+    near = _like_others(submissions) if report is not None else {}
     worst: RobomarkError | None = None
     if unsafe:
         warn_of_no_walls()
     with Rig(NONE if unsafe else FULL) as rig:
         for path in submissions:
             try:
+                if path in near:
+                    raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
                 graded = grade_submission(submission, asked, rig=rig)
             except RobomarkError as error:
@@ -91,6 +97,18 @@ def grade(
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every hand-in could be graded")
+
+
+def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
+    """The hand-ins whose reports would take each other's place in one folder, each with a sentence."""
+    names = {path: named_by(path) for path in paths}
+    near = alike(names.values())
+    times = Counter(map(named_by, paths))
+    found = {path: f"{path}: its student {cannot_be_told(near[names[path]])}" for path in paths if names[path] in near}
+    for path in paths:
+        if times[names[path]] > 1:
+            found.setdefault(path, f"{path}: {shown(names[path])} is named more than once")
+    return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
 
 
 def warn_of_no_walls() -> None:

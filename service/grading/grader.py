@@ -291,7 +291,7 @@ def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -
         floor=ground,
         robot=robot(assignment.world.robot),
         pose=trial.pose,
-        noise=Noise(trial.light_noise, trial.motor_noise),
+        noise=Noise(trial.light_noise, trial.motor_noise, assignment.world.noise == "both directions"),
         channel=_channel(trial.channel),
         seconds=trial.scenario.seconds,
         seed=trial.seed,

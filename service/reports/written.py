@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from service.grading.grade import Grade
@@ -13,11 +16,31 @@ from service.reports.plots import draw_all
 from sim.errors import UsageError
 from submissions.submission import Submission
 
+#: Of a name, in a file's name; a file system allows 255 for all of it.
+_MOST_BYTES = 80
 
-def file_name(student: str) -> str:
-    """A file name for a student's report: letters, digits, dots and dashes of the name, and nothing else."""
-    plain = re.sub(r"[^\w.-]+", "-", student).strip("-._")[:80]
-    return f"{plain or 'report'}.html"
+
+def file_stem(student: str, assignment: str = "") -> str:
+    """What a student's files are called: no two names give the same, whatever is written into one folder.
+
+    A space becomes a dash, and a dash two. A name from which more is lost, or that is too long, goes on with a hash.
+    With ``assignment``, the student's files for this one.
+    """
+    plain = re.sub(r"[^\w.-]+", "-", student.replace("-", "--").replace(" ", "-"))
+    short = plain.encode()[:_MOST_BYTES].decode(errors="ignore").strip("-.")
+    again = re.sub("--?", lambda dashes: "-" if dashes[0] == "--" else " ", short)
+    if again != student or short.casefold() == "index":
+        short = f"{short or 'report'}~{hashlib.sha256(student.encode('utf-8', 'surrogatepass')).hexdigest()[:16]}"
+    return f"{short}+{assignment}" if assignment else short
+
+
+def file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
+    """A stem for each (student, assignment); only a student with several assignments has them in it.
+
+    Each pair may come once.
+    """
+    many = Counter(student for student, _ in graded)
+    return [file_stem(student, assignment if many[student] > 1 else "") for student, assignment in graded]
 
 
 def prepare_folder(folder: Path) -> None:
@@ -45,4 +68,4 @@ def write_page(folder: Path, name: str, page: str) -> Path:
 def write_report(folder: Path, grade: Grade, submission: Submission | None = None) -> Path:
     """Draw the plots of a grade and write the student's report; where it is."""
     page = student_report(grade, draw_all(grade), submission)
-    return write_page(folder, file_name(grade.student), page)
+    return write_page(folder, f"{file_stem(grade.student)}.html", page)

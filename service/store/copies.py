@@ -26,6 +26,7 @@ from service.store.models import (
     Worker,
 )
 from sim.recording import Verdict
+from submissions.bundle import unpack_submission
 
 #: How far such a trial came depends on the machine and its load, so another run may differ.
 _NOT_REPEATABLE = (Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR)
@@ -77,9 +78,10 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
         _copy_rows(session, table, source_id, job_id)
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    names = ("verdict", "marks", "max_marks", "grader_version", "grader_sha256", "walls", "notes", "cache_key")
+    names = ("verdict", "marks", "max_marks", "grader_version", "grader_sha256", "walls", "cache_key")
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
+        "notes": _notes(session, source, job_id),
         "state": JobState.DONE,
         "copied_from": source_id,
         "lease": None,
@@ -93,6 +95,15 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
         "plots_due_at": None if drawn else at,
         "plotted_at": at if drawn else None,
     }
+
+
+def _notes(session: Session, source: Job, job_id: str) -> list[str]:
+    """What was noted when this hand-in was read, then what the grading noted: another's folder may have their name."""
+    packed = select(Submission.packed).join(Job, Job.submission_id == Submission.id)
+    theirs, own = (
+        unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)
+    )
+    return [*own, *(note for note in source.notes if note not in theirs)]
 
 
 def _copy_rows(session: Session, table: type[Base], source_id: str, job_id: str) -> None:

@@ -20,15 +20,13 @@ from service.store.models import (
     Batch,
     BatchState,
     Course,
-    Enrolment,
     Job,
     JobState,
     Lane,
-    Person,
-    Role,
     Standing,
 )
 from service.store.policies import Ruling, rule
+from service.store.students import Students
 from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
@@ -47,6 +45,12 @@ class HandIn:
     assignment: Assignment
     source: str
     handed_in_at: datetime | None = None  # by the student, where anybody said
+    written: str = ""  # the student, as the file or folder has it, where that is not the normal form
+
+    @property
+    def student(self) -> str:
+        """As it was written."""
+        return self.written or self.submission.student
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +66,11 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class AcceptedBatch:
+    """``refused`` are rows of students whom the course cannot tell from others: name, sentence."""
+
     id: str
     jobs: tuple[Accepted, ...]
+    refused: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +90,7 @@ class AcceptedNew:
 
     batch: AcceptedBatch | None
     known: tuple[Known, ...]
+    refused: tuple[tuple[str, str], ...] = ()
 
 
 def accept(
@@ -90,13 +98,15 @@ def accept(
 ) -> Accepted:
     """Take in one hand-in that a person waits for; where an identical one has a grade, it has that grade at once.
 
-    It is handed in now, unless it says when.
+    It is handed in now, unless it says when. Raises UsageError where its student cannot be told from another.
     """
     (packed,) = _pack([hand_in])
     with store.transaction() as session:
         at = now(session)
         packed = replace(packed, hand_in=replace(hand_in, handed_in_at=hand_in.handed_in_at or at))
-        return _accept(session, packed, _Terms(course_of(session, course, at), lane, max_attempts, at))
+        terms = _Terms(course_of(session, course, at), lane, max_attempts, at)
+        enrolment_id = Students(session, terms.course_id).enrol(hand_in.student, at)
+        return _accept(session, _Item(packed, enrolment_id), terms)
 
 
 def accept_batch(
@@ -110,13 +120,16 @@ def accept_batch(
 ) -> AcceptedBatch:
     """Take in a whole batch or nothing of it, each hand-in to be graded anew whatever was handed in before.
 
-    ``problems`` are the rows that were refused: name, sentence.
+    ``problems`` are the rows that were refused: name, sentence. Raises UsageError when the course refuses the rest.
     """
     packed = _pack(hand_ins)
     with store.transaction() as session:
         at = now(session)
         terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, anew=True)
-        return _accept_batch(session, packed, name, problems, terms)
+        items, refused = _enrolled(session, packed, terms)
+        if refused and not items:
+            raise UsageError(f"none can be taken in; {refused[0][0]}: {refused[0][1]}")
+        return replace(_accept_batch(session, items, name, [*problems, *refused], terms), refused=refused)
 
 
 def accept_new(
@@ -138,10 +151,11 @@ def accept_new(
     with store.transaction() as session:
         at = now(session)
         terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at)
-        found = [_known(session, item, terms.course_id) for item in packed]
-        new = [item for item, known in zip(packed, found, strict=True) if known is None]
-        batch = _accept_batch(session, new, name, problems, terms) if new else None
-        return AcceptedNew(batch, tuple(known for known in found if known is not None))
+        items, refused = _enrolled(session, packed, terms)
+        found = [_known(session, item) for item in items]
+        new = [item for item, known in zip(items, found, strict=True) if known is None]
+        batch = _accept_batch(session, new, name, [*problems, *refused], terms) if new else None
+        return AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
 
 
 def load_hand_in(session: Session, job_id: str) -> HandIn:
@@ -173,6 +187,14 @@ class _Packed:
 
 
 @dataclass(frozen=True, slots=True)
+class _Item:
+    """What is taken in, and whose it is."""
+
+    packed: _Packed
+    enrolment_id: int
+
+
+@dataclass(frozen=True, slots=True)
 class _Terms:
     """How hand-ins are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
 
@@ -196,14 +218,26 @@ def _pack(hand_ins: Sequence[HandIn]) -> list[_Packed]:
     return packed
 
 
-def _known(session: Session, packed: _Packed, course_id: int) -> Known | None:
-    hand_in = packed.hand_in
+def _enrolled(
+    session: Session, packed: Sequence[_Packed], terms: _Terms
+) -> tuple[list[_Item], tuple[tuple[str, str], ...]]:
+    """Whose each is, and the rows whose student cannot be told from another."""
+    students = Students(session, terms.course_id)
+    items, refused = [], []
+    for each in packed:
+        try:
+            items.append(_Item(each, students.enrol(each.hand_in.student, terms.at)))
+        except UsageError as error:
+            refused.append((each.hand_in.source, str(error)))
+    return items, tuple(refused)
+
+
+def _known(session: Session, item: _Item) -> Known | None:
+    hand_in = item.packed.hand_in
     newest = session.scalar(
         select(models.Submission)
-        .join(Enrolment, models.Submission.enrolment_id == Enrolment.id)
         .where(
-            Enrolment.course_id == course_id,
-            Enrolment.student == hand_in.submission.student,
+            models.Submission.enrolment_id == item.enrolment_id,
             models.Submission.assignment == hand_in.assignment.id,
         )
         .order_by(models.Submission.attempt.desc())
@@ -217,7 +251,7 @@ def _known(session: Session, packed: _Packed, course_id: int) -> Known | None:
         .outerjoin(Batch, Job.batch_id == Batch.id)
         .where(
             Job.submission_id == newest.id,
-            AssignmentVersion.sha256 == packed.frozen.sha256,
+            AssignmentVersion.sha256 == item.packed.frozen.sha256,
             Job.state != JobState.CANCELLED,
             # A dead job of a cancelled batch cannot be retried, so it too comes in again.
             or_(Job.state != JobState.DEAD, Job.batch_id.is_(None), Batch.state != BatchState.CANCELLED),
@@ -234,20 +268,20 @@ def _known(session: Session, packed: _Packed, course_id: int) -> Known | None:
 
 
 def _accept_batch(
-    session: Session, packed: Sequence[_Packed], name: str, problems: Sequence[tuple[str, str]], terms: _Terms
+    session: Session, items: Sequence[_Item], name: str, problems: Sequence[tuple[str, str]], terms: _Terms
 ) -> AcceptedBatch:
     rows = [list(row) for row in problems]
     batch = Batch(course_id=terms.course_id, name=name, problems=rows, created_at=terms.at)
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)
-    return AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in packed))
+    return AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in items))
 
 
-def _accept(session: Session, packed: _Packed, terms: _Terms) -> Accepted:
-    hand_in, at = packed.hand_in, terms.at
+def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
+    packed, enrolment_id, at = item.packed, item.enrolment_id, terms.at
+    hand_in = packed.hand_in
     submission, assignment = hand_in.submission, hand_in.assignment
-    enrolment_id = enrolment(session, terms.course_id, submission.student, at)
     version_id = keep(session, packed.frozen, at)
     of_student = (models.Submission.enrolment_id == enrolment_id, models.Submission.assignment == assignment.id)
     earlier = session.scalar(select(func.max(models.Submission.attempt)).where(*of_student)) or 0
@@ -305,17 +339,3 @@ def course_of(session: Session, name: str, at: datetime) -> int:
     """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
     insert_if_new(session, Course, name=name, created_at=at)
     return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()
-
-
-def enrolment(session: Session, course_id: int, student: str, at: datetime) -> int:
-    """The student of this name in the course; made if there is none."""
-    found = session.scalar(select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.student == student))
-    if found is not None:
-        return found
-    person = Person(name=student, created_at=at)
-    session.add(person)
-    session.flush()
-    row = Enrolment(course_id=course_id, person_id=person.id, student=student, role=Role.STUDENT)
-    session.add(row)
-    session.flush()
-    return row.id
