@@ -5,6 +5,7 @@ Whether a worker may store a grade is ``jobs``'s to say; nothing here judges.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, cast
@@ -46,9 +47,9 @@ def prepare(grade: Grade) -> Prepared:
     cap = recordings.cap_for(len(grade.trials))
     kept = [recordings.keep(trial.recording, cap) for trial in grade.trials]
     files = [artifacts.File(_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)]
-    whole = [item.recording for item in kept]
+    numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in kept]
     sights = [
-        [plain for sight in result.sights if (plain := _plain_sight(sight, whole)) is not None]
+        [plain for sight in result.sights if (plain := _plain_sight(sight, numbers[sight.trial])) is not None]
         for result in grade.criteria
     ]
     return Prepared(grade, files, sights)
@@ -142,14 +143,11 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
     )
 
 
-def _plain_sight(sight: Sight, kept: list[Recording]) -> dict[str, Any] | None:
+def _plain_sight(sight: Sight, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
     """A sight that names its picture by number in the recording; none if the picture was too much to keep."""
-    images = kept[sight.trial].images
-    where = next((index for index, image in enumerate(images) if image is sight.image), None)
-    if where is None:
-        where = next((index for index, image in enumerate(images) if image == sight.image), None)
-    if where is None and not images:
+    if not numbers:
         return None
+    where = numbers.get(sight.image)
     plain = cast(dict[str, Any], to_plain(replace(sight, image=cast(Image, None))))
     return plain | {"image": where if where is not None else to_plain(sight.image)}
 

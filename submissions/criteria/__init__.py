@@ -30,11 +30,10 @@ from submissions.criteria.motion import Displacement, Encounters, Excursions, Mo
 from submissions.criteria.path import Circuits, Closest, KeepsOut, Spread, StaysInside, TouchesNothing, Visits
 from submissions.criteria.reporting import Events, Reports, Sequence
 from submissions.criteria.stopping import StopOn
-from submissions.criteria.texts import LONGEST_MATCHED_TEXT, Messages, Prints, Replies, Says
+from submissions.criteria.texts import Messages, Prints, Replies, Says
 from submissions.criteria.timing import Ranking, Timing
 
 __all__ = [
-    "LONGEST_MATCHED_TEXT",
     "SCHEMAS",
     "Circuits",
     "Classification",

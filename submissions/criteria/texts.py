@@ -5,15 +5,12 @@ Only what is asked; judging texts is the service's.
 
 from __future__ import annotations
 
-import re
 from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
-
-#: Longest text of a student's that a pattern is tried on; a pattern that backtracks must not hold a worker.
-LONGEST_MATCHED_TEXT = 1000
+from submissions.criteria.expressions import usable
 
 
 class _TextConditions(CriterionBase):
@@ -37,15 +34,8 @@ class _TextConditions(CriterionBase):
 
     @field_validator("matches")
     @classmethod
-    def _compiles(cls, value: str | None) -> str | None:
-        if value is not None:
-            try:
-                re.compile(value)
-            except re.error as error:
-                raise ValueError(
-                    f"is not a regular expression ({error}), expected one that Python's re reads"
-                ) from None
-        return value
+    def _usable(cls, value: str | None) -> str | None:
+        return None if value is None else usable(value)
 
     @property
     def has_conditions(self) -> bool:
@@ -96,9 +86,9 @@ class _TextSequence(_TextConditions):
         if self.compare == "matches":
             for pattern in self.in_order:
                 try:
-                    re.compile(pattern)
-                except re.error as error:
-                    raise ValueError(f"has in in_order what is not a regular expression ({error}): {pattern}") from None
+                    usable(pattern)
+                except ValueError as error:
+                    raise ValueError(f'has "{pattern}" in in_order, which {error}') from None
         return self
 
     def _asks_more(self) -> bool:

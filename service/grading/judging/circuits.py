@@ -88,8 +88,8 @@ def rounds(points: Floats, x: float, y: float) -> Floats:
 
 def _whole_rounds(round_it: Floats) -> list[tuple[int, int]]:
     """First and last row of each whole round."""
-    size = np.abs(round_it)
-    ends = [int(np.flatnonzero(size >= number)[0]) for number in range(1, int(size.max(initial=0.0)) + 1)]
+    farthest = np.maximum.accumulate(np.abs(round_it))
+    ends = np.searchsorted(farthest, np.arange(1, int(farthest.max(initial=0.0)) + 1)).tolist()
     return list(zip([0, *ends], ends, strict=False))
 
 

@@ -20,7 +20,7 @@ from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import by_pattern
 from service.grading.judging.tally import Fate, Reply, reply_to
-from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
+from service.grading.judging.truths import NO_PICTURE, Told, nameable, shown_in, told_truths
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
@@ -38,8 +38,9 @@ class Classified:
 
 def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
     """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
-    shown = shown_in(criterion, assignment, trials)
-    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
+    listed = told_truths(criterion, assignment)
+    shown = shown_in(criterion, listed, trials)
+    truths = [truth for known in shown.values() for _, truth in known]
     labels = nameable(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
     pictures: list[Naming] = []
@@ -57,8 +58,11 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
             image = recording.images[number]
             own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
         pictures += own
-        namings += _that_count(criterion, assignment, index, trial, own, finder)
+        namings += _that_count(criterion, listed, index, trial, own, finder)
     by_index = dict(trials)
+    of_trial: dict[int, list[Naming]] = {index: [] for index in by_index}
+    for naming in namings:
+        of_trial[naming.trial].append(naming)
     sights = tuple(
         Sight(naming.image, naming.truth, naming.answer, by_index[naming.trial].scenario, naming.trial)
         for naming in pictures
@@ -80,7 +84,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
         tuple(namings),
         _accuracy(namings, labels, counts),
         sights,
-        tuple(_evidence(namings, index) for index, _ in trials),
+        tuple(_evidence(index, own) for index, own in of_trial.items()),
     )
 
 
@@ -97,7 +101,7 @@ def told(naming: Naming) -> str:
 
 def _that_count(
     criterion: Recognition,
-    assignment: Assignment,
+    listed: Told,
     index: int,
     trial: TrialResult,
     own: list[Naming],
@@ -110,7 +114,7 @@ def _that_count(
     if counted and len(counted) >= criterion.patterns:
         return counted
     if not counted and criterion.patterns <= 1:
-        truth = missing_truth(criterion, assignment, trial)
+        truth = listed.get((trial.scenario, trial.index), NO_PICTURE)
         sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"
@@ -142,9 +146,8 @@ def _confidence(namings: Sequence[Naming]) -> Confidence | None:
     return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
 
 
-def _evidence(namings: Sequence[Naming], index: int) -> Evidence:
+def _evidence(index: int, own: Sequence[Naming]) -> Evidence:
     """The first picture of the trial that was named wrongly, else its last."""
-    own = [naming for naming in namings if naming.trial == index]
     shown = next((naming for naming in own if not naming.right), own[-1])
     image = shown.image
     return Evidence(

@@ -31,6 +31,7 @@ from service.grading.judging.path import (
     judge_touches_nothing,
     judge_visits,
 )
+from service.grading.judging.planned import pose_numbers
 from service.grading.judging.recognition import judge_recognition
 from service.grading.judging.replies import judge_replies
 from service.grading.judging.reported import judge_reports
@@ -115,10 +116,8 @@ _JUDGES: Mapping[type, Callable[[Any, TrialResult], Outcome]] = MappingProxyType
     }
 )
 
-#: Those that need to know what the assignment planned for the trial.
-_PLANNED_JUDGES: Mapping[type, Callable[[Any, TrialResult, Assignment], Outcome]] = MappingProxyType(
-    {Reports: judge_reports}
-)
+#: Those that need to know from which of its scenario's poses the trial started.
+_PLANNED_JUDGES: Mapping[type, Callable[[Any, TrialResult, int], Outcome]] = MappingProxyType({Reports: judge_reports})
 
 _NOTHING_FOUND = Findings()
 
@@ -159,7 +158,8 @@ def _judge_one(
     ]
     if isinstance(criterion, Classification | Robustness):
         return judge_recognition(criterion, assignment, own)
-    outcomes = [_outcome(criterion, assignment, place, trial, findings, results) for place, trial in own]
+    poses = pose_numbers(assignment) if type(criterion) in _PLANNED_JUDGES else {}
+    outcomes = [_outcome(criterion, poses, place, trial, findings, results) for place, trial in own]
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -194,7 +194,7 @@ def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> Crit
 
 def _outcome(
     criterion: Criterion,
-    assignment: Assignment,
+    poses: Mapping[tuple[str, int], int],
     place: int,
     trial: TrialResult,
     findings: Findings,
@@ -206,7 +206,7 @@ def _outcome(
         return judge_ranking(criterion, place, results.get(criterion.of))
     planned = _PLANNED_JUDGES.get(type(criterion))
     if planned is not None:
-        return planned(criterion, trial, assignment)
+        return planned(criterion, trial, poses.get((trial.scenario, trial.index), 0))
     return _JUDGES[type(criterion)](criterion, trial)
 
 

@@ -157,7 +157,7 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     """Each fall of the reading below the threshold, and what the robot did in the seconds after it."""
     recording = trial.recording
     falls = _falls(criterion, recording)
-    answered = [row for row in falls if _answered(criterion, recording, row)]
+    answered = _answered(criterion, recording, falls)
     measures = (Measure("encounters", len(falls)), Measure("answered", len(answered)))
     score = Fraction(min(len(answered), criterion.at_least), criterion.at_least)
     if len(answered) >= criterion.at_least:
@@ -168,7 +168,7 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
         )
     what = " and then ".join(criterion.then)
     expected = f"Expected the robot to {what} {_times(criterion.at_least)} after seeing something dark"
-    ignored = next((row for row in falls if row not in answered), None)
+    ignored = min(set(falls).difference(answered), default=None)
     if ignored is not None:
         return failed(
             f"{expected}, but it {_did(len(answered))}; here is the first time that it did not.",
@@ -326,28 +326,36 @@ def _falls(criterion: Encounters, recording: Recording) -> list[int]:
     return [first + 1 for first, _ in stretches(dark)]
 
 
-def _answered(criterion: Encounters, recording: Recording, row: int) -> bool:
-    """Whether all that was asked came in order after ``row``, and in time."""
+def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> list[int]:
+    """Those of the falls after which all that was asked came in order, and in time."""
     ahead, turned = travel(recording)
-    still = standing(recording)
-    until = int(np.searchsorted(times(recording), row / 30 + criterion.seconds, side="right")) - 1
-    at = row
-    for deed in criterion.then:
-        done = None
-        for now in range(at, min(until, len(ahead))):
-            since = slice(at, now + 1)
-            if deed == "reverse":
-                reached = -float(np.minimum(ahead[since], 0).sum()) >= _REVERSED
-            elif deed == "turn":
-                reached = abs(float(turned[since].sum())) >= _TURNED
-            else:
-                reached = bool(still[max(now + 1 - _STOPPED, at) : now + 1].sum() >= _STOPPED)
-            if reached:
-                done = now + 1
-                break
-        if done is None:
+    motion = _Motion(-np.minimum(ahead, 0), turned, standing(recording))
+    ends = np.searchsorted(times(recording), np.array(falls) / 30 + criterion.seconds, side="right") - 1
+    return [row for row, end in zip(falls, ends.tolist(), strict=True) if _all_came(criterion.then, motion, row, end)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """What each tick added, shape (n,): mm backwards, degrees; and whether the robot stood."""
+
+    backwards: Floats
+    turned: Floats
+    still: NDArray[np.bool_]
+
+
+def _all_came(deeds: tuple[str, ...], motion: _Motion, begin: int, end: int) -> bool:
+    for deed in deeds:
+        since = slice(begin, end)
+        if deed == "reverse":
+            reached = np.cumsum(motion.backwards[since]) >= _REVERSED
+        elif deed == "turn":
+            reached = np.abs(np.cumsum(motion.turned[since])) >= _TURNED
+        else:
+            stood = np.cumsum(motion.still[since])
+            reached = stood - np.concatenate([np.zeros(_STOPPED, dtype=int), stood])[: len(stood)] >= _STOPPED
+        if not reached.any():
             return False
-        at = done
+        begin += int(np.argmax(reached)) + 1
     return True
 
 

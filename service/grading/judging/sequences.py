@@ -126,8 +126,9 @@ def _mentions(event: EventAt, line: Line) -> bool:
 
 
 def _happens(criterion: Events, event: EventAt, line: Line, recording: Recording) -> bool:
-    place = part_at_time(recording, criterion.sensor, line.t)
-    return _mentions(event, line) and in_zone(place, event.zone, criterion.margin)
+    return _mentions(event, line) and in_zone(
+        part_at_time(recording, criterion.sensor, line.t), event.zone, criterion.margin
+    )
 
 
 def _missed(

@@ -1,11 +1,10 @@
 """Judging what was printed, said and sent: which texts count, how many there are, and in which order they came.
 
-The texts are a student's; patterns are the instructor's and see only the beginning of a long text.
+The texts are a student's, patterns are the instructor's; no pair of them takes longer than the text is long.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,7 +14,8 @@ from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
 from sim.recording import Line, Message, Recording
-from submissions.criteria import LONGEST_MATCHED_TEXT, Messages, Prints, Replies, Says
+from submissions.criteria import Messages, Prints, Replies, Says
+from submissions.criteria.expressions import found_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def meets(criterion: Sequenced | Replies, text: str) -> bool:
         return False
     if not all(_plain(wanted, fold) in plain for wanted in criterion.contains):
         return False
-    return criterion.matches is None or _matches(criterion.matches, text, fold)
+    return criterion.matches is None or found_in(text, criterion.matches, fold)
 
 
 def conditions(criterion: Sequenced | Replies) -> str:
@@ -267,11 +267,7 @@ def _compares(criterion: Sequenced, text: str, wanted: str) -> bool:
         case "starts_with":
             return _plain(text, fold).startswith(_plain(wanted, fold))
         case "matches":
-            return _matches(wanted, text, fold)
-
-
-def _matches(pattern: str, text: str, ignore_case: bool) -> bool:
-    return re.search(pattern, text[:LONGEST_MATCHED_TEXT], re.IGNORECASE if ignore_case else 0) is not None
+            return found_in(text, wanted, fold)
 
 
 def _plain(text: str, ignore_case: bool) -> str:

@@ -42,8 +42,8 @@ _NUMBERS = {word: str(number) for number, word in enumerate(_SMALL)} | {
 #: Longest text of a student's that is taken apart.
 _MOST = 20_000
 _WORD = re.compile(r"[^\W_]+")
-#: A number as Python writes it, or a word.
-_TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]+")
+#: A number as Python writes it, or a word. Runs of digits are possessive: what was read of them is not read again.
+_TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]++")
 
 
 def words_of(text: str) -> list[str]:

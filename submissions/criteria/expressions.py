@@ -1,0 +1,64 @@
+"""Instructors' regular expressions, by RE2: whatever the pattern, a text takes time in proportion to its length.
+
+They are written as for Python's ``re`` and mean the same; which texts they are tried on is the service's.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from typing import Any
+
+import re2
+
+#: What Python's classes stand for in any script; RE2's own know a to z.
+_WORD, _SPACE = r"\p{L}\p{N}_", r"\s\v\x1c-\x1f\x{85}\p{Z}"
+_INSIDE = {r"\d": r"\p{Nd}", r"\D": r"\P{Nd}", r"\w": _WORD, r"\s": _SPACE}
+_OUTSIDE = _INSIDE | {
+    r"\w": f"[{_WORD}]",
+    r"\W": f"[^{_WORD}]",
+    r"\s": f"[{_SPACE}]",
+    r"\S": f"[^{_SPACE}]",
+    r"\Z": r"\z",
+    "{,": "{0,",
+}
+#: An escape, a class in brackets, or a repetition that leaves its least number out.
+_PART = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|\{,(?=\d+\})", re.DOTALL)
+_ESCAPE = re.compile(r"\\.", re.DOTALL)
+
+
+def usable(pattern: str) -> str:
+    """The pattern itself. Raises ValueError, with what is wrong and what was expected, if it cannot be used."""
+    _compiled(pattern, False)
+    return pattern
+
+
+def found_in(text: str, pattern: str, ignore_case: bool) -> bool:
+    """Whether the pattern is found anywhere in the text; ``$`` is the end, or before a line feed at the end."""
+    compiled, data = _compiled(pattern, ignore_case), text.encode("utf-8", "replace")
+    return any(compiled.search(each) is not None for each in {data, data.removesuffix(b"\n")})
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(pattern: str, ignore_case: bool) -> Any:
+    options = re2.Options()
+    options.case_sensitive = not ignore_case
+    options.never_capture = True
+    options.log_errors = False
+    try:
+        return re2.compile(_PART.sub(lambda part: _translated(part[0]), pattern), options)
+    except (re2.error, ValueError) as error:
+        reason = error.args[0].decode("utf-8", "replace") if isinstance(error, re2.error) else str(error)
+        raise ValueError(
+            f"is not a regular expression that can be used ({reason}), expected one without look-around, "
+            "back-references, possessive repetition and atomic groups"
+        ) from None
+
+
+def _translated(part: str) -> str:
+    if not part.startswith("["):
+        return _OUTSIDE.get(part, part)
+    negated = next((each for each in _ESCAPE.findall(part) if each in (r"\W", r"\S")), None)
+    if negated is not None:
+        raise ValueError(f"{negated} in brackets")
+    return _ESCAPE.sub(lambda escape: _INSIDE.get(escape[0], escape[0]), part)
