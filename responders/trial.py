@@ -39,7 +39,7 @@ def run_trial(
     with sandboxes.private_folder() as folder:
         responder = None
         if order.responder is not None:
-            responder = Responder(order.responder, sandboxes, folder, order.seed, pulse)
+            responder = Responder(order.responder, sandboxes, folder, order.child_seed, pulse)
         try:
             program = sandboxes.spawn("robot", order.program.limits)
             try:

@@ -53,6 +53,7 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
+        child_seed=seed,
         physics=physics,
     )
     return rig.run(order, obstacles, pulse)

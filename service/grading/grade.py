@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from sim.recording import Image, Pose, Recording, Verdict
+from submissions.seeds import PUBLIC
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +142,7 @@ class TrialResult:
     visibility: str
     recording: Recording
     sweep: tuple[tuple[str, float], ...] = ()  # the condition that is swept and its level in this trial
+    place: int = 0  # which of the scenario's poses it started from, whatever noise or the program made of that
 
     @property
     def verdict(self) -> Verdict:
@@ -161,6 +163,7 @@ class Grade:
     walls: str
     grader_version: str
     notes: tuple[str, ...] = ()
+    secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
 
     @property
     def marks(self) -> Decimal:

@@ -36,6 +36,7 @@ def with_models_answers(
     training: Training,
     hand_in: Source,
     files: Mapping[str, bytes],
+    child_seed: int,
     rig: Rig,
     pulse: Callable[[], None] = lambda: None,
 ) -> list[TrialResult]:
@@ -50,9 +51,8 @@ def with_models_answers(
         index: _collected(result) for index, result in enumerate(results) if result.scenario not in training.scenarios
     }
     unseen = [pair for own in asked.values() for pair in own]
-    seed = results[0].seed if results else 0
     # Not in the order of the track: neighbours on it mostly show the same.
-    order = sorted(range(len(unseen)), key=Stream(seed, "order of pictures").integer)
+    order = sorted(range(len(unseen)), key=Stream(child_seed, "order of pictures").integer)
     limits = assignment.limits
     trained = rig.train(
         TrainingOrder(
@@ -64,7 +64,7 @@ def with_models_answers(
             _arrays([unseen[place] for place in order], training),
             ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
             limits.output_bytes,
-            seed,
+            child_seed,
         ),
         pulse,
     )

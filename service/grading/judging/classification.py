@@ -38,7 +38,7 @@ class Classified:
 
 def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
     """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
-    shown = shown_in(criterion, assignment, trials)
+    shown = shown_in(criterion, trials)
     truths = [truth for told_truths in shown.values() for _, truth in told_truths]
     labels = nameable(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
@@ -57,7 +57,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
             image = recording.images[number]
             own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
         pictures += own
-        namings += _that_count(criterion, assignment, index, trial, own, finder)
+        namings += _that_count(criterion, index, trial, own, finder)
     by_index = dict(trials)
     sights = tuple(
         Sight(naming.image, naming.truth, naming.answer, by_index[naming.trial].scenario, naming.trial)
@@ -97,7 +97,6 @@ def told(naming: Naming) -> str:
 
 def _that_count(
     criterion: Recognition,
-    assignment: Assignment,
     index: int,
     trial: TrialResult,
     own: list[Naming],
@@ -110,7 +109,7 @@ def _that_count(
     if counted and len(counted) >= criterion.patterns:
         return counted
     if not counted and criterion.patterns <= 1:
-        truth = missing_truth(criterion, assignment, trial)
+        truth = missing_truth(criterion, trial)
         sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"

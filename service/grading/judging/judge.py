@@ -112,12 +112,8 @@ _JUDGES: Mapping[type, Callable[[Any, TrialResult], Outcome]] = MappingProxyType
         Follows: judge_follows,
         Laps: judge_laps,
         Spread: judge_spread,
+        Reports: judge_reports,
     }
-)
-
-#: Those that need to know what the assignment planned for the trial.
-_PLANNED_JUDGES: Mapping[type, Callable[[Any, TrialResult, Assignment], Outcome]] = MappingProxyType(
-    {Reports: judge_reports}
 )
 
 _NOTHING_FOUND = Findings()
@@ -159,7 +155,7 @@ def _judge_one(
     ]
     if isinstance(criterion, Classification | Robustness):
         return judge_recognition(criterion, assignment, own)
-    outcomes = [_outcome(criterion, assignment, place, trial, findings, results) for place, trial in own]
+    outcomes = [_outcome(criterion, place, trial, findings, results) for place, trial in own]
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -194,7 +190,6 @@ def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> Crit
 
 def _outcome(
     criterion: Criterion,
-    assignment: Assignment,
     place: int,
     trial: TrialResult,
     findings: Findings,
@@ -204,9 +199,6 @@ def _outcome(
         return findings.checks[criterion.id, place]
     if isinstance(criterion, Ranking):
         return judge_ranking(criterion, place, results.get(criterion.of))
-    planned = _PLANNED_JUDGES.get(type(criterion))
-    if planned is not None:
-        return planned(criterion, trial, assignment)
     return _JUDGES[type(criterion)](criterion, trial)
 
 

@@ -11,11 +11,9 @@ from fractions import Fraction
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.outcome import Outcome, failed, listed, passed, quoted
 from service.grading.judging.places import part_at
-from service.grading.judging.planned import pose_number
 from service.grading.judging.words import Token, find_words, tokens_of, words_of
 from sim.backgrounds import floor, names
 from sim.recording import Recording
-from submissions.assignment import Assignment
 from submissions.criteria.reporting import Reports
 
 Entry = float | str
@@ -23,8 +21,8 @@ Entry = float | str
 _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
 
 
-def judge_reports(criterion: Reports, trial: TrialResult, assignment: Assignment) -> Outcome:
-    wanted = _expected(criterion, trial, assignment)
+def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
+    wanted = _expected(criterion, trial)
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
     asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
@@ -49,11 +47,10 @@ def judge_reports(criterion: Reports, trial: TrialResult, assignment: Assignment
     return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
 
 
-def _expected(criterion: Reports, trial: TrialResult, assignment: Assignment) -> tuple[Entry, ...]:
+def _expected(criterion: Reports, trial: TrialResult) -> tuple[Entry, ...]:
     if criterion.expected != "label":
-        place = pose_number(assignment, trial)
         rows = criterion.expected
-        return rows[min(place, len(rows) - 1)]
+        return rows[min(trial.place, len(rows) - 1)]
     label = label_at_start(trial.recording)
     return (float(label) if label.isdecimal() else label,)
 

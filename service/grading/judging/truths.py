@@ -23,20 +23,17 @@ NO_PICTURE = "(no picture)"
 Shown = tuple[int, str]
 
 
-def shown_in(
-    criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
-) -> Mapping[int, Sequence[Shown]]:
+def shown_in(criterion: Recognition, trials: Sequence[tuple[int, TrialResult]]) -> Mapping[int, Sequence[Shown]]:
     """For each trial (by its index in the grade) the pictures that count, in the order in which they were sent.
 
     Pictures of floor that has no name show nothing to name, and do not count.
     """
-    told = _told(criterion, assignment)
-    return {index: _counted(criterion, _known(criterion, trial, told)) for index, trial in trials}
+    return {index: _counted(criterion, _known(criterion, trial)) for index, trial in trials}
 
 
-def missing_truth(criterion: Recognition, assignment: Assignment, trial: TrialResult) -> str:
+def missing_truth(criterion: Recognition, trial: TrialResult) -> str:
     """What a trial without a picture should have shown, where the assignment tells it."""
-    return _told(criterion, assignment).get((trial.scenario, trial.index), NO_PICTURE)
+    return _told(criterion, trial) or NO_PICTURE
 
 
 def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[str]) -> tuple[str, ...]:
@@ -60,7 +57,7 @@ def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
             return known
 
 
-def _known(criterion: Recognition, trial: TrialResult, told: Mapping[tuple[str, int], str]) -> list[Shown]:
+def _known(criterion: Recognition, trial: TrialResult) -> list[Shown]:
     recording = trial.recording
     found: list[Shown] = []
     for number, image in enumerate(recording.images):
@@ -75,7 +72,7 @@ def _known(criterion: Recognition, trial: TrialResult, told: Mapping[tuple[str, 
             case "places":
                 truth = _nearest(_places(criterion), part_at(recording, "left", image.pose), criterion.within)
             case _:
-                truth = told.get((trial.scenario, trial.index))
+                truth = _told(criterion, trial)
         if truth is not None:
             found.append((number, truth))
     return found
@@ -86,16 +83,10 @@ def _way_from_start(recording: Recording, pose: Pose) -> float:
     return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y))
 
 
-def _told(criterion: Recognition, assignment: Assignment) -> Mapping[tuple[str, int], str]:
-    """The label for the pose that each trial starts from, by scenario and index; empty if the criterion lists none."""
+def _told(criterion: Recognition, trial: TrialResult) -> str | None:
+    """The label that the criterion lists for the pose that the trial starts from, if it lists one."""
     truths = criterion.truth
-    if not isinstance(truths, tuple):
-        return {}
-    return {
-        (trial.scenario.id, trial.index): truths[trial.place]
-        for trial in assignment.trials()
-        if trial.place < len(truths)
-    }
+    return truths[trial.place] if isinstance(truths, tuple) and trial.place < len(truths) else None
 
 
 def _places(criterion: Recognition) -> Sequence[LabelledPlace]:
