@@ -19,9 +19,19 @@ class Secret:
     def sha256(self) -> str:
         return hashlib.sha256(self.text.encode("utf-8", "surrogateescape")).hexdigest()
 
+    @property
+    def name(self) -> str:
+        """What it is called before people: the beginning of its hash."""
+        return name_of(self.sha256)
+
 
 #: Of self-tests, examples and whatever else must be the same everywhere.
 PUBLIC = Secret("")
+
+
+def name_of(secret_sha256: str) -> str:
+    """What a secret with this hash is called before people."""
+    return secret_sha256[:8]
 
 
 def world_seed(secret: Secret, named: str) -> int:

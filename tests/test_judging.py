@@ -73,7 +73,8 @@ def judged(
     world = WorldSpec(recordings[0].background) if recordings else WorldSpec()
     assignment = Assignment("a", "A", world, Parts(), (scenario,), (asked,))
     trials = tuple(
-        TrialResult("s", index, 1, 0.0, 0.0, visibility, recording) for index, recording in enumerate(recordings)
+        TrialResult("s", index, 1, 0.0, 0.0, visibility, recording, place=index // scenario.trials)
+        for index, recording in enumerate(recordings)
     )
     (result,) = judge(assignment, trials)
     assert 0 <= result.marks <= result.max_marks

@@ -28,6 +28,7 @@ from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job
 from service.store.plain import from_plain, to_plain
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
+from submissions.seeds import PUBLIC
 
 _RECORDING = "application/x-robomark-recording"
 
@@ -93,6 +94,7 @@ def load(session: Session, job_id: str) -> Grade:
         walls=job.walls or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
+        secret_sha256=job.secret_sha256 or PUBLIC.sha256,
     )
 
 
@@ -113,6 +115,7 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         verdict=trial.verdict.value,
         sha256=trial.recording.sha256,
         end_t=trial.recording.end_t,
+        place=trial.place,
         sweep=to_plain(trial.sweep),
     )
 
@@ -167,6 +170,7 @@ def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
             visibility=row.visibility,
             recording=_recording(files, job_id, row.position),
             sweep=from_plain(tuple[tuple[str, float], ...], row.sweep),
+            place=row.place,
         )
         for row in rows
     )

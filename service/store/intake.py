@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from service.store import copies, models
 from service.store.engine import Store, now
 from service.store.ids import new_id
+from service.store.installation import secret_of
 from service.store.models import (
     AssignmentVersion,
     Batch,
@@ -93,10 +94,11 @@ def accept(
     It is handed in now, unless it says when.
     """
     (packed,) = _pack([hand_in])
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
         packed = replace(packed, hand_in=replace(hand_in, handed_in_at=hand_in.handed_in_at or at))
-        return _accept(session, packed, _Terms(course_of(session, course, at), lane, max_attempts, at))
+        return _accept(session, packed, _Terms(course_of(session, course, at), lane, max_attempts, at, secret))
 
 
 def accept_batch(
@@ -113,9 +115,10 @@ def accept_batch(
     ``problems`` are the rows that were refused: name, sentence.
     """
     packed = _pack(hand_ins)
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, anew=True)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
         return _accept_batch(session, packed, name, problems, terms)
 
 
@@ -135,9 +138,10 @@ def accept_new(
     has that grade at once.
     """
     packed = _pack(hand_ins)
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret)
         found = [_known(session, item, terms.course_id) for item in packed]
         new = [item for item, known in zip(packed, found, strict=True) if known is None]
         batch = _accept_batch(session, new, name, problems, terms) if new else None
@@ -180,6 +184,7 @@ class _Terms:
     lane: Lane
     max_attempts: int
     at: datetime
+    secret_sha256: str
     batch_id: str | None = None
     anew: bool = False
 
@@ -288,7 +293,11 @@ def _accept(session: Session, packed: _Packed, terms: _Terms) -> Accepted:
     )
     session.add(job)
     session.flush()
-    source = None if terms.anew else copies.find(session, copies.cache_key(session, job_id, grader_sha256()))
+    source = (
+        None
+        if terms.anew
+        else copies.find(session, copies.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
+    )
     if source is not None:
         session.execute(update(Job).where(Job.id == job_id).values(**copies.copy(session, source, job_id, at)))
     return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
