@@ -115,6 +115,18 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
+class Shown:
+    """What is told of a criterion while some of its trials are not shown: as if there were the visible ones alone.
+
+    A student can put into a hidden trial's numbers and words what the robot saw there.
+    """
+
+    message: str
+    accuracy: Accuracy | None = None
+    curves: tuple[AccuracyCurve, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class CriterionResult:
     """One marked line."""
 
@@ -122,12 +134,13 @@ class CriterionResult:
     title: str
     marks: Decimal
     max_marks: Decimal
-    message: str  # a sentence for the student: what was expected, what happened
+    message: str  # what was expected, what happened; of all trials, so for staff where ``shown`` is something else
     visibility: str = "visible"
     evidence: tuple[Evidence, ...] = ()
     accuracy: Accuracy | None = None
     sights: tuple[Sight, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
+    shown: Shown | None = None  # None where every trial is visible
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from service.grading.grade import (
     CriterionResult,
     Evidence,
     Grade,
+    Shown,
     Sight,
     TrialResult,
 )
@@ -142,6 +143,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         confidence=accuracy and to_plain(accuracy.confidence),
         curves=to_plain(result.curves),
         sights=sights,
+        shown=result.shown and to_plain(result.shown),
     )
 
 
@@ -195,6 +197,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         accuracy=_accuracy(row),
         sights=tuple(_sight(plain, trials) for plain in row.sights),
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
+        shown=None if row.shown is None else from_plain(Shown, row.shown),
     )
 
 
