@@ -17,7 +17,7 @@ from responders.notebook_process import NotebookOrder
 from responders.sandbox.manager import FULL, Sandboxes, Walls
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.running_child import ChildLimits
-from responders.training import Trained, TrainingOrder, train_and_name
+from responders.training import Named, TrainingOrder, train_and_name
 from responders.trial import run_trial
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
@@ -56,7 +56,7 @@ class Rig:
     def _ground(self, order: TrialOrder, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
         return self._arena(obstacles), self._cameras.camera(order.floor.picture)
 
-    def train(self, order: TrainingOrder, pulse: Callable[[], None] = lambda: None) -> Trained:
+    def train(self, order: TrainingOrder, pulse: Callable[[], None] = lambda: None) -> tuple[Named, ...]:
         """A hand-in's model, trained and asked. Raises as ``run`` does."""
         return train_and_name(order, self._sandboxes, pulse)
 
