@@ -80,7 +80,8 @@ def _order(program: str) -> TrialOrder:
         Noise(),
         Channel(),
         _SECONDS,
-        0,
+        seed=0,
+        child_seed=0,
     )
 
 

@@ -59,6 +59,7 @@ class TrialOrder:
     channel: Channel
     seconds: float
     seed: int
+    child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
 
@@ -125,7 +126,7 @@ class Bridge:
                 "name": order.program.code.name,
                 "text": order.program.code.text,
                 "preamble": order.program.preamble,
-                "seed": Stream(order.seed, "program").integer(0),
+                "seed": Stream(order.child_seed, "program").integer(0),
             }
         )
         while True:

@@ -47,12 +47,15 @@ class Returned:
 
 @dataclass(frozen=True, slots=True)
 class Called:
-    """What all calls gave, in their order. ``fault`` is what kept the module from being loaded."""
+    """What all calls gave, in their order. ``fault`` is what kept the module from being loaded.
+
+    ``printed`` has what the module printed while it was loaded, and then what it printed in each call.
+    """
 
     returned: tuple[Returned, ...]
     fault: Fault | None
     walls: str
-    output: str = ""
+    printed: tuple[tuple[str, ...], ...] = ()
 
 
 def call_functions(
@@ -77,8 +80,12 @@ def call_functions(
         try:
             walls = caller.walls
             fault = caller.load()
-            gave = tuple(caller.call(call) for call in calls) if fault is None else ()
-            return Called(gave, fault, walls, "\n".join(caller.output))
+            printed = [caller.taken()]
+            gave = []
+            for call in calls if fault is None else ():
+                gave.append(caller.call(call))
+                printed.append(caller.taken())
+            return Called(tuple(gave), fault, walls, tuple(printed))
         finally:
             caller.close()
 
@@ -93,6 +100,11 @@ class _Caller(Responder):
         assert self._child is not None
         self.walls = self._child.walls
         self._ended: Fault | None = None
+
+    def taken(self) -> tuple[str, ...]:
+        """What has been printed since this was last asked."""
+        printed, self.output = tuple(self.output), []
+        return printed
 
     def call(self, call: FunctionCall) -> Returned:
         """Never raises for what the called code does; after its process has been stopped, every call has that fault."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 
@@ -29,39 +30,43 @@ Images = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class TrainingOrder:
-    """A hand-in with ``function(images, labels)``; ``images`` and ``unseen`` are grey levels, (n, side, side)."""
+    """A hand-in with ``function(images, labels)``; images are grey levels, (n, side, side).
+
+    The groups of ``unseen`` are named one after the other, so what is told of the first knows nothing of the next.
+    """
 
     code: Code
     files: Mapping[str, bytes]
     function: str
     images: Images
     labels: Sequence[str]
-    unseen: Images
+    unseen: Sequence[Images]
     limits: ChildLimits
     output_bytes: int
     seed: int
 
 
 @dataclass(frozen=True, slots=True)
-class Trained:
-    """What the model called each unseen image, None where it gave no name; what went wrong, if something did."""
+class Named:
+    """What the model called each image of a group, None where it gave no name.
+
+    ``fault`` is what had gone wrong by then, ``output`` all that had been printed.
+    """
 
     names: tuple[str | None, ...]
     fault: Fault | None
-    walls: str
     output: str
-    model: str = ""  # the type of what was trained
 
 
-def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, meter: JobMeter) -> Trained:
+def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
     """One child: the student's module is loaded, trained, and asked. The limits are for all of it together.
 
     Raises HostError when the machine, not the student, fails.
     """
-    chunks = _chunks(order.unseen)
+    groups = [_chunks(images) for images in order.unseen]
     calls = [
         FunctionCall("robomark_train", (order.function,)),
-        *(FunctionCall("robomark_predict", (_encoded(chunk), chunk.shape[1])) for chunk in chunks),
+        *(FunctionCall("robomark_predict", (_encoded(chunk), chunk.shape[1])) for group in groups for chunk in group),
     ]
     called = call_functions(
         replace(order.code, text=f"{order.code.text}\n\n\n{_harness()}"),
@@ -73,23 +78,24 @@ def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, meter: JobMeter) 
         order.seed,
         meter,
     )
-    return _trained(called, chunks, order)
+    return tuple(_named(called, groups, order))
 
 
-def _trained(called: Called, chunks: Sequence[Images], order: TrainingOrder) -> Trained:
+def _named(called: Called, groups: Sequence[Sequence[Images]], order: TrainingOrder) -> Iterator[Named]:
     """The names, each checked: what comes from a student's process may be anything."""
-    if called.fault is not None or not called.returned:
-        return Trained((None,) * len(order.unseen), _in_their_file(called.fault, order), called.walls, called.output)
-    training, *naming = called.returned
-    names: list[str | None] = []
-    fault = training.fault
-    for chunk, returned in zip(chunks, naming, strict=True):
-        named = _names(returned, len(chunk)) if training.fault is None else None
-        names += named or [None] * len(chunk)
-        if named is None and fault is None:
-            fault = returned.fault or _bad_answer()
-    model = training.value if isinstance(training.value, str) else ""
-    return Trained(tuple(names), _in_their_file(fault, order), called.walls, called.output, model)
+    fault = called.fault or (called.returned[0].fault if called.returned else None)
+    trained, end = fault is None, 1
+    for group in groups:
+        names: list[str | None] = []
+        for chunk, returned in zip(group, called.returned[end:], strict=False):
+            given = _names(returned, len(chunk)) if trained else None
+            if given is None and fault is None:
+                fault = returned.fault or _bad_answer()
+            names += given or [None] * len(chunk)
+        end += len(group)
+        missing = sum(map(len, group)) - len(names)
+        output = "\n".join(itertools.chain.from_iterable(called.printed[: end + 1]))
+        yield Named((*names, *[None] * missing), _in_their_file(fault, order), output)
 
 
 def _names(returned: Returned, count: int) -> list[str | None] | None:

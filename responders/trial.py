@@ -39,7 +39,7 @@ def run_trial(
     with sandboxes.private_folder() as folder:
         responder = None
         if order.responder is not None:
-            responder = Responder(order.responder, sandboxes, folder, order.seed, meter)
+            responder = Responder(order.responder, sandboxes, folder, order.child_seed, meter)
         try:
             program = sandboxes.spawn("robot", order.program.limits, meter=meter)
             try:

@@ -16,6 +16,7 @@ from datetime import UTC, datetime, timedelta
 from importlib import metadata
 
 import redis
+from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox.manager import Sandboxes
@@ -27,9 +28,11 @@ from service.settings import Settings
 from service.store import canaries, presence
 from service.store.engine import Store, now, open_engine
 from service.store.figures import look
+from service.store.installation import secret_of
 from service.store.migrate import current_revision, newest_revision
-from service.store.models import JobState
+from service.store.models import Job, JobState
 from sim.errors import RobomarkError
+from submissions.seeds import name_of
 
 _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
@@ -54,6 +57,7 @@ def examine(settings: Settings) -> list[Finding]:
         ("walls", _walls),
         ("home", _home),
         ("database", _database),
+        ("secret", _secret),
         ("broker", _broker),
         ("clock", _clock),
         ("workers", _workers),
@@ -111,6 +115,26 @@ def _database(settings: Settings) -> tuple[bool, str]:
     if revision != newest_revision():
         return False, f"{where} is at revision {revision}, this Robomark at {newest_revision()}: robomark db upgrade"
     return True, f"{where}, tables at revision {revision}"
+
+
+def _secret(settings: Settings) -> tuple[bool, str]:
+    """Whether the trials here have the worlds that the newest grade had."""
+    whose = "the database's" if settings.own_secret is None else "that of ROBOMARK_SECRET"
+    with _opened(settings) as store:
+        if store is None:
+            return True, f"{whose}; it is made with the tables" if settings.own_secret is None else whose
+        secret = secret_of(store)
+        with store.reading() as session:
+            newest = session.scalar(
+                select(Job.secret_sha256)
+                .where(Job.state == JobState.DONE, Job.copied_from.is_(None), Job.secret_sha256.is_not(None))
+                .order_by(Job.finished_at.desc())
+                .limit(1)
+            )
+    told = f"{whose}, called {secret.name} by its hash"
+    if newest not in (None, secret.sha256):
+        return False, f"{told}; the newest grade has {name_of(newest)}: every machine needs the same ROBOMARK_SECRET"
+    return True, told
 
 
 def _broker(settings: Settings) -> tuple[bool, str]:
@@ -198,6 +222,6 @@ def _opened(settings: Settings) -> Iterator[Store | None]:
     """The database as it is; None where it has no tables of this release."""
     engine = open_engine(settings.database)
     try:
-        yield Store(engine) if current_revision(engine) == newest_revision() else None
+        yield Store(engine, settings.own_secret) if current_revision(engine) == newest_revision() else None
     finally:
         engine.dispose()

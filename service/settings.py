@@ -9,14 +9,16 @@ import os
 from pathlib import Path
 from typing import Self
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
 
 from sim.errors import UsageError
+from submissions.seeds import Secret
 
 PREFIX = "ROBOMARK_"
+_SHORTEST_SECRET = 16
 
 
 def default_home() -> Path:
@@ -53,6 +55,8 @@ class Settings(BaseSettings):
     #: A queued job whose nudge is older than this may be nudged again.
     nudge_seconds: float = Field(default=10.0, ge=0.1, le=3600)
     log_level: str = "WARNING"
+    #: Wins over the database's own; empty where there is none.
+    secret: SecretStr = SecretStr("")
 
     @field_validator("home")
     @classmethod
@@ -91,6 +95,20 @@ class Settings(BaseSettings):
             raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
         return level.upper()
 
+    @field_validator("secret")
+    @classmethod
+    def _long_enough(cls, secret: SecretStr) -> SecretStr:
+        text = secret.get_secret_value().strip()
+        if 0 < len(text) < _SHORTEST_SECRET:
+            raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that nobody can guess")
+        return SecretStr(text)
+
+    @property
+    def own_secret(self) -> Secret | None:
+        """What the environment has in place of the database's secret."""
+        text = self.secret.get_secret_value()
+        return Secret(text) if text else None
+
     @property
     def database(self) -> str:
         """The URL of the database in use."""
@@ -101,8 +119,9 @@ class Settings(BaseSettings):
         return self.model_copy(update={"broker_url": url})
 
     def environment(self) -> dict[str, str]:
-        """The variables that make a child process read these same settings."""
-        return {f"{PREFIX}{name.upper()}": str(value) for name, value in self.model_dump().items() if value != ""}
+        """The variables that make a child process read these same settings; but the secret, which it inherits."""
+        told = self.model_dump(exclude={"secret"})
+        return {f"{PREFIX}{name.upper()}": str(value) for name, value in told.items() if value != ""}
 
 
 def load_settings(**overrides: object) -> Settings:
@@ -117,4 +136,5 @@ def load_settings(**overrides: object) -> Settings:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"]).upper()
         message = first["msg"].removeprefix("Value error, ")
-        raise UsageError(f"{PREFIX}{name} is {first['input']!r}: {message[:1].lower()}{message[1:]}") from None
+        shown = "not usable" if name == "SECRET" else repr(first["input"])
+        raise UsageError(f"{PREFIX}{name} is {shown}: {message[:1].lower()}{message[1:]}") from None

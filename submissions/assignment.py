@@ -5,7 +5,6 @@ Plain data. Reading one from its folder, with every mistake named by file and li
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,7 @@ from typing import Literal
 from sim.chance import Stream
 from sim.recording import Pose
 from submissions.criteria import Criterion
+from submissions.seeds import PUBLIC, Secret, world_seed
 from submissions.sweep import NO_SWEEP, Coordinates, Sweep
 
 Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
@@ -149,17 +149,20 @@ class Assignment:
     def max_marks(self) -> Decimal:
         return sum((criterion.marks for criterion in self.criteria), Decimal(0))
 
-    def trials(self) -> Iterator[Trial]:
-        """Every trial, in an order that never changes."""
+    def trials(self, secret: Secret = PUBLIC) -> Iterator[Trial]:
+        """Every trial as the installation with this secret has it, in an order that never changes."""
         for scenario in self.scenarios:
             levels = list(
                 itertools.product(
-                    self._places(scenario), scenario.sweep.coordinates(), scenario.light_noise, scenario.motor_noise
+                    self._places(scenario, secret),
+                    scenario.sweep.coordinates(),
+                    scenario.light_noise,
+                    scenario.motor_noise,
                 )
             )
             repeated = (level for level in levels for _ in range(scenario.trials))
             for index, (fixed, sweep, light_noise, motor_noise) in enumerate(repeated):
-                seed = self.seed(scenario, index)
+                seed = self.seed(scenario, index, secret)
                 place = Stream(seed, "start pose").integer(0) % len(scenario.poses) if fixed is None else fixed
                 varied = dict(sweep)
                 yield Trial(
@@ -178,23 +181,22 @@ class Assignment:
                     sweep,
                 )
 
-    def _places(self, scenario: Scenario) -> Sequence[int | None]:
+    def _places(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
         """Numbers of the poses, in the order in which they are run; None where the trial draws one itself."""
         places = range(len(scenario.poses))
         match scenario.choose:
             case "random":
                 return (None,)
             case "shuffled":
-                chance = Stream(self.seed(scenario, 0), "order of poses")
+                chance = Stream(self.seed(scenario, 0, secret), "order of poses")
                 return sorted(places, key=chance.integer)
             case "each":
                 return places
 
-    def seed(self, scenario: Scenario, index: int) -> int:
-        """63 bits, the same for every student."""
-        secret = "" if scenario.visibility == "visible" else self.secret
-        text = f"{self.id}\n{scenario.id}\n{index}\n{secret}"
-        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 1
+    def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC) -> int:
+        """Of the world of one trial, the same for every student."""
+        own = "" if scenario.visibility == "visible" else self.secret
+        return world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{own}")
 
 
 def _start(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:

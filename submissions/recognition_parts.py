@@ -95,7 +95,11 @@ def checked_training(
 ) -> Training:
     """The training table, if there are scenarios to train on and others to be tested on, over a floor with labels."""
     ids = [scenario.id for scenario in scenarios if scenario is not None]
+    hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
     for number, name in enumerate(table.scenarios):
+        if name in hidden:
+            sentence = f'scenarios names "{name[:60]}", which is not visible, expected one whose pictures may be told'
+            problems.add(("training", "scenarios", number), sentence)
         if name not in ids:
             problems.add(
                 ("training", "scenarios", number),

@@ -1,4 +1,4 @@
-"""What every test may use: one warm rig a test process."""
+"""What every test may use: one warm rig and one home a test process."""
 
 from __future__ import annotations
 
@@ -17,6 +17,14 @@ from service.store.engine import Store, open_store
 # Two cores are shared with whatever else runs: how long an example takes says nothing.
 settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("robomark")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Commands that tests run keep nothing in the home of whoever runs the tests."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("ROBOMARK_HOME", str(tmp_path_factory.mktemp("home")))
+        yield
 
 
 @pytest.fixture(scope="session")

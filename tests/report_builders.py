@@ -22,6 +22,7 @@ from service.grading.grade import (
     Evidence,
     Grade,
     Level,
+    Shown,
     Sight,
     TrialResult,
 )
@@ -222,7 +223,11 @@ def hidden_grade() -> Grade:
         replace(trial, scenario="SECRETSCENARIO", visibility="hidden") if index >= 4 else trial
         for index, trial in enumerate(grade.trials)
     )
-    return replace(grade, trials=trials, criteria=(*grade.criteria, secret))
+    accuracy = grade.accuracy
+    assert accuracy is not None
+    of_four = replace(accuracy, n=4, value=1.0, confusion=tuple((name, name, 1) for name in SHAPES[:4]))
+    told = tuple(replace(result, shown=Shown(f"VISIBLE: {result.title}", of_four)) for result in grade.criteria)
+    return replace(grade, trials=trials, criteria=(*told, secret))
 
 
 def hostile_grade() -> Grade:

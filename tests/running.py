@@ -54,6 +54,7 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
+        child_seed=seed,
         physics=physics,
     )
     return rig.run(order, obstacles, meter)

@@ -51,7 +51,8 @@ def judged(asked: Criterion, *recordings: Recording, poses: Sequence[Pose] = (ST
     world = WorldSpec(recordings[0].background)
     assignment = Assignment("a", "A", world, Parts(), (Scenario("s", tuple(poses)),), (asked,))
     trials = tuple(
-        TrialResult("s", index, 1, 0.0, 0.0, "visible", recording) for index, recording in enumerate(recordings)
+        TrialResult("s", index, 1, 0.0, 0.0, "visible", recording, place=index % len(poses))
+        for index, recording in enumerate(recordings)
     )
     (result,) = judge(assignment, trials)
     return result

@@ -31,6 +31,7 @@ from service.queue.worker import QUARANTINED
 from service.settings import Settings
 from service.store import audit, canaries, grades, intake, jobs
 from service.store.engine import Store, open_store
+from service.store.installation import secret_of
 from service.store.intake import accept_batch
 from service.store.models import Job, JobState, Lane, Standing
 from sim.recording import Recording
@@ -200,7 +201,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_hand_ins_a
                 job = session.get_one(Job, job_id)
                 query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
                 stands = session.scalars(query).one()
-                honest = grade(taken_in.submission, taken_in.assignment, rig=rig)
+                honest = grade(taken_in.submission, taken_in.assignment, secret=secret_of(store), rig=rig)
                 assert _chains(grades.load(session, stands.id)) == _chains(honest)
                 assert (stands.id == job_id) == (job.suspect is None)
                 differs += _chains(grades.load(session, job_id)) != _chains(honest)

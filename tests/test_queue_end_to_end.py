@@ -28,6 +28,7 @@ from service.queue.nudges import Nudger
 from service.settings import Settings
 from service.store import artifacts, batches, grades, jobs
 from service.store.engine import Store, open_store
+from service.store.installation import secret_of
 from service.store.intake import HandIn, accept_batch, load_hand_in
 from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
 from submissions.example_folder import examples
@@ -126,7 +127,7 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
     with service.store.reading() as session:
         for job in graded:
             taken_in = load_hand_in(session, job.id)
-            direct = grade(taken_in.submission, taken_in.assignment, rig=rig)
+            direct = grade(taken_in.submission, taken_in.assignment, secret=secret_of(service.store), rig=rig)
             assert comparable(grades.load(session, job.id)) == comparable(direct)
             assert (job.marks, job.verdict) == (direct.marks, direct.verdict.value)
             plots = artifacts.get(session, job.id, prefix="plot-")

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import report_builders as build
-from service.grading.grade import Accuracy, Confidence, CriterionResult, TrialResult
+from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, TrialResult
 from service.grading.judging.judge import judge
 from service.grading.judging.patches import decoded
 from service.grading.judging.per_class import class_scores
@@ -378,7 +378,8 @@ def test_the_levels_of_a_hidden_sweep_are_not_told() -> None:
         )
         (result,) = judge(assignment, trials)
         assert result.marks == 4
-        assert ("64" in result.message) is (visibility == "visible")
+        assert "64" in result.message
+        assert result.shown == (None if visibility == "visible" else Shown("Marked in trials that are not shown."))
 
 
 def test_a_student_sees_no_curve_of_hidden_trials() -> None:

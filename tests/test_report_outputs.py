@@ -122,9 +122,17 @@ def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
     assert {trial.scenario for trial in view.trials} == {"each-shape"}
     assert [sight.trial for sight in view.criteria[0].sights] == [0, 1, 2, 3]
     assert view.criteria[0].accuracy is not None
-    assert view.criteria[0].accuracy.confusion == ()
+    assert (view.criteria[0].accuracy.n, view.criteria[0].message[:8]) == (4, "VISIBLE:")
     released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"}))
     assert (len(released.criteria), len(released.trials)) == (3, 6)
+    assert released.criteria[0].message == build.shape_grade().criteria[0].message
+
+
+def test_a_grade_of_before_visible_trials_were_told_apart_tells_nothing_of_trials() -> None:
+    grade = build.hidden_grade()
+    old = replace(grade, criteria=tuple(replace(result, shown=None) for result in grade.criteria))
+    first = student_view(old).criteria[0]
+    assert (first.message, first.accuracy, first.curves) == ("Marked in trials that are not shown.", None, ())
 
 
 def test_student_view_where_the_first_trial_is_hidden() -> None:

@@ -13,9 +13,11 @@ from builders import comparable, echo, hand_in
 from service.grading.grade import Grade
 from service.store import artifacts, batches, canaries, grades, jobs
 from service.store.engine import Store
+from service.store.installation import secret_of
 from service.store.intake import Accepted, HandIn, accept, accept_batch
 from service.store.models import Job, JobState, PlotState, Standing
 from sim.recording import Verdict
+from submissions.seeds import Secret
 
 WALLS = "Landlock 7, seccomp, process limits, policy 0"
 GRADE = replace(report_builders.shape_grade(), walls=WALLS)
@@ -30,7 +32,8 @@ def _accept(store: Store, student: str = "ada", like: HandIn | None = None) -> A
 def _grade_next(store: Store, grade: Grade = GRADE, worker: str = "worker") -> str:
     claim = jobs.claim(store, worker, 60)
     assert claim is not None
-    jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+    own = replace(grade, secret_sha256=secret_of(store).sha256)
+    jobs.finish(store, claim, grades.prepare(own), datetime.now(UTC))
     return claim.job_id
 
 
@@ -123,6 +126,14 @@ def test_another_grader_runs_it_again(store: Store) -> None:
     with store.transaction() as session:
         session.execute(update(Job).where(Job.id == first).values(cache_key="0" * 64))
     assert _accept(store, "bob").copied_from is None
+
+
+def test_another_secret_runs_it_again(store: Store) -> None:
+    _accept(store, "ada")
+    first = _grade_next(store)
+    other = Store(store.engine, Secret("what the environment has"))
+    assert _accept(other, "bob").copied_from is None
+    assert _accept(store, "eve").copied_from == first
 
 
 def test_copies_of_a_suspect_grade_are_suspect_and_run_again(store: Store) -> None:

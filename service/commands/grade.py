@@ -17,12 +17,14 @@ from responders.sandbox.manager import FULL, NONE
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.rig import Rig
+from service.home_secret import secret_here
 from service.reports.gradescope import gradescope_text
 from service.reports.json_output import json_text
 from service.reports.junit import junit_text
 from service.reports.rich_text import rich_report
 from service.reports.text import plain_text
 from service.reports.written import prepare_folder, write_report
+from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment, find_in_catalogue
@@ -74,6 +76,7 @@ def grade(
     if report is not None:
         prepare_folder(report)
     near = _like_others(submissions) if report is not None else {}
+    secret = secret_here(load_settings())
     worst: RobomarkError | None = None
     if unsafe:
         warn_of_no_walls()
@@ -83,7 +86,7 @@ def grade(
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
-                graded = grade_submission(submission, asked, rig=rig)
+                graded = grade_submission(submission, asked, secret=secret, rig=rig)
             except RobomarkError as error:
                 if len(submissions) == 1:
                     raise

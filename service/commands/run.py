@@ -126,6 +126,7 @@ def run(
         channel=Channel(),
         seconds=seconds,
         seed=seed,
+        child_seed=seed,
         pen_down=chosen.pen_down,
     )
     for note in chosen.notes:

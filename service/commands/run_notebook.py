@@ -62,6 +62,7 @@ def run_notebook(notebook: Notebook, files: Mapping[str, bytes], limits: RunLimi
             channel=Channel(),
             seconds=limits.seconds,
             seed=last.seed,
+            child_seed=last.seed,
             pen_down=setup.pen_down or wanted.pen_down,
         )
         return Staged(order, wanted.obstacles, notes=(*setup.notes, *wanted.notes))

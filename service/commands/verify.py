@@ -14,10 +14,12 @@ from service.grading.grader import grade as grade_submission
 from service.settings import load_settings
 from service.store import batches, grades, intake
 from service.store.engine import open_store
+from service.store.installation import secret_of
 from service.store.models import Job
 from service.version import GRADER_VERSION, grader_sha256
 from sim.errors import HostError
 from sim.recording import Verdict
+from submissions.seeds import PUBLIC, Secret, name_of
 
 #: How far such a trial came is decided by the machine and its load, so no hash is promised for it.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
@@ -27,11 +29,14 @@ def verify(
     grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
 ) -> None:
     """Run a stored grading again and compare; exit status 3 if anything differs that must not."""
-    with open_store(load_settings()) as store, store.reading() as session:
-        job = session.get_one(Job, batches.find_job(session, grade))
-        stored = grades.load(session, job.id)
-        hand_in = intake.load_hand_in(session, job.id)
-    again = grade_submission(hand_in.submission, hand_in.assignment)
+    with open_store(load_settings()) as store:
+        own = secret_of(store)
+        with store.reading() as session:
+            job = session.get_one(Job, batches.find_job(session, grade))
+            stored = grades.load(session, job.id)
+            hand_in = intake.load_hand_in(session, job.id)
+    secret = _secret_of(job, own)
+    again = grade_submission(hand_in.submission, hand_in.assignment, secret=secret)
     rows = list(zip(stored.trials, again.trials, strict=False))
     table = Table("scenario", "trial", "stored", "again", "", box=None, pad_edge=False)
     for before, after in rows:
@@ -44,6 +49,20 @@ def verify(
     if not _same(stored, again, rows):
         raise HostError(f"grade {job.id} is not what grading it again gives")
     print(f"grade {job.id} is what grading it again gives")
+
+
+def _secret_of(job: Job, own: Secret) -> Secret:
+    """The secret that the grade was given with. Raises HostError when it is not the one that is at hand."""
+    if job.secret_sha256 is None:
+        print("graded before this installation had a secret: again in the worlds of then")
+        return PUBLIC
+    if job.secret_sha256 != own.sha256:
+        raise HostError(
+            f"grade {job.id} cannot be verified with this secret: its worlds are of {name_of(job.secret_sha256)}, "
+            f"and the secret here is {own.name}; set ROBOMARK_SECRET to the one that it was graded with"
+        )
+    print(f"secret: {own.name}")
+    return own
 
 
 def _same(stored: Grade, again: Grade, rows: list[tuple[TrialResult, TrialResult]]) -> bool:

@@ -5,7 +5,6 @@ All of it is found inside the walls; what it is worth is decided in the modules 
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from service.grading.grade import TrialResult
 from service.grading.judging.function_checks import calls_of, checked
 from service.grading.judging.outcome import Outcome, fault_words
 from service.grading.judging.source_rules import SourceFacts
+from sim.chance import Stream
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
@@ -41,6 +41,7 @@ class HandedIn:
     flags: Flags = field(default_factory=Flags)
     files: Mapping[str, bytes] = field(default_factory=dict)
     modules: tuple[Source, ...] = ()  # other Python files of the hand-in's own, which the responder may import
+    child_seed: int = 0  # of the chance that its functions see
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,14 +156,9 @@ def _called(
         calls_of(criterion),
         ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
         limits.output_bytes,
-        _seed(assignment, criterion.id),
+        Stream(handed_in.child_seed, f"calls {criterion.id}").integer(0) >> 1,
         meter,
     )
-
-
-def _seed(assignment: Assignment, criterion: str) -> int:
-    """63 bits for the chance that the functions see, the same for every student."""
-    return int.from_bytes(hashlib.sha256(f"{assignment.id}\ncalls\n{criterion}".encode()).digest()[:8], "big") >> 1
 
 
 def _check(

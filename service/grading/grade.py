@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from sim.recording import Image, Pose, Recording, Verdict
+from submissions.seeds import PUBLIC
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +115,18 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
+class Shown:
+    """What is told of a criterion while some of its trials are not shown: as if there were the visible ones alone.
+
+    A student can put into a hidden trial's numbers and words what the robot saw there.
+    """
+
+    message: str
+    accuracy: Accuracy | None = None
+    curves: tuple[AccuracyCurve, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class CriterionResult:
     """One marked line."""
 
@@ -121,12 +134,13 @@ class CriterionResult:
     title: str
     marks: Decimal
     max_marks: Decimal
-    message: str  # a sentence for the student: what was expected, what happened
+    message: str  # what was expected, what happened; of all trials, so for staff where ``shown`` is something else
     visibility: str = "visible"
     evidence: tuple[Evidence, ...] = ()
     accuracy: Accuracy | None = None
     sights: tuple[Sight, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
+    shown: Shown | None = None  # None where every trial is visible
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +155,7 @@ class TrialResult:
     visibility: str
     recording: Recording
     sweep: tuple[tuple[str, float], ...] = ()  # the condition that is swept and its level in this trial
+    place: int = 0  # which of the scenario's poses it started from, whatever noise or the program made of that
 
     @property
     def verdict(self) -> Verdict:
@@ -161,6 +176,7 @@ class Grade:
     walls: str
     grader_version: str
     notes: tuple[str, ...] = ()
+    secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
 
     @property
     def marks(self) -> Decimal:

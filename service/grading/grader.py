@@ -24,6 +24,7 @@ from service.grading.rig import Rig
 from service.grading.training import with_models_answers
 from service.version import GRADER_VERSION
 from sim.backgrounds import Floor, floor, floor_from_picture
+from sim.chance import Stream
 from sim.errors import AssignmentError, UsageError
 from sim.motion import Physics
 from sim.recording import Recording
@@ -33,6 +34,7 @@ from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import modules_of, python_of
+from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
 from submissions.submission import Notebook, Source, Submission
 
 _MEGABYTE = 1 << 20
@@ -73,42 +75,51 @@ class _Parts:
 
 
 def grade(
-    submission: Submission, assignment: Assignment, *, observe: Observe | None = None, rig: Rig | None = None
+    submission: Submission,
+    assignment: Assignment,
+    *,
+    secret: Secret = PUBLIC,
+    observe: Observe | None = None,
+    rig: Rig | None = None,
 ) -> Grade:
-    """The marks of ``submission``. Without a ``rig`` one is made for this grading and closed afterwards.
+    """The marks of ``submission`` in the worlds of the installation that has this secret.
+
+    Without a ``rig`` one is made for this grading and closed afterwards.
 
     Raises UsageError when a part is missing that the assignment asks for, HostError when this machine fails,
     and whatever ``observe`` raises.
     """
     if rig is None:
         with Rig() as own:
-            return grade(submission, assignment, observe=observe, rig=own)
+            return grade(submission, assignment, secret=secret, observe=observe, rig=own)
     parts = _parts(submission, assignment)
-    trials = tuple(assignment.trials())
-    results: list[TrialResult] = []
+    trials = tuple(assignment.trials(secret))
+    own_seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    run: dict[int, TrialResult] = {}
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.pulse)
-    for trial in trials:
-        order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed))
-        recording = _recording(order, parts, assignment, rig, meter)
-        results.append(
-            TrialResult(
-                trial.scenario.id,
-                trial.index,
-                trial.seed,
-                trial.light_noise,
-                trial.motor_noise,
-                trial.scenario.visibility,
-                recording,
-                trial.sweep,
-            )
+    # In an order of each submission's own: what counts processes or looks at a clock does not tell a trial again.
+    for number in sorted(range(len(trials)), key=Stream(own_seed, "order of trials").integer):
+        trial = trials[number]
+        order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed), submission)
+        run[number] = TrialResult(
+            trial.scenario.id,
+            trial.index,
+            trial.seed,
+            trial.light_noise,
+            trial.motor_noise,
+            trial.scenario.visibility,
+            _recording(order, parts, assignment, rig, meter),
+            trial.sweep,
+            trial.place,
         )
         watch.finished_one()
+    results = [run[number] for number in range(len(trials))]
     if assignment.training is not None and parts.responder is not None:
         results = with_models_answers(
-            results, assignment, assignment.training, parts.responder, parts.files, rig, meter
+            results, assignment, assignment.training, parts.responder, parts.files, own_seed, rig, meter
         )
-    findings = look_at(_handed_in(submission, parts), assignment, results, rig, meter)
+    findings = look_at(_handed_in(submission, parts, own_seed), assignment, results, rig, meter)
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
@@ -120,6 +131,7 @@ def grade(
         walls=results[0].recording.walls if results else findings.walls or "no student code was run",
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results)),
+        secret_sha256=secret.sha256,
     )
 
 
@@ -132,12 +144,12 @@ def _cell_notes(parts: _Parts, results: Sequence[TrialResult]) -> tuple[str, ...
     return next(visible, ()) if parts.notebook is not None else ()
 
 
-def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
+def _handed_in(submission: Submission, parts: _Parts, own_seed: int) -> HandedIn:
     """What is looked at without driving; of a notebook what is no robot program stands for the responder."""
     responder = parts.responder
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
-    return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission))
+    return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission), own_seed)
 
 
 def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
@@ -267,7 +279,7 @@ def _recording(order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Ri
     return replace(recording, faults=tuple(faults))
 
 
-def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -> TrialOrder:
+def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor, submission: Submission) -> TrialOrder:
     limits = assignment.limits
     if parts.program is None:
         raise AssignmentError(f"Assignment {assignment.id} has scenarios and no robot program to run in them.")
@@ -295,6 +307,7 @@ def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -
         channel=_channel(trial.channel),
         seconds=trial.scenario.seconds,
         seed=trial.seed,
+        child_seed=child_seed(trial.seed, submission.sha256),
         pen_down="p" in parts.flags.switches,
         physics=Physics(assignment.world.solid, assignment.world.drive),
     )

@@ -121,6 +121,7 @@ class NotebookStage:
     def _own(self, program: Program, setup: Setup) -> TrialOrder:
         """A run as its own flags have it."""
         own = self._unmarked
+        seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
         return TrialOrder(
             program=program_order(program, own.limits, own.output_bytes),
             responder=None,
@@ -131,7 +132,8 @@ class NotebookStage:
             noise=Noise(setup.light_noise, setup.motor_noise),
             channel=Channel(),
             seconds=own.seconds,
-            seed=Stream(own.seed, "notebook run").integer(self._count) >> 1,
+            seed=seed,
+            child_seed=seed,
             pen_down=setup.pen_down,
         )
 

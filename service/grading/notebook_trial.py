@@ -86,7 +86,8 @@ def _play(
 
     # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
     sheet = int(order.floor.sheet == 0 and not order.floor.patches)
-    unmarked = UnmarkedRuns(order.program.limits, order.program.output_bytes, order.seconds, order.seed, sheet)
+    # Their noise would tell the trial again, were it of the world's seed.
+    unmarked = UnmarkedRuns(order.program.limits, order.program.output_bytes, order.seconds, order.child_seed, sheet)
     stage = NotebookStage(site, marked_run, unmarked, staged if marking.which is None else Staged())
     notebook = hand_in.notebook
     played = rig.play(
@@ -96,7 +97,7 @@ def _play(
             hand_in.files,
             hand_in.limits,
             hand_in.output_bytes,
-            order.seed,
+            order.child_seed,
         ),
         stage,
         meter,

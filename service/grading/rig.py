@@ -21,7 +21,7 @@ from responders.sandbox.manager import FULL, Sandboxes, Walls
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.running_child import ChildLimits, KilledFromOutside
-from responders.training import Trained, TrainingOrder, train_and_name
+from responders.training import Named, TrainingOrder, train_and_name
 from responders.trial import run_trial
 from service.grading.slots import Slots
 from sim.arena import Arena
@@ -72,7 +72,7 @@ class Rig:
     def _ground(self, order: TrialOrder, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
         return self._arena(obstacles), self._cameras.camera(order.floor.picture)
 
-    def train(self, order: TrainingOrder, meter: JobMeter | None = None) -> Trained:
+    def train(self, order: TrainingOrder, meter: JobMeter | None = None) -> tuple[Named, ...]:
         """A hand-in's model, trained and asked. Raises as ``run`` does."""
         meter = meter or JobMeter()
         return self.undisturbed(lambda: train_and_name(order, self._sandboxes, meter), meter)

@@ -16,7 +16,7 @@ import numpy as np
 from responders.conversation import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.training import Images, Trained, TrainingOrder
+from responders.training import Images, Named, TrainingOrder
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
 from service.grading.judging.patches import grey_picture
@@ -37,6 +37,7 @@ def with_models_answers(
     training: Training,
     hand_in: Source,
     files: Mapping[str, bytes],
+    child_seed: int,
     rig: Rig,
     meter: JobMeter,
 ) -> list[TrialResult]:
@@ -47,36 +48,39 @@ def with_models_answers(
     """
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
-    asked = {
-        index: _collected(result) for index, result in enumerate(results) if result.scenario not in training.scenarios
-    }
-    unseen = [pair for own in asked.values() for pair in own]
-    seed = results[0].seed if results else 0
+    asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
+    # Hidden pictures come last: what a student is told of the visible ones is said before the model has seen those.
+    visible = [index for index in asked if results[index].visibility == "visible"]
+    groups = [group for group in (visible, [index for index in asked if index not in visible]) if group]
+    unseen = [[pair for index in group for pair in _collected(results[index])] for group in groups]
     # Not in the order of the track: neighbours on it mostly show the same.
-    order = sorted(range(len(unseen)), key=Stream(seed, "order of pictures").integer)
+    chance = Stream(child_seed, "order of pictures")
+    orders = [sorted(range(len(pictures)), key=chance.integer) for pictures in unseen]
     limits = assignment.limits
-    trained = rig.train(
+    named = rig.train(
         TrainingOrder(
             Code(hand_in.name, hand_in.text),
             files,
             training.function,
             _arrays([pair for pair, _ in known], training),
             [truth for _, truth in known],
-            _arrays([unseen[place] for place in order], training),
+            [
+                _arrays([pictures[place] for place in order], training)
+                for pictures, order in zip(unseen, orders, strict=True)
+            ],
             ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
             limits.output_bytes,
-            seed,
+            child_seed,
         ),
         meter,
     )
-    by_place = dict(zip(order, trained.names, strict=True))
-    names = iter([by_place[place] for place in range(len(unseen))])
-    answered = []
-    for index, result in enumerate(results):
-        if index in asked:
-            recording = _answered(result.recording, asked[index], names, trained)
-            result = replace(result, recording=recording)
-        answered.append(result)
+    answered = list(results)
+    for group, order, gave in zip(groups, orders, named, strict=True):
+        by_place = dict(zip(order, gave.names, strict=True))
+        names = iter([by_place[place] for place in range(len(order))])
+        for index in group:
+            recording = _answered(results[index].recording, _collected(results[index]), names, gave)
+            answered[index] = replace(results[index], recording=recording)
     return answered
 
 
@@ -92,7 +96,7 @@ def _arrays(found: Sequence[Pair], training: Training) -> Images:
     return np.stack(pictures) if pictures else np.empty((0, side, side), np.uint8)
 
 
-def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str | None], trained: Trained) -> Recording:
+def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str | None], gave: Named) -> Recording:
     """The recording with each picture as a message of the robot's and each name as its answer."""
     messages: list[Message] = []
     images: list[Image] = []
@@ -105,17 +109,17 @@ def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str |
         if name is not None:
             messages.append(Message(image.t, "responder", name, image.t, len(messages) - 1))
     faults = recording.faults
-    if trained.fault is not None:
-        fault = replace(trained.fault, t=0.0, hint=trained.fault.hint or _HINT)
+    if gave.fault is not None:
+        fault = replace(gave.fault, t=0.0, hint=gave.fault.hint or _HINT)
         faults = tuple(sorted((*faults, fault), key=_time))
-    proof = f"{recording.sha256}:{json.dumps([given, str(trained.fault)])}"
+    proof = f"{recording.sha256}:{json.dumps([given, str(gave.fault)])}"
     return replace(
         recording,
         messages=tuple(messages),
         images=tuple(images),
         faults=faults,
         verdict=faults[0].verdict if faults else Verdict.FINISHED,
-        responder_output=trained.output,
+        responder_output=gave.output,
         sha256=hashlib.sha256(proof.encode()).hexdigest(),
     )
 

@@ -20,6 +20,7 @@ from service.queue.plotting import draw
 from service.settings import Settings
 from service.store import grades, intake, jobs
 from service.store.engine import Store
+from service.store.installation import secret_of
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recording import Verdict
 
@@ -86,7 +87,7 @@ def _grade(store: Store, settings: Settings, rig: Rig, claim: jobs.Claim) -> Non
     watch = _Heartbeat(store, settings, claim)
     with store.reading() as session:
         hand_in = intake.load_hand_in(session, claim.job_id)
-    graded = grade(hand_in.submission, hand_in.assignment, observe=watch, rig=rig)
+    graded = grade(hand_in.submission, hand_in.assignment, secret=secret_of(store), observe=watch, rig=rig)
     graded_at = watch.now()
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:

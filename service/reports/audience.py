@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from decimal import Decimal
 
-from service.grading.grade import CriterionResult, Grade, TrialResult
+from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
+from service.grading.judging.trial_words import shown_words
 from sim.recording import Verdict
 
 #: What a student sees before anything is published.
@@ -18,9 +19,9 @@ BEFORE_PUBLICATION = frozenset({"visible"})
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> Grade:
     """``grade`` without the criteria and trials whose visibility is not in ``released``.
 
-    Evidence and pictures from hidden trials go too; a criterion that loses pictures also loses its confusion
-    counts, and one that loses trials its curves, because they would tell what the hidden trials ask. Totals are then
-    those of the criteria shown.
+    Evidence and pictures from hidden trials go too; of a criterion that loses trials the message, the accuracy and
+    the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
+    then those of the criteria shown.
     """
     kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
     new_index = {old: new for new, old in enumerate(kept)}
@@ -62,8 +63,9 @@ def _severity(trial: TrialResult) -> int:
 def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -> CriterionResult:
     evidence = tuple(replace(item, trial=new_index[item.trial]) for item in result.evidence if item.trial in new_index)
     sights = tuple(replace(sight, trial=new_index[sight.trial]) for sight in result.sights if sight.trial in new_index)
-    accuracy = result.accuracy
-    if accuracy is not None and len(sights) < len(result.sights):
-        accuracy = replace(accuracy, confusion=())
-    curves = result.curves if len(evidence) == len(result.evidence) else ()
-    return replace(result, evidence=evidence, sights=sights, accuracy=accuracy, curves=curves)
+    kept = replace(result, evidence=evidence, sights=sights)
+    if len(evidence) == len(result.evidence):
+        return replace(kept, shown=None)
+    # A grade of before this was kept apart tells nothing.
+    shown = result.shown or Shown(shown_words(""))
+    return replace(kept, message=shown.message, accuracy=shown.accuracy, curves=shown.curves, shown=None)

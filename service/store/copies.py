@@ -32,8 +32,8 @@ from submissions.bundle import unpack_submission
 _NOT_REPEATABLE = (Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR)
 
 
-def cache_key(session: Session, job_id: str, grader_sha256: str) -> str:
-    """Alike for two jobs only where their grades must be: the seeds follow from the assignment."""
+def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
+    """Alike for two jobs only where their grades must be: the seeds follow from the assignment and the secret."""
     query = (
         select(Submission.sha256, AssignmentVersion.sha256)
         .join(Job, Job.submission_id == Submission.id)
@@ -41,7 +41,7 @@ def cache_key(session: Session, job_id: str, grader_sha256: str) -> str:
         .where(Job.id == job_id)
     )
     submission, assignment = session.execute(query).one()
-    return hashlib.sha256(f"{submission}\n{assignment}\n{grader_sha256}".encode()).hexdigest()
+    return hashlib.sha256(f"{submission}\n{assignment}\n{grader_sha256}\n{secret_sha256}".encode()).hexdigest()
 
 
 def find(session: Session, key: str) -> str | None:
@@ -78,7 +78,8 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
         _copy_rows(session, table, source_id, job_id)
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    names = ("verdict", "marks", "max_marks", "grader_version", "grader_sha256", "walls", "cache_key")
+    of_grade = ("verdict", "marks", "max_marks", "walls", "grader_version")
+    names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
         "notes": _notes(session, source, job_id),

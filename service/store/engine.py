@@ -21,6 +21,7 @@ from sqlalchemy.pool import NullPool
 
 from service.settings import Settings
 from sim.errors import HostError
+from submissions.seeds import Secret
 
 SQLITE_BUSY_SECONDS = 30
 _ONLY_READS = "robomark_only_reads"
@@ -31,6 +32,7 @@ class Store:
     """The open database. Safe to share between threads; not across a fork."""
 
     engine: Engine
+    secret: Secret | None = None  # of the environment; it wins over the database's own
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -61,11 +63,13 @@ class Store:
 def open_engine(url: str) -> Engine:
     """An engine with the settings that Robomark needs; makes the folder of a SQLite file.
 
+    No error tells the values of a statement: the installation's secret is one.
+
     Raises HostError when the folder cannot be made.
     """
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        return create_engine(parsed, pool_pre_ping=True, pool_size=2, max_overflow=8)
+        return create_engine(parsed, pool_pre_ping=True, pool_size=2, max_overflow=8, hide_parameters=True)
     if parsed.database and parsed.database != ":memory:":
         folder = Path(parsed.database).absolute().parent
         try:
@@ -73,7 +77,9 @@ def open_engine(url: str) -> Engine:
         except OSError as error:
             raise HostError(f"The folder for the database cannot be made: {folder}: {error.strerror}") from None
     # One connection a transaction: nothing stays open in threads that came and went.
-    engine = create_engine(parsed, poolclass=NullPool, connect_args={"timeout": SQLITE_BUSY_SECONDS})
+    engine = create_engine(
+        parsed, poolclass=NullPool, connect_args={"timeout": SQLITE_BUSY_SECONDS}, hide_parameters=True
+    )
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_immediate)
     return engine
@@ -110,7 +116,7 @@ def open_store(settings: Settings) -> Store:
     except BaseException:
         engine.dispose()
         raise
-    return Store(engine)
+    return Store(engine, settings.own_secret)
 
 
 def now(session: Session) -> datetime:

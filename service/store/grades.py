@@ -21,6 +21,7 @@ from service.grading.grade import (
     CriterionResult,
     Evidence,
     Grade,
+    Shown,
     Sight,
     TrialResult,
 )
@@ -29,6 +30,7 @@ from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job
 from service.store.plain import from_plain, to_plain
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
+from submissions.seeds import PUBLIC
 
 _RECORDING = "application/x-robomark-recording"
 
@@ -94,6 +96,7 @@ def load(session: Session, job_id: str) -> Grade:
         walls=job.walls or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
+        secret_sha256=job.secret_sha256 or PUBLIC.sha256,
     )
 
 
@@ -114,6 +117,7 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         verdict=trial.verdict.value,
         sha256=trial.recording.sha256,
         end_t=trial.recording.end_t,
+        place=trial.place,
         sweep=to_plain(trial.sweep),
     )
 
@@ -140,6 +144,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         confidence=accuracy and to_plain(accuracy.confidence),
         curves=to_plain(result.curves),
         sights=sights,
+        shown=result.shown and to_plain(result.shown),
     )
 
 
@@ -165,6 +170,7 @@ def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
             visibility=row.visibility,
             recording=_recording(files, job_id, row.position),
             sweep=from_plain(tuple[tuple[str, float], ...], row.sweep),
+            place=row.place,
         )
         for row in rows
     )
@@ -189,6 +195,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         accuracy=_accuracy(row),
         sights=tuple(_sight(plain, trials) for plain in row.sights),
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
+        shown=None if row.shown is None else from_plain(Shown, row.shown),
     )
 
 

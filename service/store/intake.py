@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from service.store import copies, models
 from service.store.engine import Store, now
 from service.store.ids import new_id
+from service.store.installation import secret_of
 from service.store.models import (
     AssignmentVersion,
     Batch,
@@ -101,10 +102,11 @@ def accept(
     It is handed in now, unless it says when. Raises UsageError where its student cannot be told from another.
     """
     (packed,) = _pack([hand_in])
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
         packed = replace(packed, hand_in=replace(hand_in, handed_in_at=hand_in.handed_in_at or at))
-        terms = _Terms(course_of(session, course, at), lane, max_attempts, at)
+        terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret)
         enrolment_id = Students(session, terms.course_id).enrol(hand_in.student, at)
         return _accept(session, _Item(packed, enrolment_id), terms)
 
@@ -123,9 +125,10 @@ def accept_batch(
     ``problems`` are the rows that were refused: name, sentence. Raises UsageError when the course refuses the rest.
     """
     packed = _pack(hand_ins)
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, anew=True)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
         items, refused = _enrolled(session, packed, terms)
         if refused and not items:
             raise UsageError(f"none can be taken in; {refused[0][0]}: {refused[0][1]}")
@@ -148,9 +151,10 @@ def accept_new(
     has that grade at once.
     """
     packed = _pack(hand_ins)
+    secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret)
         items, refused = _enrolled(session, packed, terms)
         found = [_known(session, item) for item in items]
         new = [item for item, known in zip(items, found, strict=True) if known is None]
@@ -202,6 +206,7 @@ class _Terms:
     lane: Lane
     max_attempts: int
     at: datetime
+    secret_sha256: str
     batch_id: str | None = None
     anew: bool = False
 
@@ -322,7 +327,11 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     )
     session.add(job)
     session.flush()
-    source = None if terms.anew else copies.find(session, copies.cache_key(session, job_id, grader_sha256()))
+    source = (
+        None
+        if terms.anew
+        else copies.find(session, copies.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
+    )
     if source is not None:
         session.execute(update(Job).where(Job.id == job_id).values(**copies.copy(session, source, job_id, at)))
     return Accepted(job_id, submission.student, row.attempt, source, ruling.over)

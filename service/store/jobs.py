@@ -18,6 +18,7 @@ from sqlalchemy.orm import Session
 
 from service.store import artifacts, canaries, copies, grades, phases
 from service.store.engine import Store, now
+from service.store.installation import secret_of
 from service.store.models import UNFINISHED, Job, JobState, PlotState
 from service.store.turns import next_job
 from service.version import grader_sha256
@@ -129,7 +130,8 @@ def finish(
             "max_marks": grade.max_marks,
             "grader_version": grade.grader_version,
             "grader_sha256": grader_sha256(),
-            "cache_key": copies.cache_key(session, claim.job_id, grader_sha256()),
+            "secret_sha256": grade.secret_sha256,
+            "cache_key": copies.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
             "walls": grade.walls,
             "notes": list(grade.notes),
             "plots": PlotState.DUE,
@@ -145,10 +147,11 @@ def finish_with_copy(store: Store, claim: Claim) -> bool:
 
     Raises Fenced when the job is no longer this worker's.
     """
+    secret = secret_of(store)
     with store.transaction() as session:
         if session.scalar(select(Job.fresh).where(Job.id == claim.job_id)):
             return False
-        source = copies.find(session, copies.cache_key(session, claim.job_id, grader_sha256()))
+        source = copies.find(session, copies.cache_key(session, claim.job_id, grader_sha256(), secret.sha256))
         if source is None:
             return False
         at = now(session)

@@ -100,6 +100,16 @@ class Base(DeclarativeBase):
     }
 
 
+class Installation(Base):
+    """This installation itself: one row, made with the tables."""
+
+    __tablename__ = "installation"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    secret: Mapped[str] = mapped_column(String(64))  # what the seeds of trials depend on; shown nowhere
+    made_at: Mapped[datetime]
+
+
 class Course(Base):
     __tablename__ = "course"
 
@@ -230,6 +240,7 @@ class Job(Base):
     #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.
     phases: Mapped[Any] = mapped_column(default=dict)
     grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all that decides over marks
+    secret_sha256: Mapped[str | None] = mapped_column(String(64))  # of what its seeds depend on; None: of nothing
     cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # alike only where grades must be
     fresh: Mapped[bool] = mapped_column(default=False)  # to be run even where an identical grade is there
     copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that was run
@@ -263,6 +274,7 @@ class TrialRow(Base):
     verdict: Mapped[str] = mapped_column(String(32))
     sha256: Mapped[str] = mapped_column(String(64))
     end_t: Mapped[float]
+    place: Mapped[int] = mapped_column(default=0)  # which of the scenario's poses
     sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: what is swept, and its level here
 
 
@@ -292,6 +304,7 @@ class CriterionRow(Base):
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
     curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
     sights: Mapped[Any]
+    shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} as of the visible trials alone
 
 
 class Artifact(Base):

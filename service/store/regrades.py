@@ -277,6 +277,8 @@ def _reason(session: Session, before: Job, after: Job) -> str:
         versions_differ = before.grader_version != after.grader_version
         told = f" ({before.grader_version} to {after.grader_version})" if versions_differ else ""
         reasons.append(f"grader changed{told}")
+    if before.state is JobState.DONE and before.secret_sha256 != after.secret_sha256:
+        reasons.append("secret changed")
     if before.suspect is not None:
         reasons.append("the earlier worker was found to grade wrongly")
     if not reasons and _chains(session, before.id) != _chains(session, after.id):

@@ -20,7 +20,7 @@ from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import by_pattern
 from service.grading.judging.tally import Fate, Reply, reply_to
-from service.grading.judging.truths import NO_PICTURE, Told, nameable, shown_in, told_truths
+from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
@@ -38,9 +38,8 @@ class Classified:
 
 def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
     """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
-    listed = told_truths(criterion, assignment)
-    shown = shown_in(criterion, listed, trials)
-    truths = [truth for known in shown.values() for _, truth in known]
+    shown = shown_in(criterion, trials)
+    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
     labels = nameable(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
     pictures: list[Naming] = []
@@ -58,7 +57,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
             image = recording.images[number]
             own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
         pictures += own
-        namings += _that_count(criterion, listed, index, trial, own, finder)
+        namings += _that_count(criterion, index, trial, own, finder)
     by_index = dict(trials)
     of_trial: dict[int, list[Naming]] = {index: [] for index in by_index}
     for naming in namings:
@@ -101,7 +100,6 @@ def told(naming: Naming) -> str:
 
 def _that_count(
     criterion: Recognition,
-    listed: Told,
     index: int,
     trial: TrialResult,
     own: list[Naming],
@@ -114,7 +112,7 @@ def _that_count(
     if counted and len(counted) >= criterion.patterns:
         return counted
     if not counted and criterion.patterns <= 1:
-        truth = listed.get((trial.scenario, trial.index), NO_PICTURE)
+        truth = missing_truth(criterion, trial)
         sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"

@@ -1,7 +1,6 @@
 """Judging: from an assignment and what happened in its trials to one result a criterion.
 
-How each kind is judged is in the module of the kind; here they are gathered, marked, and put into words for
-a student.
+How each kind is judged is in the module of the kind; here they are gathered, marked, and put into words.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from service.grading.findings import Findings
-from service.grading.grade import CriterionResult, Evidence, TrialResult
+from service.grading.grade import CriterionResult, Evidence, Shown, TrialResult
 from service.grading.judging.circuits import judge_circuits
 from service.grading.judging.collecting import judge_collects
 from service.grading.judging.drawing import judge_drawing
@@ -31,7 +30,6 @@ from service.grading.judging.path import (
     judge_touches_nothing,
     judge_visits,
 )
-from service.grading.judging.planned import pose_numbers
 from service.grading.judging.recognition import judge_recognition
 from service.grading.judging.replies import judge_replies
 from service.grading.judging.reported import judge_reports
@@ -41,7 +39,7 @@ from service.grading.judging.spread import judge_spread, spread_words
 from service.grading.judging.stopping import judge_stop_on
 from service.grading.judging.texts import judge_messages, judge_prints, judge_says
 from service.grading.judging.timing import judge_ranking, judge_timing
-from service.grading.judging.trial_words import early_end, place_words
+from service.grading.judging.trial_words import early_end, place_words, shown_words
 from sim.errors import HostError
 from sim.recording import Verdict
 from submissions.assignment import Assignment
@@ -113,11 +111,9 @@ _JUDGES: Mapping[type, Callable[[Any, TrialResult], Outcome]] = MappingProxyType
         Follows: judge_follows,
         Laps: judge_laps,
         Spread: judge_spread,
+        Reports: judge_reports,
     }
 )
-
-#: Those that need to know from which of its scenario's poses the trial started.
-_PLANNED_JUDGES: Mapping[type, Callable[[Any, TrialResult, int], Outcome]] = MappingProxyType({Reports: judge_reports})
 
 _NOTHING_FOUND = Findings()
 
@@ -158,8 +154,7 @@ def _judge_one(
     ]
     if isinstance(criterion, Classification | Robustness):
         return judge_recognition(criterion, assignment, own)
-    poses = pose_numbers(assignment) if type(criterion) in _PLANNED_JUDGES else {}
-    outcomes = [_outcome(criterion, poses, place, trial, findings, results) for place, trial in own]
+    outcomes = [_outcome(criterion, place, trial, findings, results) for place, trial in own]
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -171,6 +166,7 @@ def _judge_one(
             Evidence(index, outcome.passed, outcome.message, outcome.t, outcome.pose, outcome.measures)
             for (index, _), outcome in zip(own, outcomes, strict=True)
         ),
+        shown=_shown(criterion, own, outcomes),
     )
 
 
@@ -194,7 +190,6 @@ def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> Crit
 
 def _outcome(
     criterion: Criterion,
-    poses: Mapping[tuple[str, int], int],
     place: int,
     trial: TrialResult,
     findings: Findings,
@@ -204,32 +199,33 @@ def _outcome(
         return findings.checks[criterion.id, place]
     if isinstance(criterion, Ranking):
         return judge_ranking(criterion, place, results.get(criterion.of))
-    planned = _PLANNED_JUDGES.get(type(criterion))
-    if planned is not None:
-        return planned(criterion, trial, poses.get((trial.scenario, trial.index), 0))
     return _JUDGES[type(criterion)](criterion, trial)
 
 
 def _told(criterion: Criterion, trials: _Indexed, outcomes: SequenceOf[Outcome]) -> str:
-    """The summary; of an observation all that was observed, as long as every trial may be shown."""
-    shown = all(trial.visibility == "visible" for _, trial in trials)
-    if isinstance(criterion, Spread) and shown and all(outcome.passed for outcome in outcomes):
+    """The summary; of an observation all that was observed."""
+    if isinstance(criterion, Spread) and trials and all(outcome.passed for outcome in outcomes):
         return spread_words(criterion, [trial for _, trial in trials])
     return _summary(trials, outcomes)
 
 
-def _summary(trials: _Indexed, outcomes: SequenceOf[Outcome]) -> str:
-    """What to tell the student: how many trials went well, and what happened in the first that did not.
+def _shown(criterion: Criterion, trials: _Indexed, outcomes: SequenceOf[Outcome]) -> Shown | None:
+    """What a student may read where some trials are hidden."""
+    places = [place for place, (_, trial) in enumerate(trials) if trial.visibility == "visible"]
+    if len(places) == len(trials):
+        return None
+    told = _told(criterion, [trials[place] for place in places], [outcomes[place] for place in places])
+    return Shown(shown_words(told if places else ""))
 
-    Of trials that are not shown to students it tells only how many went wrong.
-    """
+
+def _summary(trials: _Indexed, outcomes: SequenceOf[Outcome]) -> str:
+    """How many trials went well, and what happened in the first that did not."""
     count = len(outcomes)
     passes = sum(outcome.passed for outcome in outcomes)
     if count and passes == count:
-        shown = count == 1 and trials[0][1].visibility == "visible"
-        return outcomes[0].message if shown else f"As expected in all {count} trials."
+        return outcomes[0].message if count == 1 else f"As expected in all {count} trials."
     tally = f"{passes} of {count} trials went as expected. " if count != 1 else ""
     for (_, trial), outcome in zip(trials, outcomes, strict=True):
-        if not outcome.passed and trial.visibility == "visible":
+        if not outcome.passed:
             return f"{tally}{place_words(trial, outcome.t)}: {outcome.message}{early_end(trial, outcome)}"
-    return f"{tally}What went wrong happened in a scenario that is not shown."
+    return tally.strip()

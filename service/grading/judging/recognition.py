@@ -1,4 +1,4 @@
-"""From what a recognition criterion found to its result: marks, curves, and the sentence that a student reads.
+"""From what a recognition criterion found to its result: marks, curves, and the sentences that are read.
 
 Finding answers and truths is ``classification.py``'s, the curves ``sweeps.py``'s.
 """
@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from service.grading.grade import AccuracyCurve, Counts, CriterionResult, TrialResult
+from service.grading.grade import AccuracyCurve, Counts, CriterionResult, Shown, TrialResult
 from service.grading.judging.classification import Classified, classify, told
 from service.grading.judging.marks import earned, share_of_accuracy, share_of_steps
 from service.grading.judging.naming import Naming
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, range_above, share_of_robustness
-from service.grading.judging.trial_words import early_end, place_words
+from service.grading.judging.trial_words import early_end, place_words, shown_words
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Classification, Recognition, Robustness
 from submissions.sweep import CONDITIONS
@@ -26,6 +26,19 @@ def judge_recognition(
     criterion: Classification | Robustness, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
 ) -> CriterionResult:
     """The result of a criterion that pools its ``trials`` (with their indices in the grade)."""
+    result = _judged(criterion, assignment, trials)
+    visible = [(index, trial) for index, trial in trials if trial.visibility == "visible"]
+    if len(visible) == len(trials):
+        return result
+    if not visible:
+        return replace(result, shown=Shown(shown_words("")))
+    alone = _judged(criterion, assignment, visible)
+    return replace(result, shown=Shown(shown_words(alone.message), alone.accuracy, alone.curves))
+
+
+def _judged(
+    criterion: Classification | Robustness, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
+) -> CriterionResult:
     if isinstance(criterion, Robustness):
         levels = levels_along(criterion.along, dict(trials))
         trials = [(index, trial) for index, trial in trials if index in levels]
@@ -36,8 +49,7 @@ def judge_recognition(
         curve = curve_along(criterion.along, found.namings, by_index)
         share = share_of_robustness(criterion, curve)
         curves = (replace(curve, asked=criterion.level), *(other for other in curves if other.along != criterion.along))
-        shown = all(trial.visibility == "visible" for _, trial in trials)
-        words = _robustness_words(criterion, curve) if shown else f" Along {CONDITIONS[criterion.along].words}."
+        words = _robustness_words(criterion, curve)
     else:
         share = _share(criterion, found)
         words = _what_marks_need(criterion, found) if share < 1 else ""
@@ -124,9 +136,8 @@ def _robustness_words(criterion: Robustness, curve: AccuracyCurve) -> str:
 
 
 def _first_wrong(namings: Sequence[Naming], trials: dict[int, TrialResult]) -> str:
-    """Where the first picture was named wrongly, of trials that students may see."""
-    wrong = (naming for naming in namings if not naming.right and trials[naming.trial].visibility == "visible")
-    first = next(wrong, None)
+    """Where the first picture was named wrongly."""
+    first = next((naming for naming in namings if not naming.right), None)
     if first is None:
         return ""
     trial = trials[first.trial]

@@ -21,9 +21,8 @@ Entry = float | str
 _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
 
 
-def judge_reports(criterion: Reports, trial: TrialResult, place: int) -> Outcome:
-    """``place`` is the number of the pose that the trial started from."""
-    wanted = _expected(criterion, trial, place)
+def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
+    wanted = _expected(criterion, trial)
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
     asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
@@ -48,10 +47,10 @@ def judge_reports(criterion: Reports, trial: TrialResult, place: int) -> Outcome
     return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
 
 
-def _expected(criterion: Reports, trial: TrialResult, place: int) -> tuple[Entry, ...]:
+def _expected(criterion: Reports, trial: TrialResult) -> tuple[Entry, ...]:
     if criterion.expected != "label":
         rows = criterion.expected
-        return rows[min(place, len(rows) - 1)]
+        return rows[min(trial.place, len(rows) - 1)]
     label = label_at_start(trial.recording)
     return (float(label) if label.isdecimal() else label,)
 

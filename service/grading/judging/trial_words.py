@@ -29,6 +29,15 @@ def place_words(trial: TrialResult, t: float | None) -> str:
     return ", ".join(words)
 
 
+def shown_words(message: str) -> str:
+    """What is told of visible trials, for a criterion that has others as well; the same whatever happened in those."""
+    return (
+        f"{message} Trials that are not shown are marked as well."
+        if message
+        else "Marked in trials that are not shown."
+    )
+
+
 def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
     """Why the run ended before its time, unless the outcome tells already."""
     fault = cut(trial.recording)

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from service.grading.grade import TrialResult
 from service.grading.judging.patches import decoded
 from service.grading.judging.places import part_at
-from service.grading.judging.planned import pose_numbers
 from sim.backgrounds import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
@@ -24,26 +23,17 @@ NO_PICTURE = "(no picture)"
 Shown = tuple[int, str]
 
 
-#: What the assignment itself tells of a trial, by its scenario and index.
-Told = Mapping[tuple[str, int], str]
-
-
-def told_truths(criterion: Recognition, assignment: Assignment) -> Told:
-    """The label for the pose that each trial starts from; empty if the criterion lists none."""
-    truths = criterion.truth
-    if not isinstance(truths, tuple):
-        return {}
-    return {trial: truths[place] for trial, place in pose_numbers(assignment).items() if place < len(truths)}
-
-
-def shown_in(
-    criterion: Recognition, told: Told, trials: Sequence[tuple[int, TrialResult]]
-) -> Mapping[int, Sequence[Shown]]:
+def shown_in(criterion: Recognition, trials: Sequence[tuple[int, TrialResult]]) -> Mapping[int, Sequence[Shown]]:
     """For each trial (by its index in the grade) the pictures that count, in the order in which they were sent.
 
     Pictures of floor that has no name show nothing to name, and do not count.
     """
-    return {index: _counted(criterion, _known(criterion, trial, told)) for index, trial in trials}
+    return {index: _counted(criterion, _known(criterion, trial)) for index, trial in trials}
+
+
+def missing_truth(criterion: Recognition, trial: TrialResult) -> str:
+    """What a trial without a picture should have shown, where the assignment tells it."""
+    return _told(criterion, trial) or NO_PICTURE
 
 
 def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[str]) -> tuple[str, ...]:
@@ -67,7 +57,7 @@ def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
             return known
 
 
-def _known(criterion: Recognition, trial: TrialResult, told: Told) -> list[Shown]:
+def _known(criterion: Recognition, trial: TrialResult) -> list[Shown]:
     recording = trial.recording
     found: list[Shown] = []
     for number, image in enumerate(recording.images):
@@ -82,7 +72,7 @@ def _known(criterion: Recognition, trial: TrialResult, told: Told) -> list[Shown
             case "places":
                 truth = _nearest(_places(criterion), part_at(recording, "left", image.pose), criterion.within)
             case _:
-                truth = told.get((trial.scenario, trial.index))
+                truth = _told(criterion, trial)
         if truth is not None:
             found.append((number, truth))
     return found
@@ -91,6 +81,12 @@ def _known(criterion: Recognition, trial: TrialResult, told: Told) -> list[Shown
 def _way_from_start(recording: Recording, pose: Pose) -> float:
     """How far the robot at ``pose`` is from where it started, mm."""
     return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y))
+
+
+def _told(criterion: Recognition, trial: TrialResult) -> str | None:
+    """The label that the criterion lists for the pose that the trial starts from, if it lists one."""
+    truths = criterion.truth
+    return truths[trial.place] if isinstance(truths, tuple) and trial.place < len(truths) else None
 
 
 def _places(criterion: Recognition) -> Sequence[LabelledPlace]:

@@ -1,0 +1,50 @@
+"""The secret of this home, for commands that need no database besides: read without opening it, once it is there.
+
+What the secret is for is ``submissions.seeds``'; where it is made, ``service.store``'s migrations.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+from service.settings import Settings
+from sim.errors import HostError
+from submissions.seeds import Secret
+
+
+def secret_here(settings: Settings) -> Secret:
+    """The environment's, else that of the database, which is made if there is none.
+
+    Raises HostError when it can be neither read nor kept.
+    """
+    return settings.own_secret or _read(settings) or _opened(settings)
+
+
+def _read(settings: Settings) -> Secret | None:
+    """What a SQLite file has; None where there is none, or not yet."""
+    file = Path(settings.database.removeprefix("sqlite:///"))
+    if not file.is_file():
+        return None
+    try:
+        with closing(sqlite3.connect(file)) as connection:
+            row = connection.execute("SELECT secret FROM installation").fetchone()
+    except sqlite3.Error:
+        return None
+    return None if row is None else Secret(row[0])
+
+
+def _opened(settings: Settings) -> Secret:
+    # Costs as much as a short grading.
+    from service.store.engine import open_store
+    from service.store.installation import secret_of
+
+    try:
+        with open_store(settings) as store:
+            return secret_of(store)
+    except HostError as error:
+        raise HostError(
+            f"The secret that trials depend on cannot be kept: {error}. Set ROBOMARK_HOME to a folder that "
+            "can be written, or ROBOMARK_SECRET."
+        ) from None
