@@ -168,7 +168,7 @@ def _order() -> TrialOrder:
     ground = floor("Empty_Map")
     noise, channel = Noise(), Channel()
     return TrialOrder(
-        program, None, True, ground, robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1
+        program, None, True, ground, robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1, 1
     )
 
 
