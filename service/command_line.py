@@ -20,6 +20,7 @@ import typer
 from sqlalchemy.exc import DBAPIError
 from typer.exceptions import TyperException
 
+from service.home import keep_private
 from service.reports.readable import readable
 from sim.errors import Cancelled, RobomarkError, UsageError
 
@@ -80,7 +81,10 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
-        ending = commands(sys.argv[1:])(standalone_mode=False)
+        command = commands(sys.argv[1:])
+        # Not before they are imported: what Python keeps of its modules is for the users that children run as, too.
+        keep_private()
+        ending = command(standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
         _end(str(error), _CALLER)

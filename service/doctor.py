@@ -21,6 +21,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox.manager import Sandboxes
 from service.grading.rig import Rig
+from service.home import open_home
 from service.queue import canaries as known_answers
 from service.queue.broker import broker_answers, broker_client, socket_path
 from service.queue.worker import worker_lives
@@ -95,7 +96,7 @@ def _walls(_settings: Settings) -> tuple[bool, str]:
 
 
 def _home(settings: Settings) -> tuple[bool, str]:
-    settings.home.mkdir(mode=0o700, parents=True, exist_ok=True)
+    open_home(settings.home)
     if not os.access(settings.home, os.W_OK | os.X_OK):
         return False, f"{settings.home} cannot be written"
     free = shutil.disk_usage(settings.home).free

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
+from service.home import open_home
 from service.queue.broker import EmbeddedBroker
 from service.queue.processes import run_file
 from service.queue.supervised import SupervisedProcess, SupervisedWorker, stop_all
@@ -86,6 +87,7 @@ def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
 
     Raises UsageError, with the note, when it is taken. The place is free again when this process has ended, however.
     """
+    open_home(settings.home)
     path = run_file(settings.home / "run" / "up.lock")
     try:
         with path.open("a+") as lock:

@@ -168,17 +168,3 @@ def _wait_until(condition: object, seconds: float = 30) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.01)
-
-
-def test_the_folder_of_a_killed_worker_is_removed_by_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    gone = subprocess.Popen(["true"])
-    gone.wait()
-    left, kept, other = (
-        tmp_path / name for name in (f"robomark-trial-{gone.pid}-a", f"robomark-trial-{os.getpid()}-b", "c")
-    )
-    for folder in (left, kept, other):
-        folder.mkdir()
-        (folder / "file").touch()
-    with Rig():
-        assert sorted(path.name for path in tmp_path.iterdir()) == sorted([kept.name, other.name])

@@ -6,6 +6,7 @@ What a student's process may do in its own is decided by the walls; that it cann
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import shutil
 import subprocess
@@ -13,25 +14,24 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-_PREFIX = "robomark-trial-"
+_PREFIX = "robomark-trials-"
 #: Others may pass through it, as a child that runs as a user of its own must, but not look round.
 _MODE = 0o711
 
 
 class PrivateFolders:
-    """The folder in which trials have theirs; made when first asked for."""
+    """The folder in which trials have theirs; made when first asked for, and locked as long as its worker lives."""
 
     def __init__(self) -> None:
         self._path: Path | None = None
+        self._lock = -1
 
     @property
     def path(self) -> Path:
         """It, made again if somebody has tidied it away."""
-        if self._path is None:
-            self._path = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-"))
-            self._path.chmod(_MODE)
-        with contextlib.suppress(FileExistsError):
-            self._path.mkdir(_MODE)
+        if self._path is None or not self._path.is_dir():
+            self._make(self._path)
+        assert self._path is not None
         return self._path
 
     @contextlib.contextmanager
@@ -47,17 +47,43 @@ class PrivateFolders:
         if self._path is not None:
             _remove(self._path)
             self._path = None
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def _make(self, path: Path | None) -> None:
+        # Whoever looks for left-overs does not see it without its lock.
+        hidden = Path(tempfile.mkdtemp(prefix=f".{_PREFIX}"))
+        hidden.chmod(_MODE)
+        path = path or hidden.with_name(hidden.name.removeprefix("."))
+        locked = os.open(hidden, os.O_RDONLY | os.O_DIRECTORY)
+        fcntl.flock(locked, fcntl.LOCK_EX)
+        hidden.rename(path)
+        if self._lock >= 0:
+            os.close(self._lock)
+        self._path, self._lock = path, locked
 
 
 def remove_left_overs() -> None:
-    """Remove the folders of trials whose worker was killed before it could do so itself."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*-*"):
-        worker = folder.name.removeprefix(_PREFIX).partition("-")[0]
+    """Remove the folders of trials whose worker was killed before it could do so itself.
+
+    A worker may live in another name space, where process ids say nothing: only the lock says that it is gone.
+    """
+    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
         # Another worker may be doing the same at this moment.
-        with contextlib.suppress(FileNotFoundError):
-            mine = folder.lstat().st_uid == os.getuid() and not folder.is_symlink()
-            if worker.isdecimal() and mine and not Path(f"/proc/{worker}").exists():
+        with contextlib.suppress(OSError), _opened(folder) as descriptor:
+            if os.fstat(descriptor).st_uid == os.getuid():
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 _remove(folder)
+
+
+@contextlib.contextmanager
+def _opened(folder: Path) -> Iterator[int]:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
 
 
 def _remove(folder: Path) -> None:

@@ -16,6 +16,7 @@ from rich.text import Text
 from service.commands.example_table import catalogue_table, examples_table, figures_table
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.rig import Rig
+from service.home import for_the_user
 from service.reports.readable import one_line, readable
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment import Assignment
@@ -118,7 +119,8 @@ def new(
     ] = None,
 ) -> None:
     """Make the folder of a new assignment, with a reference solution, ready to be changed."""
-    write_new(folder, like)
+    with for_the_user():
+        write_new(folder, like)
     typer.echo(f"{folder}: change {FILE_NAME}, then: robomark assignments check {shlex.quote(str(folder))}")
 
 
@@ -131,7 +133,8 @@ def export(
     ] = False,
 ) -> None:
     """Write an assignment out: whole, or with --student what students may see of it."""
-    written = export_for_students(assignment, folder) if student else export_whole(assignment, folder)
+    with for_the_user():
+        written = export_for_students(assignment, folder) if student else export_whole(assignment, folder)
     typer.echo(f"{folder}: {_count(written, 'file', 'files')}")
 
 

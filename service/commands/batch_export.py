@@ -18,6 +18,7 @@ import typer
 
 from service.commands.batch_control import BatchId
 from service.grading.grade import Grade
+from service.home import for_the_user
 from service.reports.csv_output import marks_csv, moodle_csv
 from service.reports.gradescope import gradescope_text
 from service.reports.json_output import json_document
@@ -95,7 +96,8 @@ def _exported(lines: Sequence[JobLine], *, published: bool) -> list[JobLine]:
 def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: Path) -> None:
     """A file a hand-in, named after its student, and after its assignment where one student has several."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        with for_the_user():
+            folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
     stems = file_stems([(line.student, line.assignment) for line in lines])
@@ -106,7 +108,8 @@ def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: 
 
 def _write(path: Path, text: str) -> None:
     try:
-        path.write_text(text, encoding="utf-8", newline="")
+        with for_the_user():
+            path.write_text(text, encoding="utf-8", newline="")
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from None
 

@@ -14,6 +14,7 @@ from rich.table import Table
 from models import card, names
 from models.cards import Confusion, Curve, Tally
 from models.training import train as train_model
+from service.home import for_the_user
 from service.reports.written import prepare_folder
 from sim.errors import UsageError
 
@@ -48,7 +49,8 @@ def train(
     out: Annotated[Path, typer.Option(help="Folder for the weights and the card.")] = Path("models-trained"),
 ) -> None:
     """Train a classifier again; the same versions of the libraries give the same bytes."""
-    about = train_model(name, out)
+    with for_the_user():
+        about = train_model(name, out)
     same = name in names() and card(name).sha256 == about.sha256
     typer.echo(f"{out / about.file}: {about.training_images} images, sha256 {about.sha256[:16]}")
     typer.echo("the same bytes as the packaged weights" if same else "other bytes than the packaged weights")
@@ -138,7 +140,8 @@ def _write(result: Evaluation, folder: Path) -> None:
     for name, data in files.items():
         path = folder / name
         try:
-            path.write_bytes(data)
+            with for_the_user():
+                path.write_bytes(data)
         except OSError as error:
             raise UsageError(f"{path} cannot be written: {error.strerror}") from error
         typer.echo(str(path))

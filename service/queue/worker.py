@@ -17,6 +17,7 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from responders.sandbox.manager import FULL, NONE, Sandboxes
+from service.home import keep_private, open_home
 from service.queue.celery_app import NO_WALLS, QUEUES, make_celery
 from service.queue.logs import configure_logging
 from service.queue.processes import run_file
@@ -59,6 +60,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     """
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
+    open_home(settings.home)
     with Sandboxes(NONE if unsafe else FULL) as sandboxes:
         walls = sandboxes.check()
     os.environ.update(settings.environment())
@@ -143,4 +145,5 @@ def worker_lives(settings: Settings) -> bool:
 
 
 if __name__ == "__main__":
+    keep_private()
     raise SystemExit(run_worker(load_settings()))

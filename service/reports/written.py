@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from service.grading.grade import Grade
+from service.home import for_the_user
 from service.reports.html import student_report
 from service.reports.plots import draw_all
 from sim.errors import UsageError
@@ -46,7 +47,8 @@ def file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
 def prepare_folder(folder: Path) -> None:
     """Make the folder, before any work is done for it. Raises UsageError when nothing can be written there."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        with for_the_user():
+            folder.mkdir(parents=True, exist_ok=True)
         reason = "" if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
     except OSError as error:
         reason = "it is no folder" if folder.exists() else str(error.strerror)
@@ -58,8 +60,9 @@ def write_page(folder: Path, name: str, page: str) -> Path:
     """Write one page. Raises UsageError when the folder cannot be written to."""
     path = folder / name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(page, encoding="utf-8")
+        with for_the_user():
+            folder.mkdir(parents=True, exist_ok=True)
+            path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
     return path

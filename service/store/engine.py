@@ -19,6 +19,7 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
+from service.home import open_home
 from service.settings import Settings
 from sim.errors import HostError
 from submissions.seeds import Secret
@@ -102,10 +103,13 @@ def _begin_immediate(connection: Connection) -> None:
 def open_store(settings: Settings) -> Store:
     """The database of these settings, brought up to the newest tables.
 
-    Raises HostError when it cannot be reached or is newer than this Robomark.
+    Raises HostError when it cannot be reached or is newer than this Robomark, UsageError for a home that others share.
     """
     from service.store.migrate import upgrade
 
+    parsed = make_url(settings.database)
+    if parsed.get_backend_name() == "sqlite" and settings.home in Path(str(parsed.database)).absolute().parents:
+        open_home(settings.home)
     engine = open_engine(settings.database)
     try:
         upgrade(engine)

@@ -10,6 +10,7 @@ import sys
 
 import uvicorn
 
+from service.home import keep_private
 from service.queue.broker import broker_url
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
@@ -35,4 +36,5 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
 
 
 if __name__ == "__main__":
+    keep_private()
     serve_on(load_settings(), socket.socket(fileno=int(sys.argv[1])))

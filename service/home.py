@@ -1,0 +1,133 @@
+"""The home is ours alone: made so, mended where it is not, refused where it cannot be; and what is made by default.
+
+What lies in the home is the business of whoever puts it there; reports and exports lie elsewhere.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import pwd
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from sim.errors import HostError, UsageError
+
+_log = logging.getLogger(__name__)
+#: What in the home is Robomark's; another's files beside it are left as they are, and out of reach all the same.
+_OURS = ("robomark.db*", "run", "log", "broker*")
+_OF_OTHERS = 0o077
+#: Root, and the number that root has in a name space of users which does not know it.
+_POWERFUL = (0, 65534)
+_users_umask: ContextVar[int] = ContextVar("users_umask")
+
+
+def keep_private() -> None:
+    """From now on this process makes what nobody but this user can read; but for what is made ``for_the_user``."""
+    if _users_umask.get(None) is None:
+        _users_umask.set(os.umask(_OF_OTHERS))
+
+
+@contextmanager
+def for_the_user() -> Iterator[None]:
+    """What is made in here lies where the user wants it, and who can read it is for the user's own umask to say."""
+    users = _users_umask.get(None)
+    if users is None:
+        yield
+        return
+    private = os.umask(users)
+    try:
+        yield
+    finally:
+        os.umask(private)
+
+
+def open_home(home: Path) -> None:
+    """Make the home, or make it and what is in it private again, and say so.
+
+    Raises UsageError for a home that is another's or lies where others could put one of theirs in its place,
+    HostError when it cannot be made.
+    """
+    if home in (Path("/"), *_folders_of_all()):
+        raise UsageError(f"the home {home} is not for Robomark alone; expected a folder of its own in ROBOMARK_HOME")
+    try:
+        _check_way(home)
+        home.mkdir(mode=0o700, parents=True, exist_ok=True)
+        mended = _mend(home)
+    except FileExistsError:
+        raise UsageError(f"the home {home} is no folder, expected one for Robomark alone in ROBOMARK_HOME") from None
+    except OSError as error:
+        raise HostError(f"the home {error.filename or home} cannot be used: {error.strerror}") from None
+    if mended:
+        _log.warning("robomark: the home %s was open to other users (%d of its files and folders); "
+                     "now it is this user's alone", home, mended)  # fmt: skip
+
+
+def _folders_of_all() -> tuple[Path, ...]:
+    """The folders in which users have theirs."""
+    try:
+        return tuple(Path.home().parents)
+    except RuntimeError:
+        return ()
+
+
+def _check_way(home: Path) -> None:
+    """Whoever owns a folder or link on the way, or may write there, could put another home in this one's place."""
+    for path in (home, *home.parents):
+        if path.is_symlink():
+            _check_owner(home, path, path.lstat(), _POWERFUL)
+    for folder in dict.fromkeys((*home.parents, *home.resolve().parents)):
+        if not folder.exists():
+            continue
+        found = folder.stat()
+        _check_owner(home, folder, found, _POWERFUL)
+        if found.st_mode & stat.S_IWOTH and not found.st_mode & stat.S_ISVTX:
+            raise UsageError(
+                f"the home {home} is not this user's alone: everybody may write in {folder}; "
+                f"expected another folder in ROBOMARK_HOME, or chmod o-w {folder}"
+            )
+
+
+def _check_owner(home: Path, path: Path, found: os.stat_result, also: tuple[int, ...] = ()) -> None:
+    if found.st_uid not in (os.geteuid(), *also):
+        raise UsageError(
+            f"the home {home} is not this user's alone: {path} belongs to {_called(found.st_uid)}, and Robomark runs "
+            f"as {_called(os.geteuid())}; run it as that user, or name another folder in ROBOMARK_HOME"
+        )
+
+
+def _called(user: int) -> str:
+    try:
+        return pwd.getpwuid(user).pw_name
+    except KeyError:
+        return f"user {user}"
+
+
+def _mend(home: Path) -> int:
+    """How much of it was open to others. It is closed from the top, so that nobody comes in between."""
+    mended: int = _close(home, home.resolve())
+    for path in sorted(found for name in _OURS for found in home.glob(name)):
+        mended += _close(home, path)
+        if path.is_symlink():
+            _check_owner(home, path, path.stat())
+            continue
+        for folder, folders, files in os.walk(path):
+            mended += sum(_close(home, Path(folder, name)) for name in (*folders, *files))
+    return mended
+
+
+def _close(home: Path, path: Path) -> bool:
+    """Whether it was open to others. What another put into the home is refused, for it would be trusted."""
+    try:
+        found = path.lstat()
+        _check_owner(home, path, found)
+        was_open = not stat.S_ISLNK(found.st_mode) and bool(found.st_mode & _OF_OTHERS)
+        if was_open:
+            path.chmod(stat.S_IMODE(found.st_mode) & ~_OF_OTHERS)
+    except FileNotFoundError:
+        # Services come and go.
+        return False
+    return was_open
