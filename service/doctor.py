@@ -19,6 +19,7 @@ import redis
 from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
+from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
 from service.grading.rig import Rig
 from service.home import open_home
@@ -56,6 +57,7 @@ def examine(settings: Settings) -> list[Finding]:
         ("Python", _python),
         ("simulator", _simulator),
         ("walls", _walls),
+        ("control groups", _control_groups),
         ("home", _home),
         ("database", _database),
         ("secret", _secret),
@@ -93,6 +95,20 @@ def _simulator(_settings: Settings) -> tuple[bool, str]:
 def _walls(_settings: Settings) -> tuple[bool, str]:
     with Sandboxes() as sandboxes:
         return True, f"student code runs behind: {sandboxes.check()}"
+
+
+def _control_groups(settings: Settings) -> tuple[bool, str]:
+    """An extra, so that nothing is wrong without it; a unit may well have what this process has not."""
+    reason = control_group.why_not()
+    told = f"a worker started from here has {'one for each grading at a time' if reason is None else f'none: {reason}'}"
+    with _opened(settings) as store:
+        if store is None:
+            return True, told
+        with store.reading() as session:
+            lately = [seen.worker for seen in presence.workers(session) if seen.lately]
+    if not lately:
+        return True, told
+    return True, f"{told}; {sum('control group' in each.walls for each in lately)} of {len(lately)} workers have them"
 
 
 def _home(settings: Settings) -> tuple[bool, str]:

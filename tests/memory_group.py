@@ -46,6 +46,8 @@ def memory_group(size: int) -> Iterator[MemoryGroup | None]:
         if made is not None:
             for _ in range(100):
                 with suppress(OSError):
+                    for inner in made.folder.glob("*/"):
+                        inner.rmdir()
                     made.folder.rmdir()
                     break
                 time.sleep(0.1)

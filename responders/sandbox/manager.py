@@ -25,6 +25,7 @@ from typing import Any, Literal
 
 from responders import wire
 from responders.sandbox import bubblewrap
+from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
@@ -66,18 +67,19 @@ FULL = Walls()
 NONE = Walls(landlock=0, seccomp=False, bubblewrap=False)
 
 
-def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str, bubblewrap: bool) -> str:
+def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str, bubblewrap: bool, control_group: bool) -> str:
     """What grades and reports say of the layers that stood."""
     layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp + ["own user"] * own_user
-    layers += ["bubblewrap"] * bubblewrap
+    layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
     return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
 class Zygote:
     """A process with the imports of one role loaded, from which children are forked."""
 
-    def __init__(self, role: Role, walls: Walls, folders: PrivateFolders) -> None:
+    def __init__(self, role: Role, walls: Walls, folders: PrivateFolders, group: ControlGroup | None = None) -> None:
         self._role = role
+        self._group = group
         self._walls = walls
         self._folders = folders
         self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
@@ -193,7 +195,7 @@ class Zygote:
         except BaseException:
             child.close()
             raise
-        child.begin(meter, blamed)
+        child.begin(meter, blamed, self._group.watch() if self._group is not None else None)
         return child
 
     def _check_walls(self, child: Child) -> None:
@@ -212,6 +214,7 @@ class Zygote:
             standing["own_user"],
             standing["policy"],
             self.without_bubblewrap is None,
+            self._group is not None,
         )
 
     def _start(self) -> None:
@@ -239,9 +242,10 @@ class Zygote:
             "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5:])"
         )
         arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), *roots]
+        joining = self._group.joining if self._group is not None else []
         try:
             self._process = subprocess.Popen(
-                [*wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
+                [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
                 pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -294,10 +298,12 @@ class Zygote:
 
 
 class Sandboxes:
-    """The zygotes of one worker: started when first needed, ended together."""
+    """The zygotes of one worker: started when first needed, ended together, and all in one ``group`` if given."""
 
-    def __init__(self, walls: Walls = FULL) -> None:
+    def __init__(self, walls: Walls = FULL, group: ControlGroup | None = None) -> None:
         self._walls = walls
+        self._group = group
+        self._memory_limits: dict[Role, int] = {}  # of the newest child of each; one lives at a time
         self._zygotes: dict[Role, Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
@@ -309,6 +315,9 @@ class Sandboxes:
 
         What it costs is counted by ``meter``, that of its job.
         """
+        if self._group is not None:
+            self._memory_limits[role] = limits.memory_bytes
+            self._group.make_room(sum(self._memory_limits.values()))
         return self._zygote(role).spawn(limits, folder, meter, blamed=self._blamed)
 
     @contextlib.contextmanager
@@ -335,7 +344,7 @@ class Sandboxes:
 
     def _zygote(self, role: Role) -> Zygote:
         if role not in self._zygotes:
-            self._zygotes[role] = Zygote(role, self._walls, self._folders)
+            self._zygotes[role] = Zygote(role, self._walls, self._folders, self._group)
         return self._zygotes[role]
 
     @property
@@ -346,6 +355,8 @@ class Sandboxes:
     def close(self) -> None:
         while self._zygotes:
             self._zygotes.popitem()[1].close()
+        if self._group is not None:
+            self._group.close()
         self._folders.close()
 
     def __enter__(self) -> Sandboxes:

@@ -79,6 +79,7 @@ class Child:
         self._limits = limits
         self._meter = JobMeter()
         self._blamed = False
+        self._overran: Callable[[], bool] | None = None
         self._pending = b""
         self._sent = self._received = 0  # frames
         self._known: dict[bytes, wire.Frame] = {}
@@ -88,12 +89,13 @@ class Child:
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
         connection.settimeout(_POLL_SECONDS)
 
-    def begin(self, meter: JobMeter, blamed: bool) -> None:
+    def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
         """From now on student code may run in it, and what it costs is counted by ``meter``.
 
         With ``blamed`` being killed is its own fault, as it runs alone on this machine and was killed before.
+        ``overran`` says whether it, with the other processes of its submission, has taken more than they may have.
         """
-        self._meter, self._blamed = meter, blamed
+        self._meter, self._blamed, self._overran = meter, blamed, overran
 
     def send(self, frame: dict[str, Any]) -> None:
         """Send one frame; a child that does not read it shows up at the next ``receive``."""
@@ -300,6 +302,9 @@ class Child:
         if not ended:
             # It was alive until we ended it ourselves just now: it had only closed the wire.
             return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
+        if self._overran is not None and self._overran():
+            sentence = "its process was killed: with the submission's others it took more memory than they may have"
+            return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
         if self._blamed:
             sentence = "its process was killed, again and with nothing else running: it takes more memory than there is"
             return ChildStopped(Verdict.MEMORY_LIMIT, sentence)

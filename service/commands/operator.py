@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from responders.sandbox import control_group
 from service.commands.batch_tables import remarks
 from service.commands.grade import warn_of_no_walls
 from service.doctor import examine
@@ -45,6 +46,8 @@ def worker(
     if settings.broker_url:
         status = run_worker(settings, unsafe=unsafe)
     else:
+        # Before the broker is in this group: it can only be divided when nobody is left in it.
+        control_group.divide()
         with EmbeddedBroker(settings) as broker:
             status = run_worker(broker.settings, unsafe=unsafe)
     if status:

@@ -6,6 +6,7 @@ import platform
 
 import typer
 
+from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
 
 sandbox_app = typer.Typer(help="The walls round student code.", no_args_is_help=True)
@@ -28,3 +29,8 @@ def check() -> None:
         typer.echo("extra: bubblewrap hides the names of files and processes too")
     else:
         typer.echo(f"extra: bubblewrap, which would hide the names of files and processes too, is not used: {reason}")
+    reason = control_group.why_not()
+    if reason is None:
+        typer.echo("extra: a worker started from here has a control group for each grading at a time")
+    else:
+        typer.echo(f"extra: a worker started from here has no control group for each grading at a time: {reason}")

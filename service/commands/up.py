@@ -14,6 +14,7 @@ import structlog
 import typer
 from sqlalchemy.exc import SQLAlchemyError
 
+from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
@@ -40,6 +41,8 @@ def up(
     """Bring up broker, workers and web server, and keep them up until Ctrl-C; jobs in flight then go back."""
     settings = load_settings()
     configure_logging(settings.log_level)
+    # Before there are others in this group: it can only be divided when nobody is left in it.
+    control_group.divide()
     with ExitStack() as held:
         leave_note = held.enter_context(alone_in(settings))
         listening = held.enter_context(listen(host, port)) if serve else None

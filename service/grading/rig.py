@@ -17,6 +17,7 @@ from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_play import Played, Stage, never_ran, play_notebook
 from responders.notebook_process import NotebookOrder
+from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import FULL, Sandboxes, Walls
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
@@ -38,12 +39,13 @@ class Rig:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
 
     ``slots`` are those of the machine's graders; without them there is no other. A ``meter`` counts what one job costs.
+    All student code runs in ``group``, where there is one, which is closed with the rig.
     """
 
-    def __init__(self, walls: Walls = FULL, slots: Slots | None = None) -> None:
+    def __init__(self, walls: Walls = FULL, slots: Slots | None = None, group: ControlGroup | None = None) -> None:
         remove_left_overs()
         self._slots = slots
-        self._sandboxes = Sandboxes(walls)
+        self._sandboxes = Sandboxes(walls, group)
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
 

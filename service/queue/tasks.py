@@ -13,6 +13,7 @@ from functools import cached_property
 import structlog
 from celery import Task, current_app, shared_task, signals
 
+from responders.sandbox import control_group
 from responders.sandbox.manager import FULL, NONE
 from service.grading.rig import Rig
 from service.grading.slots import Slots
@@ -65,8 +66,9 @@ class _Children:
     @cached_property
     def child(self) -> PoolChild:
         settings = load_settings()
-        walls = NONE if current_app.conf.get(NO_WALLS) else FULL
-        store, rig = open_store(settings), Rig(walls, Slots(settings.home / "run"))
+        unsafe = current_app.conf.get(NO_WALLS)
+        group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
+        store, rig = open_store(settings), Rig(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
         watch = Watch(store, rig, worker_name(), settings.canary_seconds)
         watch.keep_looking()
         return PoolChild(settings, store, rig, watch)

@@ -16,6 +16,7 @@ from pathlib import Path
 import structlog
 from sqlalchemy.exc import DBAPIError
 
+from responders.sandbox import control_group
 from responders.sandbox.manager import FULL, NONE, Sandboxes
 from service.home import keep_private, open_home
 from service.queue.celery_app import NO_WALLS, QUEUES, make_celery
@@ -62,6 +63,9 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
     open_home(settings.home)
     with Sandboxes(NONE if unsafe else FULL) as sandboxes:
+    undivided = control_group.divide()
+    group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
+    with Sandboxes(NONE if unsafe else FULL, group) as sandboxes:
         walls = sandboxes.check()
     os.environ.update(settings.environment())
     name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
@@ -69,6 +73,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     configure_logging(settings.log_level)
+    _log.info("worker.control_group", not_used_because=undivided)
     with open_store(settings) as store, run_file(lock_path(settings)).open("a") as lock, _shown_alive(settings, name):
         # Shared: several workers of one home may live; whoever asks wants to know whether any does.
         fcntl.flock(lock, fcntl.LOCK_SH)
