@@ -52,6 +52,7 @@ def examine(settings: Settings) -> list[Finding]:
         ("Python", _python),
         ("simulator", _simulator),
         ("walls", _walls),
+        ("between trials", _between_trials),
         ("home", _home),
         ("database", _database),
         ("broker", _broker),
@@ -88,6 +89,15 @@ def _simulator(_settings: Settings) -> tuple[bool, str]:
 def _walls(_settings: Settings) -> tuple[bool, str]:
     with Sandboxes() as sandboxes:
         return True, f"student code runs behind: {sandboxes.check()}"
+
+
+def _between_trials(_settings: Settings) -> tuple[bool, str]:
+    """Without this workers here give assignments with hidden scenarios back."""
+    with Sandboxes() as sandboxes:
+        reason = sandboxes.remembers()
+    if reason is None:
+        return True, "a trial can leave nothing for the next"
+    return False, f"a trial can leave something for the next, so hidden scenarios are not graded: {reason}"
 
 
 def _home(settings: Settings) -> tuple[bool, str]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import shutil
 import subprocess
 import tempfile
@@ -16,6 +17,8 @@ from pathlib import Path
 _PREFIX = "robomark-trial-"
 #: Others may pass through it, as a child that runs as a user of its own must, but not look round.
 _MODE = 0o711
+#: How many numbers are left out at most before a trial, several times what a child may use up.
+_SKIPPED = 1500
 
 
 class PrivateFolders:
@@ -23,6 +26,7 @@ class PrivateFolders:
 
     def __init__(self) -> None:
         self._path: Path | None = None
+        self._counting = False  # whether files there are numbered on and on
 
     @property
     def path(self) -> Path:
@@ -30,13 +34,21 @@ class PrivateFolders:
         if self._path is None:
             self._path = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-"))
             self._path.chmod(_MODE)
+            self._counting = len({_number(self._path) for _ in range(4)}) == 4
         with contextlib.suppress(FileExistsError):
             self._path.mkdir(_MODE)
         return self._path
 
+    def _skip_numbers(self) -> None:
+        """Where files are numbered on and on (tmpfs, Btrfs), the next number would tell how many a trial has made."""
+        if self._counting:
+            for _ in range(secrets.randbelow(_SKIPPED)):
+                _number(self.path)
+
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
         """A folder for one trial."""
+        self._skip_numbers()
         folder = Path(tempfile.mkdtemp(dir=self.path))
         try:
             yield folder
@@ -47,6 +59,16 @@ class PrivateFolders:
         if self._path is not None:
             _remove(self._path)
             self._path = None
+
+
+def _number(folder: Path) -> int:
+    """The number of a new file in ``folder``, which is gone again."""
+    path = folder / "number"
+    path.touch(0o600)
+    try:
+        return path.stat().st_ino
+    finally:
+        path.unlink()
 
 
 def remove_left_overs() -> None:

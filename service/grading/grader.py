@@ -85,6 +85,8 @@ def grade(
     parts = _parts(submission, assignment)
     trials = tuple(assignment.trials())
     results: list[TrialResult] = []
+    if any(trial.scenario.visibility != "visible" for trial in trials):
+        rig.check_forgetting()
     watch = _Watch(observe or _nobody, len(trials))
     for trial in trials:
         order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed))

@@ -21,6 +21,7 @@ from responders.training import Trained, TrainingOrder, train_and_name
 from responders.trial import run_trial
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
+from sim.errors import HostError
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording
 
@@ -33,6 +34,7 @@ class Rig:
     def __init__(self, walls: Walls = FULL) -> None:
         remove_left_overs()
         self._sandboxes = Sandboxes(walls)
+        self._forgets = walls.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
 
@@ -76,6 +78,12 @@ class Rig:
     def check_walls(self) -> str:
         """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""
         return self._sandboxes.check()
+
+    def check_forgetting(self) -> None:
+        """Hidden trials must leave nothing for later ones. Raises HostError where they could; done once in a while."""
+        reason = self._sandboxes.remembers() if self._forgets else None
+        if reason is not None:
+            raise HostError(f"a trial could leave something for the next, so nothing hidden is graded here: {reason}")
 
     @property
     def children_cpu_seconds(self) -> float:
