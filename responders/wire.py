@@ -76,6 +76,7 @@ WALLS: Schema = MappingProxyType(
                 "landlock": _whole(0, 99),
                 "seccomp": _flag,
                 "own_user": _flag,
+                "without_doorkeeper": _or_none(_text),
                 "policy": _text,
                 "missing": _or_none(_text),
             },

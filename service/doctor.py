@@ -58,6 +58,7 @@ def examine(settings: Settings) -> list[Finding]:
         ("simulator", _simulator),
         ("walls", _walls),
         ("control groups", _control_groups),
+        ("between trials", _between_trials),
         ("home", _home),
         ("database", _database),
         ("secret", _secret),
@@ -109,6 +110,15 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
     if not lately:
         return True, told
     return True, f"{told}; {sum('control group' in each.walls for each in lately)} of {len(lately)} workers have them"
+
+
+def _between_trials(_settings: Settings) -> tuple[bool, str]:
+    """Without this workers here give assignments with hidden scenarios back."""
+    with Sandboxes() as sandboxes:
+        reason = sandboxes.remembers()
+    if reason is None:
+        return True, "a trial can leave nothing for the next"
+    return False, f"a trial can leave something for the next, so hidden scenarios are not graded: {reason}"
 
 
 def _home(settings: Settings) -> tuple[bool, str]:

@@ -8,21 +8,36 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import socket
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from attacks import file_changes, files, kernel, memory, metadata, network, processes, programs, signals, tools
+from attacks import (
+    file_changes,
+    files,
+    kernel,
+    memory,
+    metadata,
+    network,
+    processes,
+    programs,
+    remembering,
+    signals,
+    tools,
+)
 from filter_machine import listed
 from responders import wire
+from responders.sandbox import manager
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import NONE, Role, Sandboxes, Walls
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.running_child import Child, ChildLimits
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
@@ -35,6 +50,7 @@ GETS_THROUGH = {
     tools.NEWER: frozenset({"none", "landlock-1"}),
     tools.REMAINS: frozenset({"none", "full", "full-1"}),
     tools.UNTRIED: frozenset(),
+    tools.NOWHERE: frozenset(),
 }
 SETTINGS = {
     "full": Walls(bubblewrap=False),
@@ -53,6 +69,10 @@ SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
 _TOOLS = Path(tools.__file__).read_text()
 _NUMBERS = {name: number for number, name, _ in listed()}
 
+#: What is left in turn by the first half of an attack that remembers.
+_BITS = (1, 0, 0, 1, 1, 0, 1, 0)
+_OLD = 1_500_000_000
+
 #: The first lines of the student's file: this file's ``tools`` under their own name, then the group and the attack.
 _FRAME = """
 import sys, types
@@ -65,7 +85,8 @@ tools = module("attacks.tools", {tools!r})
 tools.numbers.update({numbers!r})
 tools.targets.__dict__.update({targets!r})
 tools.disarm()
-tools.report(getattr(module("group", {group!r}), {name!r}))
+group = module("group", {group!r})
+{attack}
 def responder(text): return text
 """
 
@@ -78,6 +99,7 @@ class Attack:
     name: str
     stopped_by: str
     text: str = field(repr=False)
+    at_once: bool = False  # of one that remembers: whether its halves run at the same time
 
     @property
     def id(self) -> str:
@@ -91,6 +113,16 @@ def attacks() -> list[Attack]:
         for group in GROUPS
         for name, value in vars(group).items()
         if hasattr(value, "stopped_by")
+    ]
+
+
+def memories() -> list[Attack]:
+    """Those in two halves, of which the first leaves a bit for the second."""
+    text = Path(remembering.__file__).read_text()
+    return [
+        Attack("remembering", name, value.kept_by, text, value.at_once)
+        for name, value in vars(remembering).items()
+        if hasattr(value, "kept_by")
     ]
 
 
@@ -185,9 +217,42 @@ class Canaries:
         return seen
 
 
+def readable_tree(folder: Path) -> Path:
+    """Package folders like the own ones, with more files, folders and links in them, and links beside them."""
+    here = Path(manager.__file__).parents[2]
+    for name in ("sim/brick", "responders/kit"):
+        shutil.copytree(here / name, folder / name)
+        more = folder / name / "more"
+        more.mkdir()
+        for turn in range(len(_BITS)):
+            (more / f"file-{turn}").write_bytes(bytes(4096))
+            (more / f"pages-{turn}").write_bytes(bytes(65536))
+            (more / f"link-{turn}").symlink_to("nowhere")
+            (more / f"folder-{turn}").mkdir()
+            (more / f"folder-{turn}" / "nothing").touch()
+    (folder / "links").mkdir()
+    for turn in range(len(_BITS)):
+        (folder / "links" / f"link-{turn}").symlink_to("nowhere")
+    os.sync()
+    return folder
+
+
+def forget(folder: Path) -> None:
+    """As if nobody had looked at what is in a readable tree, and memory were needed for something else."""
+    for path in (*folder.glob("*/*/more/*"), *folder.glob("links/*")):
+        os.utime(path, (_OLD, _OLD), follow_symlinks=False)
+        if path.name.startswith("pages"):
+            with path.open("rb") as file:
+                os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+
+
 def attack_text(attack: Attack, targets: dict[str, Any]) -> str:
     """A student's file that runs an attack and prints what came of it."""
-    return _FRAME.format(tools=_TOOLS, numbers=_NUMBERS, targets=targets, group=attack.text, name=attack.name)
+    return _text(f"tools.report(group.{attack.name})", attack, targets)
+
+
+def _text(line: str, attack: Attack, targets: dict[str, Any]) -> str:
+    return _FRAME.format(tools=_TOOLS, numbers=_NUMBERS, targets=targets, group=attack.text, attack=line)
 
 
 def scrambled(*secrets: str) -> list[str]:
@@ -207,23 +272,70 @@ def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any
     return stop.message if stop is not None else "\n".join(said)
 
 
+def remembered(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
+    """What came of an attack in two halves: ``LEAK ...`` if the second could tell all bits that the first left."""
+    found: list[int] = []
+    for turn, bit in enumerate(_BITS):
+        told = _one_bit(sandboxes, role, attack, targets | {"since": time.time()}, turn, bit)
+        if not told.startswith("found "):
+            return told
+        found.append(int(told.removeprefix("found ")))
+    ones, zeros = ([value for value, bit in zip(found, _BITS, strict=True) if bit == which] for which in (1, 0))
+    apart = min(ones) > max(zeros) or max(ones) < min(zeros)
+    return f"LEAK {found}" if apart else f"blocked {found}"
+
+
+def _one_bit(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any], turn: int, bit: int) -> str:
+    """What the second half said, or the first if it came to nothing."""
+    leave, find = (
+        f"tools.tell(lambda: group.{call})" for call in (f"{attack.name}({turn}, {bit})", f"{attack.name}.find({turn})")
+    )
+    with contextlib.ExitStack() as first:
+        folder = first.enter_context(sandboxes.private_folder())
+        child = first.enter_context(_running(sandboxes, role, _text(leave, attack, targets), folder))
+        said, stop = _heard(child, role, "ready ")
+        if any(line.startswith("blocked") for line in said) or (attack.at_once and not said):
+            return said[0] if said else f"blocked {stop}"
+        if attack.at_once:
+            targets = targets | {"other": int(said[-1].removeprefix("ready "))}
+        else:
+            first.close()
+        with sandboxes.private_folder() as folder:
+            said, stop = run_text(sandboxes, role, _text(find, attack, targets), folder)
+    return said[-1] if said else f"blocked {stop}"
+
+
 def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple[list[str], ChildStopped | None]:
     """Run a student's file; the texts it printed, and how it was stopped if it was."""
-    said: list[str] = []
+    with _running(sandboxes, role, text, folder) as child:
+        return _heard(child, role)
+
+
+@contextlib.contextmanager
+def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Iterator[Child]:
     child = sandboxes.spawn(role, LIMITS, folder)
     try:
         job = {"name": f"{role}.py", "text": text, "seed": 1}
         child.send(job | ({"preamble": "none"} if role == "robot" else {"function": None}))
+        yield child
+    finally:
+        child.close()
+
+
+def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
+    """What a child prints, to its end or to a text that begins with ``until``."""
+    said: list[str] = []
+    try:
         while True:
             frame = child.receive(SCHEMAS[role])
             if frame["do"] == "print":
                 said.append(frame["text"])
+                if until is not None and frame["text"].startswith(until):
+                    return said, None
             elif frame["do"] in ("end", "ready"):
                 return said + ([json.dumps(frame["error"])] if frame["error"] else []), None
     except ChildStopped as stop:
         return said, stop
-    finally:
-        child.close()
 
 
 @contextlib.contextmanager

@@ -15,8 +15,10 @@ import os
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +26,9 @@ from types import TracebackType
 from typing import Any, Literal
 
 from responders import wire
-from responders.sandbox import bubblewrap
+from responders.sandbox import bubblewrap, traces
 from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.inside import grants
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
@@ -35,10 +38,13 @@ Role = Literal["robot", "responder"]
 Play = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
+_END_SECONDS = 0.5
 _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
+#: How a zygote tells that a child has ended: the wait status, seconds and microseconds of the user's and the system's.
+_ENDED = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
-_FOLDERS = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
+_FOLDERS: dict[Role, tuple[str, str]] = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
 
 
 class WallsMissing(HostError):
@@ -67,10 +73,12 @@ FULL = Walls()
 NONE = Walls(landlock=0, seccomp=False, bubblewrap=False)
 
 
-def stamp(landlock: int, seccomp: bool, own_user: bool, policy: str, bubblewrap: bool, control_group: bool) -> str:
+def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
     """What grades and reports say of the layers that stood."""
-    layers = [f"Landlock {landlock}"] * bool(landlock) + ["seccomp"] * seccomp + ["own user"] * own_user
+    layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
+    layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
     layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
+    policy = standing["policy"]
     return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
@@ -86,6 +94,8 @@ class Zygote:
         self._forks = 0
         #: Why bubblewrap does not stand round it; None when it does.
         self.without_bubblewrap: str | None = "not asked for"
+        #: Why its children can name any path; None when a doorkeeper decides about those.
+        self.without_doorkeeper: str | None = "no child has been forked"
         self.children_cpu_seconds = 0.0  # of all children that are gone
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -134,10 +144,11 @@ class Zygote:
     def reap(self, pid: int) -> int:
         """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
         try:
-            answer, _ = self._ask({"do": "reap", "pid": pid})
-            self.children_cpu_seconds += float(answer["cpu"])
-            return int(answer["status"])
-        except (OSError, EOFError) as error:
+            ended, _ = self._ask({"do": "reap", "pid": pid})
+            status, *used = _ENDED.unpack_from(ended)
+            self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
+            return int(status)
+        except (OSError, EOFError, struct.error) as error:
             # Its children died with it, and that is no fault of a student's.
             self.close()
             raise _ZygoteEnded(f"the {self._role} zygote ended while a program ran") from error
@@ -147,6 +158,9 @@ class Zygote:
             self._control.close()
             self._control = None
         if self._process is not None:
+            # It ends by itself then, and its doorkeeper before it, unless it is stuck.
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_SECONDS)
             self._process.kill()
             self._process.wait()
             self._process = None
@@ -163,7 +177,7 @@ class Zygote:
             descriptors = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            answer, received = self._ask(
+            data, received = self._ask(
                 {
                     "do": "spawn",
                     "play": play,
@@ -183,6 +197,7 @@ class Zygote:
             theirs.close()
             for fd in descriptors:
                 os.close(fd)
+        answer = json.loads(data)
         if "missing" in answer:
             ours.close()
             raise _walls_missing(answer["missing"])
@@ -208,22 +223,15 @@ class Zygote:
             raise _walls_missing(standing["missing"])
         if bool(standing["landlock"]) != bool(self._walls.landlock) or standing["seccomp"] != self._walls.seccomp:
             raise _walls_missing("a wall that was asked for does not stand")
-        child.walls = stamp(
-            standing["landlock"],
-            standing["seccomp"],
-            standing["own_user"],
-            standing["policy"],
-            self.without_bubblewrap is None,
-            self._group is not None,
-        )
+        self.without_doorkeeper = standing["without_doorkeeper"]
+        child.walls = stamp(standing, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
         """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
         if self._process is not None and self._process.poll() is None:
             return
         here = Path(__file__).resolve().parent
-        package, folder = _FOLDERS[self._role]
-        roots = [str(_package_folder(package) / folder)]
+        roots = [_own_modules(self._role)]
         if self._walls.bubblewrap:
             wrapping = bubblewrap.wrapping([str(here), *roots], self._folders.path)
             self.without_bubblewrap = bubblewrap.why_not(wrapping)
@@ -274,7 +282,7 @@ class Zygote:
         self._folders_inside = received[0]
         return True
 
-    def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[dict[str, Any], list[int]]:
+    def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
         if self._control is None:
             raise EOFError("it is not running")
         payload = array.array("i", descriptors or [])
@@ -282,7 +290,7 @@ class Zygote:
         self._control.sendmsg([json.dumps(order).encode()], ancillary)
         return self._answer()
 
-    def _answer(self) -> tuple[dict[str, Any], list[int]]:
+    def _answer(self) -> tuple[bytes, list[int]]:
         if self._control is None:
             raise EOFError("it is not running")
         if not select.select([self._control], [], [], _START_SECONDS)[0]:
@@ -293,8 +301,7 @@ class Zygote:
         found = array.array("i")
         for _, _, part in received:
             found.frombytes(part[: len(part) - len(part) % 4])
-        answer: dict[str, Any] = json.loads(data)
-        return answer, list(found)
+        return data, list(found)
 
 
 class Sandboxes:
@@ -307,6 +314,7 @@ class Sandboxes:
         self._zygotes: dict[Role, Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
+        self._forgets_until = 0.0
 
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
@@ -337,6 +345,21 @@ class Sandboxes:
         """What keeps bubblewrap, an extra, from standing round children of ``role``; None if it does."""
         self.check(role)
         return self._zygote(role).without_bubblewrap
+
+    def remembers(self) -> str | None:
+        """Why a trial here could leave something for a later one to find; None for the next hours if it cannot."""
+        now = time.time()
+        if not 0 < self._forgets_until - now <= traces.HOLDS_SECONDS:
+            zygote = self._zygote("robot")
+            zygote.try_walls()
+            if zygote.without_doorkeeper is not None:
+                return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
+            if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
+                dated = traces.read_beforehand(grants.readable([_own_modules(role) for role in _FOLDERS]))
+                if dated is not None:
+                    return dated
+            self._forgets_until = now + traces.HOLDS_SECONDS
+        return None
 
     def private_folder(self) -> contextlib.AbstractContextManager[Path]:
         """A folder for one trial, removed afterwards whatever the student's code has put into it."""
@@ -386,6 +409,12 @@ def _walls_missing(what: str) -> WallsMissing:
         f"this machine cannot wall in student code: {what}; "
         "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
     )
+
+
+def _own_modules(role: Role) -> str:
+    """The folder with what a role's children import of ours."""
+    package, folder = _FOLDERS[role]
+    return str(_package_folder(package) / folder)
 
 
 def _package_folder(name: str) -> Path:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import secrets
 import shutil
 import subprocess
 import tempfile
@@ -17,6 +18,8 @@ from pathlib import Path
 _PREFIX = "robomark-trials-"
 #: Others may pass through it, as a child that runs as a user of its own must, but not look round.
 _MODE = 0o711
+#: How many numbers are left out at most before a trial, several times what a child may use up.
+_SKIPPED = 1500
 
 
 class PrivateFolders:
@@ -25,6 +28,7 @@ class PrivateFolders:
     def __init__(self) -> None:
         self._path: Path | None = None
         self._lock = -1
+        self._counting = False  # whether files there are numbered on and on
 
     @property
     def path(self) -> Path:
@@ -34,9 +38,16 @@ class PrivateFolders:
         assert self._path is not None
         return self._path
 
+    def _skip_numbers(self) -> None:
+        """Where files are numbered on and on (tmpfs, Btrfs), the next number would tell how many a trial has made."""
+        if self._counting:
+            for _ in range(secrets.randbelow(_SKIPPED)):
+                _number(self.path)
+
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
         """A folder for one trial."""
+        self._skip_numbers()
         folder = Path(tempfile.mkdtemp(dir=self.path))
         try:
             yield folder
@@ -62,6 +73,17 @@ class PrivateFolders:
         if self._lock >= 0:
             os.close(self._lock)
         self._path, self._lock = path, locked
+        self._counting = len({_number(path) for _ in range(4)}) == 4
+
+
+def _number(folder: Path) -> int:
+    """The number of a new file in ``folder``, which is gone again."""
+    path = folder / "number"
+    path.touch(0o600)
+    try:
+        return path.stat().st_ino
+    finally:
+        path.unlink()
 
 
 def remove_left_overs() -> None:

@@ -25,12 +25,19 @@ def check() -> None:
         typer.echo(f"robot programs: {sandboxes.check('robot')}")
         typer.echo(f"responders: {sandboxes.check('responder')}")
         reason = sandboxes.why_no_bubblewrap()
+        kept = sandboxes.remembers()
     if reason is None:
-        typer.echo("extra: bubblewrap hides the names of files and processes too")
+        typer.echo("extra: bubblewrap gives them name spaces of their own")
     else:
-        typer.echo(f"extra: bubblewrap, which would hide the names of files and processes too, is not used: {reason}")
+        typer.echo(f"extra: bubblewrap, which would give them name spaces of their own, is not used: {reason}")
     reason = control_group.why_not()
     if reason is None:
         typer.echo("extra: a worker started from here has a control group for each grading at a time")
     else:
         typer.echo(f"extra: a worker started from here has no control group for each grading at a time: {reason}")
+    if kept is None:
+        typer.echo("between trials: a trial can leave nothing for the next")
+    else:
+        typer.echo(
+            f"between trials: a trial can leave something for the next, so hidden scenarios are not graded: {kept}"
+        )

@@ -96,6 +96,8 @@ def grade(
     trials = tuple(assignment.trials(secret))
     own_seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
     run: dict[int, TrialResult] = {}
+    if any(trial.scenario.visibility != "visible" for trial in trials):
+        rig.check_forgetting()
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.pulse)
     # In an order of each submission's own: what counts processes or looks at a clock does not tell a trial again.

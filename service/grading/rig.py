@@ -27,6 +27,7 @@ from responders.trial import run_trial
 from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
+from sim.errors import HostError
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording
 
@@ -46,6 +47,7 @@ class Rig:
         remove_left_overs()
         self._slots = slots
         self._sandboxes = Sandboxes(walls, group)
+        self._forgets = walls.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
 
@@ -98,6 +100,12 @@ class Rig:
     def check_walls(self) -> str:
         """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""
         return self._sandboxes.check()
+
+    def check_forgetting(self) -> None:
+        """Hidden trials must leave nothing for later ones. Raises HostError where they could; done once in a while."""
+        reason = self._sandboxes.remembers() if self._forgets else None
+        if reason is not None:
+            raise HostError(f"a trial could leave something for the next, so nothing hidden is graded here: {reason}")
 
     @property
     def children_cpu_seconds(self) -> float:

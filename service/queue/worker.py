@@ -62,7 +62,6 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
     open_home(settings.home)
-    with Sandboxes(NONE if unsafe else FULL) as sandboxes:
     undivided = control_group.divide()
     group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
     with Sandboxes(NONE if unsafe else FULL, group) as sandboxes:

@@ -18,6 +18,8 @@ libc.mmap.restype = ctypes.c_void_p
 
 #: Which wall stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
 LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "either", "newer", "remains", "untried"
+#: What there is nowhere to be found, with or without walls.
+NOWHERE = "nowhere"
 
 #: The numbers of system calls by name, and the canaries; filled before an attack runs.
 numbers: dict[str, int] = {}
@@ -29,6 +31,24 @@ def attack(stopped_by):
 
     def mark(function):
         function.stopped_by = stopped_by
+        return function
+
+    return mark
+
+
+def leaves(stopped_by, at_once=False):
+    """Mark a function as the first half of an attack: ``function(turn, bit)`` leaves a bit for a later child.
+
+    The other half is what ``function.finds`` marks: ``find(turn)``, in another child, while the first one still runs
+    if ``at_once``. What it returns is to be larger, or smaller, whenever the bit is set.
+    """
+
+    def mark(function):
+        def finds(finder):
+            function.find = finder
+            return finder
+
+        function.kept_by, function.at_once, function.finds = stopped_by, at_once, finds
         return function
 
     return mark
@@ -89,6 +109,16 @@ def disarm():
                 if name == "folders":
                     cell.cell_contents = ("/",)
             found.__globals__["_SENTENCES"].clear()
+
+
+def tell(function):
+    """Run one half of an attack and print what it returned, or why it got no further."""
+    say = sys.stdout.write
+    try:
+        said = f"found {int(function() or 0)}"
+    except BaseException as error:
+        said = f"blocked {type(error).__name__}: {error}"
+    say(said)
 
 
 def report(function):

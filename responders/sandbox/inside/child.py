@@ -5,20 +5,22 @@ The role (robot program or responder) takes over once every layer stands.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import resource
 import signal
+import socket
 from collections.abc import Callable
 from typing import Any
 
-from . import lockdown
+from . import doorkeeper, lockdown
 from .frames import Frame, Wire
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
-_WIRE, _FOLDER = 3, 4
+_WIRE, _DOOR = 3, 4
 #: Where the numbers of users begin that exist for one child each; nothing on a machine should belong to them.
 _USERS, _USERS_COUNT = 61_000, 4_000
 #: All that student code finds: libraries loaded late must not start threads either.
@@ -37,11 +39,13 @@ def start(
     grants: lockdown.Grants,
     role: Callable[[Wire, lockdown.Grants], None],
     zygote: int,
+    door: int,
 ) -> None:
     """Never returns. ``descriptors`` are the wire and, if the order has a folder, the folder."""
     try:
         _own_session()
-        _descriptors(descriptors, bool(order["folder"]))
+        _first_to_go()
+        _descriptors([descriptors[0], door, *descriptors[1:]])
         _limits(order)
         wire = Wire(_WIRE)
         wire.send(_walls(order, grants, zygote))
@@ -56,6 +60,16 @@ def _own_session() -> None:
     os.setsid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
+
+
+def _first_to_go() -> None:
+    """When the machine runs out of memory, a child goes before its zygote.
+
+    Files of a process that is not to be read, as the zygote, are root's; so this one is to be, until it is locked.
+    """
+    ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 1, 0, 0, 0)
+    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
+        score.write("1000")
 
 
 def _own_user(order: dict[str, Any], grants: lockdown.Grants) -> bool:
@@ -79,18 +93,16 @@ def _end_with(zygote: int) -> None:
         os._exit(0)
 
 
-def _descriptors(descriptors: list[int], has_folder: bool) -> None:
-    """Nothing stays open but the null device on 0 to 2 and the wire; the folder becomes the working folder."""
+def _descriptors(descriptors: list[int]) -> None:
+    """Nothing stays open but the null device on 0 to 2, the wire and the door; a folder becomes the working folder."""
     high = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
     null = os.open(os.devnull, os.O_RDWR)
     for fd in (0, 1, 2):
         os.dup2(null, fd)
     os.dup2(high[0], _WIRE)
-    if has_folder:
-        os.fchdir(high[1])
-    else:
-        os.chdir("/")
-    os.closerange(_FOLDER, 1 << 16)
+    os.dup2(high[1], _DOOR)
+    os.chdir(high[2] if len(high) > 2 else "/")
+    os.closerange(_DOOR + 1, 1 << 16)
     os.umask(0o077)
 
 
@@ -101,18 +113,22 @@ def _limits(order: dict[str, Any]) -> None:
     memory = mapped + order["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     seconds = int(order["cpu"]) + 2
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    # Counted in ticks, which a program can be charged without computing: dying of it must not look like our doing.
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 60))
     resource.setrlimit(resource.RLIMIT_FSIZE, (order["file_size"], order["file_size"]))
     resource.setrlimit(resource.RLIMIT_NOFILE, (32, 32))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))
     resource.setrlimit(resource.RLIMIT_MSGQUEUE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
 def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame:
     """Put up the layers that the order names, try each, and say what stands; nothing of the student's has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
+    without_doorkeeper: str | None = "it was not asked for"
+    memory = os.open("/proc/self/mem", os.O_RDONLY)
     try:
         own_user = _own_user(order, grants)
         _end_with(zygote)
@@ -121,20 +137,36 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame
         if order["landlock"]:
             landlock = _files(order, grants)
         if order["seccomp"]:
+            without_doorkeeper = _ask_about_paths(memory)
             lockdown.restrict_system_calls()
             _must_fail("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
             _must_fail("seccomp", lambda: os.kill(os.getppid(), 0))
             seccomp = True
     except lockdown.WallMissing as wall:
         missing = str(wall)
+    os.closerange(_DOOR, 1 << 8)
     return {
         "do": "walls",
         "landlock": landlock,
         "seccomp": seccomp,
         "own_user": own_user,
+        "without_doorkeeper": without_doorkeeper,
         "policy": lockdown.POLICY,
         "missing": missing,
     }
+
+
+def _ask_about_paths(memory: int) -> str | None:
+    """Have the doorkeeper decide about every path from now on; why it cannot, or None."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:
+        try:
+            questions = lockdown.ask_about_paths()
+        except lockdown.WallMissing as wall:
+            return str(wall)
+        doorkeeper.make_known(door, questions, memory)
+        os.close(questions)
+    _must_fail("doorkeeper", lambda: os.stat("/etc/passwd"))
+    return None
 
 
 def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:

@@ -18,52 +18,52 @@ from typing import Any
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
+_ENDED = (ctypes.c_char * 152)()  # the status and, from the eighth byte, what was used; zeroes but for a moment
 
 
 def main(role_name: str, folders: str, roots: list[str]) -> None:
     """Serve orders on descriptor 3 until the worker closes it. ``folders`` is where children have theirs."""
-    _first_to_go()
+    _before_the_worker()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, child, determinism, grants, lockdown, refusals, student_code  # noqa: F401
+    from . import battery, child, determinism, doorkeeper, grants, lockdown, refusals, student_code  # noqa: F401
 
+    control = socket.socket(fileno=3)
+    readable = grants.readable(roots)
+    allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
+    door, keeper = doorkeeper.start(allowed, control.fileno())
     if role_name == "robot":
         from . import robot_role as role
     else:
         from . import responder_role as role  # type: ignore[no-redef]
     role.preload()
     plays = {"role": role.run, "battery": battery.run}
-    readable = grants.readable(roots)
-    allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
     zygote = os.getpid()
     _one_thread()
     gc.collect()
     gc.freeze()
-    control = socket.socket(fileno=3)
     inside = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
     _reply(control, {"ready": True}, [inside])
     os.close(inside)
     while True:
         order, descriptors = _receive(control)
         if order is None:
+            door.close()
+            os.waitpid(keeper, 0)
             os._exit(0)
         if order["do"] == "spawn":
             pid = os.fork()
             if pid == 0:
-                child.start(order, descriptors, allowed, plays[order["play"]], zygote)
+                child.start(order, descriptors, allowed, plays[order["play"]], zygote, door.fileno())
             _hand_over(control, pid)
             for fd in descriptors:
                 os.close(fd)
         else:
-            _, status, usage = os.wait4(order["pid"], 0)
-            _reply(
-                control,
-                {"status": status, "cpu": usage.ru_utime + usage.ru_stime, "memory_kb": usage.ru_maxrss},
-            )
+            _reap(control, order["pid"])
 
 
 def _hand_over(control: socket.socket, pid: int) -> None:
@@ -79,10 +79,18 @@ def _hand_over(control: socket.socket, pid: int) -> None:
     os.close(pidfd)
 
 
-def _first_to_go() -> None:
-    """When the machine runs out of memory, a child goes before the worker."""
+def _reap(control: socket.socket, pid: int) -> None:
+    """Hand on how a child ended without looking: what this process has held once, the next child finds in its copy."""
+    if ctypes.CDLL(None).wait4(pid, ctypes.byref(_ENDED), 0, ctypes.byref(_ENDED, 8)) != pid:
+        raise ChildProcessError(f"no child {pid}")
+    control.send(_ENDED)
+    ctypes.memset(_ENDED, 0, ctypes.sizeof(_ENDED))
+
+
+def _before_the_worker() -> None:
+    """When the machine runs out of memory, children go first, then their zygote, and only then the worker."""
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
-        score.write("1000")
+        score.write("700")
 
 
 def _one_thread() -> None:
