@@ -127,6 +127,7 @@ class CriterionResult:
     accuracy: Accuracy | None = None
     sights: tuple[Sight, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
+    unjudged: str = ""  # why it could not be judged, for staff; empty if it was
 
 
 @dataclass(frozen=True, slots=True)

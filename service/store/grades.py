@@ -139,6 +139,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         counts=accuracy and to_plain(accuracy.counts),
         confidence=accuracy and to_plain(accuracy.confidence),
         curves=to_plain(result.curves),
+        unjudged=result.unjudged or None,
         sights=sights,
     )
 
@@ -189,6 +190,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         accuracy=_accuracy(row),
         sights=tuple(_sight(plain, trials) for plain in row.sights),
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
+        unjudged=row.unjudged or "",
     )
 
 
