@@ -15,7 +15,7 @@ _PACKAGES = Path(__file__).parent.parent
 #: What the marks follow from; an assignment has a hash of its own.
 _DECIDING = ("sim", "models", "responders", "submissions", "service/grading")
 _NOT_DECIDING = {"__pycache__", "catalogue", "examples"}
-_DISTRIBUTIONS = ("pybullet", "numpy", "scikit-learn", "joblib", "pandas", "pillow")
+_DISTRIBUTIONS = ("pybullet", "numpy", "scikit-learn", "joblib", "pandas", "pillow", "google-re2")
 
 
 @cache

@@ -146,7 +146,7 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
     labels = [step.label for step in told.steps if isinstance(step, Step)]
     assert "PY::0" in labels
     assert "saw 30" in labels
-    gaps = [step.exchanges for step in told.steps if isinstance(step, Gap)]
+    gaps = [step.count for step in told.steps if isinstance(step, Gap)]
     assert sum(gaps) == 34
     trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
     assert any("6 of 40 exchanges" in text for text in _texts(draw_conversation(trial, "t")))

@@ -91,6 +91,7 @@ def remarks(line: JobLine) -> list[str]:
         f"same as {line.copied_from}": line.copied_from is not None,
         f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
+        f"{line.unjudged} criteria not judged": line.unjudged > 0,
         "suspect": line.suspect is not None,
         "published": line.published_at is not None,
     }

@@ -141,6 +141,7 @@ class CriterionResult:
     sights: tuple[Sight, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
     shown: Shown | None = None  # None where every trial is visible
+    unjudged: str = ""  # why it could not be judged, for staff; empty if it was
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from responders.conversation import Code, ResponderOrder
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at, reads_program
-from service.grading.grade import Grade, TrialResult
-from service.grading.judging.judge import judge
+from service.grading.grade import CriterionResult, Grade, TrialResult
+from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
 from service.grading.rig import Rig
 from service.grading.training import with_models_answers
@@ -122,17 +122,18 @@ def grade(
             results, assignment, assignment.training, parts.responder, parts.files, own_seed, rig, meter
         )
     findings = look_at(_handed_in(submission, parts, own_seed), assignment, results, rig, meter)
+    criteria = judge_within(bounds_for(results), assignment, tuple(results), findings, meter.pulse)
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
         assignment_version=assignment.version,
         submission=submission.sha256,
         student=submission.student,
-        criteria=judge(assignment, tuple(results), findings),
+        criteria=criteria,
         trials=tuple(results),
         walls=results[0].recording.walls if results else findings.walls or "no student code was run",
         grader_version=GRADER_VERSION,
-        notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results)),
+        notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results), *_unjudged_notes(criteria)),
         secret_sha256=secret.sha256,
     )
 
@@ -144,6 +145,11 @@ def _cell_notes(parts: _Parts, results: Sequence[TrialResult]) -> tuple[str, ...
     """
     visible = (result.recording.notes for result in results if result.visibility == "visible")
     return next(visible, ()) if parts.notebook is not None else ()
+
+
+def _unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
+    count = sum(bool(result.unjudged) for result in criteria)
+    return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()
 
 
 def _handed_in(submission: Submission, parts: _Parts, own_seed: int) -> HandedIn:

@@ -62,7 +62,8 @@ def ask(rig: Rig) -> Known | None:
     """What this process finds; None when a limit of the machine cut it. Raises HostError when it cannot grade."""
     submission, assignment = _question()
     graded = grade(submission, assignment, rig=rig)
-    return None if any(trial.verdict in _CUT for trial in graded.trials) else found(graded)
+    cut = any(trial.verdict in _CUT for trial in graded.trials) or any(result.unjudged for result in graded.criteria)
+    return None if cut else found(graded)
 
 
 def found(graded: Grade) -> Known:

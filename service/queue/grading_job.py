@@ -89,6 +89,9 @@ def _grade(store: Store, settings: Settings, rig: Rig, claim: jobs.Claim) -> Non
         hand_in = intake.load_hand_in(session, claim.job_id)
     graded = grade(hand_in.submission, hand_in.assignment, secret=secret_of(store), observe=watch, rig=rig)
     graded_at = watch.now()
+    for result in graded.criteria:
+        if result.unjudged:
+            _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
         faults = broken.recording.faults

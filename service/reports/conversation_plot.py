@@ -97,8 +97,8 @@ def _lanes(told: Conversation) -> Mapping[str, float]:
 
 def _row(step: Step | Gap, lanes: Mapping[str, float]) -> _Row:
     if isinstance(step, Gap):
-        plural = "exchange is" if step.exchanges == 1 else "exchanges are"
-        return _Row(step, (f"{step.exchanges} more {plural} not shown",), 0.34)
+        plural = f"{step.what} is" if step.count == 1 else f"{step.what}s are"
+        return _Row(step, (f"{step.count} more {plural} not shown",), 0.34)
     width = max(_NARROWEST, abs(lanes[step.source] - lanes[step.target]) - 0.06)
     label = f"{step.note}: {step.label}" if step.note and step.kind != "lost" else step.label
     lines = tuple(textwrap.wrap(label, int(width * _CHARACTERS), max_lines=2, placeholder="…"))

@@ -36,14 +36,21 @@ class Misread:
 
 
 def misread(sights: Sequence[Sight]) -> tuple[Misread, ...]:
-    """Every picture that was answered, and wrongly, in the order in which they were sent."""
-    right = [sight for sight in sights if is_right(sight)]
-    greys = [(sight, _greys(sight)) for sight in right]
-    return tuple(
-        Misread(number, sight, _nearest(sight, sight.truth, greys), _nearest(sight, sight.answer, greys))
+    """Every picture that was answered, and wrongly, in the order in which they were sent.
+
+    The nearest ones are looked for only for the pictures that are drawn.
+    """
+    wrong = [
+        (number, sight)
         for number, sight in enumerate(sights, start=1)
         if sight.answer is not None and not is_right(sight)
+    ]
+    greys = [(sight, _greys(sight)) for sight in sights if is_right(sight)] if wrong else []
+    drawn = (
+        Misread(number, sight, _nearest(sight, sight.truth, greys), _nearest(sight, sight.answer, greys))
+        for number, sight in wrong[:MOST_MISREAD]
     )
+    return (*drawn, *(Misread(number, sight, None, None) for number, sight in wrong[MOST_MISREAD:]))
 
 
 def draw_misread(found: Sequence[Misread], pictures: int, title: str) -> Figure:

@@ -17,6 +17,8 @@ from sim.recording import Call, Message, Recording
 PARTIES = ("robot", "responder", "parser", "agent", "logger", "network")
 MOST_EXCHANGES = 6
 MOST_STEPS = 40
+#: Of one message, however often it makes the responder call.
+MOST_CALL_STEPS = 60
 _KNOWN: Mapping[str, str] = MappingProxyType({party: party for party in PARTIES})
 
 Kind = Literal["message", "call", "return", "lost", "silence"]
@@ -36,9 +38,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Exchanges that are left out here."""
+    """So many exchanges, or steps inside an exchange, are left out here."""
 
-    exchanges: int
+    count: int
+    what: Literal["exchange", "step"] = "exchange"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +131,16 @@ def _begin(recording: Recording, exchange: _Exchange) -> float:
     return recording.messages[exchange.answers[0] if exchange.sent is None else exchange.sent].t
 
 
-def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, list[Step]]]:
+def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
     """Groups of steps with the time at which each group is told."""
     if exchange.sent is not None:
         message = recording.messages[exchange.sent]
-        steps = [_crossing(message)]
+        steps: list[Step | Gap] = [_crossing(message)]
         if message.delivered is not None:
-            steps += _calls(call for call in recording.calls if call.message == exchange.sent)
+            made = list(_calls(call for call in recording.calls if call.message == exchange.sent))
+            steps += made[:MOST_CALL_STEPS]
+            if len(made) > MOST_CALL_STEPS:
+                steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
             if not exchange.answers:
                 steps.append(Step("silence", "responder", "robot", "– no answer –"))
         yield message.t, steps

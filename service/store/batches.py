@@ -49,6 +49,7 @@ class JobLine:
     copied_from: str | None  # the identical grade that was run
     suspect: str | None  # why the grade is not to be trusted
     staff_only: str | None  # the limit that the hand-in was over
+    unjudged: int  # criteria that could not be judged
     days_late: int
     published_at: datetime | None
 
@@ -154,13 +155,16 @@ def _find(session: Session, query: Select[str], start: str, what: str) -> str:
     return found[0]
 
 
-def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, str | None, int]:
+def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None]:
     accuracy = (
         select(CriterionRow.accuracy)
         .where(CriterionRow.job_id == Job.id, CriterionRow.accuracy.is_not(None))
         .order_by(CriterionRow.position)
         .limit(1)
         .scalar_subquery()
+    )
+    unjudged = (
+        select(func.count()).where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None)).scalar_subquery()
     )
     return (
         select(
@@ -172,6 +176,7 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, 
             accuracy,
             models.Submission.staff_only,
             models.Submission.days_late,
+            unjudged,
         )
         .join(models.Submission, Job.submission_id == models.Submission.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -179,8 +184,8 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, 
     )
 
 
-def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int]) -> JobLine:
-    job, student, source, version, attempt, accuracy, staff_only, days_late = row
+def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None]) -> JobLine:
+    job, student, source, version, attempt, accuracy, staff_only, days_late, unjudged = row
     return JobLine(
         id=job.id,
         student=student,
@@ -202,6 +207,7 @@ def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | No
         copied_from=job.copied_from,
         suspect=job.suspect,
         staff_only=staff_only,
+        unjudged=unjudged or 0,
         days_late=days_late,
         published_at=job.published_at,
     )

@@ -47,12 +47,13 @@ def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: 
 def find(session: Session, key: str) -> str | None:
     """The newest grade that may be copied for this key; None where it has to be run.
 
-    Never one without walls, of a worker in quarantine, or cut by a limit of the machine.
+    Never one without walls, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
     """
     distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
     cut = exists().where(
         TrialRow.job_id == Job.id, TrialRow.verdict.in_([verdict.value for verdict in _NOT_REPEATABLE])
     )
+    unjudged = exists().where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None))
     query = (
         select(Job.id)
         .where(
@@ -65,6 +66,7 @@ def find(session: Session, key: str) -> str | None:
             Job.walls.contains("seccomp"),
             ~distrusted,
             ~cut,
+            ~unjudged,
         )
         .order_by(Job.finished_at.desc(), Job.id)
         .limit(1)

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from service.store import phases, presence
 from service.store.engine import now
-from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, Lane, PlotState, Worker
+from service.store.models import UNFINISHED, Batch, BatchState, CriterionRow, Job, JobState, Lane, PlotState, Worker
 from service.store.turns import claimable
 
 #: Times are told of the jobs that ended in this time, the newest of them.
@@ -32,6 +32,7 @@ class Figures:
     oldest_seconds: Mapping[Lane, float]  # how long the oldest job that could be claimed has waited
     verdicts: Mapping[str, int]
     host_faults: int  # attempts that ended through no fault of the student's
+    unjudged: int  # criteria that could not be judged
     plots: Mapping[PlotState, int]
     paused_batches: int
     workers: Sequence[presence.Seen]
@@ -53,6 +54,7 @@ def look(session: Session) -> Figures:
     plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
     paused = select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED)
     quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
+    unjudged = select(func.count()).select_from(CriterionRow).where(CriterionRow.unjudged.is_not(None))
     seen = presence.workers(session)
     return Figures(
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
@@ -60,6 +62,7 @@ def look(session: Session) -> Figures:
         oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
         verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
         host_faults=session.scalar(faults) or 0,
+        unjudged=session.scalar(unjudged) or 0,
         plots=dict(session.execute(plots).all()),
         paused_batches=session.scalar(paused) or 0,
         workers=seen,

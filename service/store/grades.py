@@ -143,6 +143,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         counts=accuracy and to_plain(accuracy.counts),
         confidence=accuracy and to_plain(accuracy.confidence),
         curves=to_plain(result.curves),
+        unjudged=result.unjudged or None,
         sights=sights,
         shown=result.shown and to_plain(result.shown),
     )
@@ -196,6 +197,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         sights=tuple(_sight(plain, trials) for plain in row.sights),
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
         shown=None if row.shown is None else from_plain(Shown, row.shown),
+        unjudged=row.unjudged or "",
     )
 
 

@@ -303,6 +303,7 @@ class CriterionRow(Base):
     counts: Mapped[Any | None]  # {"sent": 6, "answered": 5, "late": 0, "malformed": 0, "unanswered": 1, ...}
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
     curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
+    unjudged: Mapped[str | None]  # why it could not be judged; staff have to look
     sights: Mapped[Any]
     shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} as of the visible trials alone
 

@@ -82,6 +82,9 @@ def _endings(figures: Figures) -> Iterator[Metric]:
     yield CounterMetricFamily(
         "robomark_host_faults", "Attempts that failed through no fault of the student's.", figures.host_faults
     )
+    yield CounterMetricFamily(
+        "robomark_criteria_unjudged", "Criteria that could not be judged within their bounds.", figures.unjudged
+    )
 
 
 def _workers(figures: Figures) -> Iterator[Metric]:

@@ -129,22 +129,32 @@ def judge(
     what was reached. Raises HostError for a trial that this machine spoilt, because such a trial must be run
     again, not marked.
     """
-    if any(trial.verdict is Verdict.HOST_ERROR for trial in trials):
-        raise HostError("A trial that failed on this machine cannot be marked; it has to be run again.")
+    refuse_spoilt(trials)
     results: dict[str, CriterionResult] = {}
-    # Ranks are given for figures that other criteria measure.
-    for criterion in sorted(assignment.criteria, key=lambda each: isinstance(each, Ranking)):
-        results[criterion.id] = _judge_one(criterion, assignment, trials, findings, results)
+    for criterion in in_turn(assignment):
+        results[criterion.id] = judge_one(criterion, assignment, trials, findings, results)
     return tuple(results[criterion.id] for criterion in assignment.criteria)
 
 
-def _judge_one(
+def refuse_spoilt(trials: SequenceOf[TrialResult]) -> None:
+    """Raises HostError for a trial that this machine spoilt."""
+    if any(trial.verdict is Verdict.HOST_ERROR for trial in trials):
+        raise HostError("A trial that failed on this machine cannot be marked; it has to be run again.")
+
+
+def in_turn(assignment: Assignment) -> list[Criterion]:
+    """The criteria as they are judged: ranks, which are given for figures that others measure, come last."""
+    return sorted(assignment.criteria, key=lambda each: isinstance(each, Ranking))
+
+
+def judge_one(
     criterion: Criterion,
     assignment: Assignment,
     trials: SequenceOf[TrialResult],
     findings: Findings,
     results: Mapping[str, CriterionResult],
 ) -> CriterionResult:
+    """The result of one criterion; ``results`` are those of the criteria before it in turn, by id."""
     if isinstance(criterion, SourceRules | Functions):
         return _judged_once(criterion, findings)
     own = [

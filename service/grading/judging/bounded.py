@@ -1,0 +1,314 @@
+"""Judging within bounds: little is judged at once, all else in a process that is killed at its limits.
+
+What is judged, and how, is ``judge.py``'s. A criterion that cannot be judged within its bounds spoils no other.
+"""
+
+from __future__ import annotations
+
+import gc
+import io
+import os
+import pickle
+import resource
+import select
+import signal
+import struct
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, NoReturn
+
+from service.grading.findings import Findings
+from service.grading.grade import CriterionResult, TrialResult
+from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
+from sim.errors import HostError
+from sim.recording import Image
+from submissions.assignment import Assignment
+from submissions.criteria import Criterion, Ranking
+
+#: Characters that programs and responders wrote in all trials; to fork a worker costs as much as judging so many.
+_LITTLE = 100_000
+_A_TEXT = 20  # characters that a text counts for, beside its own
+_PULSE_MILLISECONDS = 200
+_LONGEST_CAUSE = 300
+_FRAME = struct.Struct("<Q")
+_IMAGE = "IMG_DATA::"
+#: The child ends by its bounds, or with its parent: what stops a service must not make it look unable to judge.
+_NOT_FOR_IT = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_ITS_BOUNDS = (signal.SIGPROF, signal.SIGALRM)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What judging may take: seconds of computing, seconds in all, bytes beyond what is mapped."""
+
+    cpu_seconds: float
+    seconds: float
+    memory_bytes: int
+
+
+#: Of all criteria, where there is little to judge.
+_GUARD = Bounds(2.0, 10.0, 256 << 20)
+
+
+def bounds_for(trials: Sequence[TrialResult]) -> Bounds:
+    """For each criterion; ten times and more what the slowest takes for the longest texts and runs."""
+    ticks = sum(len(trial.recording.ticks) for trial in trials)
+    cpu_seconds = 10 + len(trials) + ticks / 5000
+    return Bounds(cpu_seconds, 6 * cpu_seconds, 512 << 20)
+
+
+def judge_within(
+    bounds: Bounds,
+    assignment: Assignment,
+    trials: tuple[TrialResult, ...],
+    findings: Findings,
+    pulse: Callable[[], None] = lambda: None,
+) -> tuple[CriterionResult, ...]:
+    """As ``judge``; of a criterion that could not be judged its result tells so, and why.
+
+    Raises HostError as ``judge`` does, or when no process can be started, and whatever ``pulse`` raises.
+    """
+    refuse_spoilt(trials)
+    left = in_turn(assignment)
+    results: dict[str, CriterionResult] = {}
+    if _written(trials) <= _LITTLE and threading.current_thread() is threading.main_thread():
+        # Whatever is wrong here is found out in a process.
+        with suppress(Exception, _Late), _guarded():
+            while left:
+                results[left[0].id] = judge_one(left[0], assignment, trials, findings, results)
+                del left[0]
+    killed_at = ""
+    while left:
+        judging = _Judging(bounds, assignment, trials, findings, results)
+        frames, status = _in_a_process(lambda: judging.frames(left), pulse)  # noqa: B023 - called at once
+        for frame, criterion in zip(frames, left, strict=False):
+            results[criterion.id] = _result(criterion, frame, trials)
+        del left[: len(frames)]
+        if not left:
+            break
+        # Killed by somebody else, as when the machine's memory runs out: once that may be no fault of the criterion's.
+        if _ended_by(status) == signal.SIGKILL and killed_at != left[0].id:
+            killed_at = left[0].id
+            continue
+        criterion = left.pop(0)
+        results[criterion.id] = _unjudged(criterion, _cause(status, bounds))
+    return tuple(results[criterion.id] for criterion in assignment.criteria)
+
+
+class _Late(BaseException):
+    """What is little takes too long; no judge must catch this."""
+
+
+@contextmanager
+def _guarded() -> Iterator[None]:
+    """For a moment only, with little more memory; raises _Late, or MemoryError, in what takes more."""
+
+    def late(*_: object) -> NoReturn:
+        raise _Late
+
+    before = {number: signal.signal(number, late) or signal.SIG_DFL for number in _ITS_BOUNDS}
+    memory = _limit_memory(_GUARD.memory_bytes)
+    _set_timers(_GUARD.cpu_seconds, _GUARD.seconds)
+    try:
+        try:
+            yield
+        finally:
+            _set_timers(0, 0)
+    finally:
+        # Again, should a timer have run out on the way here.
+        _set_timers(0, 0)
+        resource.setrlimit(resource.RLIMIT_AS, memory)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _written(trials: Sequence[TrialResult]) -> int:
+    """How much there is to read that student code wrote; what an image is sent as is not its own."""
+    recordings = [trial.recording for trial in trials]
+    lines = (line.text for recording in recordings for line in (*recording.printed, *recording.spoken))
+    messages = (message.text for recording in recordings for message in recording.messages)
+    texts = (*lines, *(text for text in messages if not text.startswith(_IMAGE)))
+    return sum(map(len, texts)) + _A_TEXT * len(texts)
+
+
+@dataclass(frozen=True, slots=True)
+class _Judging:
+    """What the process knows, from before it was forked."""
+
+    bounds: Bounds
+    assignment: Assignment
+    trials: tuple[TrialResult, ...]
+    findings: Findings
+    results: dict[str, CriterionResult]
+
+    def frames(self, criteria: Sequence[Criterion]) -> Iterator[bytes]:
+        """A result, or the reason why there is none, for each of the criteria."""
+        _confine(self.bounds)
+        for criterion in criteria:
+            _set_timers(self.bounds.cpu_seconds, self.bounds.seconds)
+            try:
+                yield _pickled(self._judged(criterion), self.trials)
+            except MemoryError:
+                yield _pickled(f"it took more than {self.bounds.memory_bytes >> 20} MB of memory", ())
+            except Exception as error:
+                yield _pickled(f"{type(error).__name__}: {error}"[:_LONGEST_CAUSE], ())
+
+    def _judged(self, criterion: Criterion) -> CriterionResult | str:
+        of = self.results.get(criterion.of) if isinstance(criterion, Ranking) else None
+        if of is not None and of.unjudged:
+            return f"{of.id}, which it ranks, could not be judged"
+        result = judge_one(criterion, self.assignment, self.trials, self.findings, self.results)
+        self.results[criterion.id] = result
+        return result
+
+
+def _confine(bounds: Bounds) -> None:
+    # Nothing of the parent's may be finalised here: a database would be told that its connection has ended.
+    gc.disable()
+    for number in _NOT_FOR_IT:
+        signal.signal(number, signal.SIG_IGN)
+    for number in _ITS_BOUNDS:
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ITS_BOUNDS)
+    _limit_memory(bounds.memory_bytes)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _set_timers(cpu_seconds: float, seconds: float) -> None:
+    signal.setitimer(signal.ITIMER_PROF, cpu_seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def _limit_memory(more: int) -> tuple[int, int]:
+    """Let this process map so many bytes more than it has; the limits before."""
+    mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    most = before[1]
+    allowed = mapped + more if most == resource.RLIM_INFINITY else min(mapped + more, most)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, most))
+    return before
+
+
+def _in_a_process(work: Callable[[], Iterator[bytes]], pulse: Callable[[], None]) -> tuple[list[bytes], int]:
+    """What ``work`` yielded in a forked process until that ended, and its wait status."""
+    reader, writer = os.pipe()
+    try:
+        pid = os.fork()
+    except OSError as error:
+        os.close(reader)
+        os.close(writer)
+        raise HostError(f"This machine cannot start a process to judge in: {error.strerror}.") from None
+    if pid == 0:
+        _work_and_leave(work, writer)
+    os.close(writer)
+    status = None
+    try:
+        told = b"".join(_read(reader, pulse))
+        _, status = os.waitpid(pid, 0)
+    finally:
+        os.close(reader)
+        if status is None:
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+    return list(_frames(told)), status
+
+
+def _work_and_leave(work: Callable[[], Iterator[bytes]], writer: int) -> NoReturn:
+    try:
+        with os.fdopen(writer, "wb") as out, suppress(BrokenPipeError):
+            for frame in work():
+                out.write(_FRAME.pack(len(frame)))
+                out.write(frame)
+                out.flush()
+    finally:
+        # Whatever the parent has to do at its end is not this process's.
+        os._exit(0)
+
+
+def _read(reader: int, pulse: Callable[[], None]) -> Iterator[bytes]:
+    poll = select.poll()
+    poll.register(reader, select.POLLIN)
+    while True:
+        if poll.poll(_PULSE_MILLISECONDS):
+            data = os.read(reader, 1 << 20)
+            if not data:
+                return
+            yield data
+        pulse()
+
+
+def _frames(told: bytes) -> Iterator[bytes]:
+    """The whole frames; one that was being written when the process ended is none."""
+    place = 0
+    while place + _FRAME.size <= len(told):
+        begin = place + _FRAME.size
+        place = begin + _FRAME.unpack_from(told, place)[0]
+        if place <= len(told):
+            yield told[begin:place]
+
+
+class _Pickler(pickle.Pickler):
+    """Names the pictures of the recordings by where they are: they are many, and both sides have them."""
+
+    def __init__(self, file: io.BytesIO, places: Mapping[int, tuple[int, int]]) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._places = places
+
+    def persistent_id(self, value: Any) -> tuple[int, int] | None:
+        return self._places.get(id(value)) if isinstance(value, Image) else None
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, trials: Sequence[TrialResult]) -> None:
+        super().__init__(file)
+        self._trials = trials
+
+    def persistent_load(self, place: tuple[int, int]) -> Image:
+        trial, number = place
+        return self._trials[trial].recording.images[number]
+
+
+def _pickled(told: CriterionResult | str, trials: Sequence[TrialResult]) -> bytes:
+    places = {
+        id(image): (trial, number)
+        for trial, result in enumerate(trials)
+        for number, image in enumerate(result.recording.images)
+    }
+    file = io.BytesIO()
+    _Pickler(file, places).dump(told)
+    return file.getvalue()
+
+
+def _result(criterion: Criterion, frame: bytes, trials: Sequence[TrialResult]) -> CriterionResult:
+    told: CriterionResult | str = _Unpickler(io.BytesIO(frame), trials).load()
+    return _unjudged(criterion, told) if isinstance(told, str) else told
+
+
+def _unjudged(criterion: Criterion, cause: str) -> CriterionResult:
+    return CriterionResult(
+        id=criterion.id,
+        title=criterion.title,
+        marks=Decimal(0),
+        max_marks=criterion.marks,
+        message="This could not be judged within the limits that judging has; staff will look at it.",
+        visibility=criterion.visibility,
+        unjudged=cause,
+    )
+
+
+def _ended_by(status: int) -> int:
+    """The number of the signal, 0 if it was none."""
+    return os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+
+
+def _cause(status: int, bounds: Bounds) -> str:
+    ended_by = _ended_by(status)
+    if ended_by == signal.SIGPROF:
+        return f"it took more than {bounds.cpu_seconds:.0f} s of computing"
+    if ended_by == signal.SIGALRM:
+        return f"it took more than {bounds.seconds:.0f} s"
+    return f"its process was ended by signal {ended_by}" if ended_by else "its process ended before it was judged"
