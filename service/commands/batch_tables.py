@@ -92,6 +92,7 @@ def remarks(line: JobLine) -> list[str]:
         f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
+        f"{line.surprises} trials that the log explains": line.surprises > 0,
         "suspect": line.suspect is not None,
         "published": line.published_at is not None,
     }

@@ -21,6 +21,7 @@ from service.store.models import (
     JobState,
     PlotState,
     Standing,
+    TrialRow,
 )
 from sim.errors import UsageError
 
@@ -50,6 +51,7 @@ class JobLine:
     suspect: str | None  # why the grade is not to be trusted
     staff_only: str | None  # the limit that the hand-in was over
     unjudged: int  # criteria that could not be judged
+    surprises: int  # trials in which our own code stumbled over what a child sent
     days_late: int
     published_at: datetime | None
 
@@ -155,7 +157,9 @@ def _find(session: Session, query: Select[str], start: str, what: str) -> str:
     return found[0]
 
 
-def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None]:
+def _job_lines() -> Select[
+    Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
+]:
     accuracy = (
         select(CriterionRow.accuracy)
         .where(CriterionRow.job_id == Job.id, CriterionRow.accuracy.is_not(None))
@@ -166,6 +170,7 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, 
     unjudged = (
         select(func.count()).where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None)).scalar_subquery()
     )
+    surprises = select(func.count()).where(TrialRow.job_id == Job.id, TrialRow.surprise.is_not(None)).scalar_subquery()
     return (
         select(
             Job,
@@ -177,6 +182,7 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, 
             models.Submission.staff_only,
             models.Submission.days_late,
             unjudged,
+            surprises,
         )
         .join(models.Submission, Job.submission_id == models.Submission.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -184,8 +190,10 @@ def _job_lines() -> Select[Job, str, str, AssignmentVersion, int, float | None, 
     )
 
 
-def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None]) -> JobLine:
-    job, student, source, version, attempt, accuracy, staff_only, days_late, unjudged = row
+def _line(
+    row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None],
+) -> JobLine:
+    job, student, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
     return JobLine(
         id=job.id,
         student=student,
@@ -208,6 +216,7 @@ def _line(row: Row[Job, str, str, AssignmentVersion, int, float | None, str | No
         suspect=job.suspect,
         staff_only=staff_only,
         unjudged=unjudged or 0,
+        surprises=surprises or 0,
         days_late=days_late,
         published_at=job.published_at,
     )

@@ -14,7 +14,18 @@ from sqlalchemy.orm import Session
 
 from service.store import phases, presence
 from service.store.engine import now
-from service.store.models import UNFINISHED, Batch, BatchState, CriterionRow, Job, JobState, Lane, PlotState, Worker
+from service.store.models import (
+    UNFINISHED,
+    Batch,
+    BatchState,
+    CriterionRow,
+    Job,
+    JobState,
+    Lane,
+    PlotState,
+    TrialRow,
+    Worker,
+)
 from service.store.turns import claimable
 
 #: Times are told of the jobs that ended in this time, the newest of them.
@@ -33,6 +44,7 @@ class Figures:
     verdicts: Mapping[str, int]
     host_faults: int  # attempts that ended through no fault of the student's
     unjudged: int  # criteria that could not be judged
+    surprises: int  # trials in which our own code stumbled over what a child sent
     plots: Mapping[PlotState, int]
     paused_batches: int
     workers: Sequence[presence.Seen]
@@ -55,6 +67,7 @@ def look(session: Session) -> Figures:
     paused = select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED)
     quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
     unjudged = select(func.count()).select_from(CriterionRow).where(CriterionRow.unjudged.is_not(None))
+    surprises = select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None))
     seen = presence.workers(session)
     return Figures(
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
@@ -63,6 +76,7 @@ def look(session: Session) -> Figures:
         verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
         host_faults=session.scalar(faults) or 0,
         unjudged=session.scalar(unjudged) or 0,
+        surprises=session.scalar(surprises) or 0,
         plots=dict(session.execute(plots).all()),
         paused_batches=session.scalar(paused) or 0,
         workers=seen,

@@ -119,6 +119,7 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         end_t=trial.recording.end_t,
         place=trial.place,
         sweep=to_plain(trial.sweep),
+        surprise=next((fault.staff for fault in trial.recording.faults if fault.staff), None),
     )
 
 

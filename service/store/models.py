@@ -276,6 +276,7 @@ class TrialRow(Base):
     end_t: Mapped[float]
     place: Mapped[int] = mapped_column(default=0)  # which of the scenario's poses
     sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: what is swept, and its level here
+    surprise: Mapped[str | None]  # what our own code stumbled over, if it did
 
 
 class CriterionRow(Base):

@@ -85,6 +85,9 @@ def _endings(figures: Figures) -> Iterator[Metric]:
     yield CounterMetricFamily(
         "robomark_criteria_unjudged", "Criteria that could not be judged within their bounds.", figures.unjudged
     )
+    yield CounterMetricFamily(
+        "robomark_surprises", "Trials in which our own code stumbled over what a child sent.", figures.surprises
+    )
 
 
 def _workers(figures: Figures) -> Iterator[Metric]:

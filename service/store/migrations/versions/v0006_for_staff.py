@@ -1,4 +1,4 @@
-"""Why a criterion could not be judged, for staff."""
+"""For staff: why a criterion could not be judged, and what our own code stumbled over in a trial."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ depends_on = None
 
 def upgrade() -> None:
     op.add_column("criterion_result", sa.Column("unjudged", SafeText(), nullable=True))
+    op.add_column("trial", sa.Column("surprise", SafeText(), nullable=True))
 
 
 downgrade = refuse_downgrade
