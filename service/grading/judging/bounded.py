@@ -85,8 +85,9 @@ def judge_within(
     while left:
         judging = _Judging(bounds, assignment, trials, findings, results)
         frames, status = _in_a_process(lambda: judging.frames(left), pulse)  # noqa: B023 - called at once
-        for frame, criterion in zip(frames, left, strict=False):
-            results[criterion.id] = _result(criterion, frame, trials)
+        for frame in frames:
+            result: CriterionResult = _Unpickler(io.BytesIO(frame), trials).load()
+            results[result.id] = result
         del left[: len(frames)]
         if not left:
             break
@@ -146,24 +147,23 @@ class _Judging:
     results: dict[str, CriterionResult]
 
     def frames(self, criteria: Sequence[Criterion]) -> Iterator[bytes]:
-        """A result, or the reason why there is none, for each of the criteria."""
+        """The result of each of the criteria."""
         _confine(self.bounds)
         for criterion in criteria:
             _set_timers(self.bounds.cpu_seconds, self.bounds.seconds)
-            try:
-                yield _pickled(self._judged(criterion), self.trials)
-            except MemoryError:
-                yield _pickled(f"it took more than {self.bounds.memory_bytes >> 20} MB of memory", ())
-            except Exception as error:
-                yield _pickled(f"{type(error).__name__}: {error}"[:_LONGEST_CAUSE], ())
+            result = self.results[criterion.id] = self._judged(criterion)
+            yield _pickled(result, self.trials)
 
-    def _judged(self, criterion: Criterion) -> CriterionResult | str:
+    def _judged(self, criterion: Criterion) -> CriterionResult:
         of = self.results.get(criterion.of) if isinstance(criterion, Ranking) else None
         if of is not None and of.unjudged:
-            return f"{of.id}, which it ranks, could not be judged"
-        result = judge_one(criterion, self.assignment, self.trials, self.findings, self.results)
-        self.results[criterion.id] = result
-        return result
+            return _unjudged(criterion, f"{of.id}, which it ranks, could not be judged")
+        try:
+            return judge_one(criterion, self.assignment, self.trials, self.findings, self.results)
+        except MemoryError:
+            return _unjudged(criterion, f"it took more than {self.bounds.memory_bytes >> 20} MB of memory")
+        except Exception as error:
+            return _unjudged(criterion, f"{type(error).__name__}: {error}"[:_LONGEST_CAUSE])
 
 
 def _confine(bounds: Bounds) -> None:
@@ -272,20 +272,15 @@ class _Unpickler(pickle.Unpickler):
         return self._trials[trial].recording.images[number]
 
 
-def _pickled(told: CriterionResult | str, trials: Sequence[TrialResult]) -> bytes:
+def _pickled(result: CriterionResult, trials: Sequence[TrialResult]) -> bytes:
     places = {
         id(image): (trial, number)
-        for trial, result in enumerate(trials)
-        for number, image in enumerate(result.recording.images)
+        for trial, run in enumerate(trials)
+        for number, image in enumerate(run.recording.images)
     }
     file = io.BytesIO()
-    _Pickler(file, places).dump(told)
+    _Pickler(file, places).dump(result)
     return file.getvalue()
-
-
-def _result(criterion: Criterion, frame: bytes, trials: Sequence[TrialResult]) -> CriterionResult:
-    told: CriterionResult | str = _Unpickler(io.BytesIO(frame), trials).load()
-    return _unjudged(criterion, told) if isinstance(told, str) else told
 
 
 def _unjudged(criterion: Criterion, cause: str) -> CriterionResult:

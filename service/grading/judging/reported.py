@@ -117,7 +117,7 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
         if token.value is not None and not any(_is_near(token.value, number, criterion.tolerance) for number in numbers)
     ]
     if criterion.only and others:
-        return f"it reported {others[0].word} as well"
+        return f"it reported {quoted(others[0].word)[1:-1]} as well"
     return ""
 
 
