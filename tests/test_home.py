@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 
 from builders import settings_in
 from command import COMMAND
@@ -98,6 +99,18 @@ def test_what_a_user_asked_for_elsewhere_goes_by_the_users_umask(tmp_path: Path,
     assert _robomark(tmp_path / "home", umask, "assignments", "new", made).returncode == 0
     assert {_mode(path) for path in (trace, made / "assignment.toml")} == {0o666 & ~umask}
     assert _mode(made) == 0o777 & ~umask
+
+
+def test_a_database_is_private_whoever_opens_it_first(tmp_path: Path) -> None:
+    """And so are its log and its shared memory, which lie beside it while it is open."""
+    before = os.umask(0)
+    try:
+        with open_store(settings_in(tmp_path / "home")) as store, store.transaction() as session:
+            session.execute(text("SELECT 1"))
+            assert len(list((tmp_path / "home").iterdir())) == 3
+            assert _open(tmp_path / "home") == []
+    finally:
+        os.umask(before)
 
 
 @AS_ROOT

@@ -5,9 +5,10 @@ Knows neither tables nor what is done in a transaction.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -108,9 +109,14 @@ def open_store(settings: Settings) -> Store:
     from service.store.migrate import upgrade
 
     parsed = make_url(settings.database)
-    if parsed.get_backend_name() == "sqlite" and settings.home in Path(str(parsed.database)).absolute().parents:
+    file = Path(str(parsed.database)).absolute() if parsed.get_backend_name() == "sqlite" else None
+    if file is not None and settings.home in file.parents:
         open_home(settings.home)
     engine = open_engine(settings.database)
+    if file is not None:
+        # Ours alone before anything is in it; SQLite gives what it lays beside it the same mode.
+        with suppress(OSError):
+            os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
         upgrade(engine)
     except OperationalError as error:
