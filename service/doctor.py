@@ -109,7 +109,8 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
             lately = [seen.worker for seen in presence.workers(session) if seen.lately]
     if not lately:
         return True, told
-    return True, f"{told}; {sum('control group' in each.walls for each in lately)} of {len(lately)} workers have them"
+    have = sum("control group" in worker.walls for worker in lately)
+    return True, f"{told}; of {len(lately)} heard of lately {have} have"
 
 
 def _between_trials(_settings: Settings) -> tuple[bool, str]:

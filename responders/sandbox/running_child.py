@@ -303,7 +303,7 @@ class Child:
             # It was alive until we ended it ourselves just now: it had only closed the wire.
             return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
         if self._overran is not None and self._overran():
-            sentence = "its process was killed: with the submission's others it took more memory than they may have"
+            sentence = "the submission's processes took more memory together than they may have"
             return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
         if self._blamed:
             sentence = "its process was killed, again and with nothing else running: it takes more memory than there is"
