@@ -46,6 +46,7 @@ LIMITS = ChildLimits(4.0, 256 << 20)
 GETS_THROUGH = {
     tools.LANDLOCK: frozenset({"none", "seccomp"}),
     tools.SECCOMP: frozenset({"none", "landlock", "landlock-1"}),
+    tools.DOORKEEPER: frozenset({"none", "no-doorkeeper"}),
     tools.EITHER: frozenset({"none"}),
     tools.NEWER: frozenset({"none", "landlock-1"}),
     tools.REMAINS: frozenset({"none", "full", "full-1"}),
@@ -57,9 +58,10 @@ SETTINGS = {
     "full-1": Walls(landlock=1, bubblewrap=False),
     "bubblewrap": Walls(),
     "none": NONE,
-    "landlock": Walls(seccomp=False, bubblewrap=False),
-    "landlock-1": Walls(landlock=1, seccomp=False, bubblewrap=False),
-    "seccomp": Walls(landlock=0, bubblewrap=False),
+    "landlock": Walls(seccomp=False, doorkeeper=False, bubblewrap=False),
+    "landlock-1": Walls(landlock=1, seccomp=False, doorkeeper=False, bubblewrap=False),
+    "seccomp": Walls(landlock=0, doorkeeper=False, bubblewrap=False),
+    "no-doorkeeper": Walls(doorkeeper=False, bubblewrap=False),
 }
 #: An interpreter that every user can read, where the machine has one.
 SYSTEM_PYTHON = "/usr/bin/python3.11"
@@ -70,7 +72,7 @@ _TOOLS = Path(tools.__file__).read_text()
 _NUMBERS = {name: number for number, name, _ in listed()}
 
 #: What is left in turn by the first half of an attack that remembers.
-_BITS = (1, 0, 0, 1, 1, 0, 1, 0)
+_BITS = (1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 1, 1)
 _OLD = 1_500_000_000
 
 #: The first lines of the student's file: this file's ``tools`` under their own name, then the group and the attack.
@@ -219,6 +221,7 @@ class Canaries:
 
 def readable_tree(folder: Path) -> Path:
     """Package folders like the own ones, with more files, folders and links in them, and links beside them."""
+    folder.chmod(0o755)
     here = Path(manager.__file__).parents[2]
     for name in ("sim/brick", "responders/kit"):
         shutil.copytree(here / name, folder / name)
@@ -237,7 +240,7 @@ def readable_tree(folder: Path) -> Path:
     return folder
 
 
-def forget(folder: Path) -> None:
+def unread(folder: Path) -> None:
     """As if nobody had looked at what is in a readable tree, and memory were needed for something else."""
     for path in (*folder.glob("*/*/more/*"), *folder.glob("links/*")):
         os.utime(path, (_OLD, _OLD), follow_symlinks=False)
@@ -267,6 +270,8 @@ def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
+    if stop is not None and "SIGKILL" in stop.message:
+        return f"LEAK it died as if somebody else had killed it ({stop.message})"
     if stop is not None and any(words in stop.message for words in ("not JSON", "without its number")):
         return f"LEAK another program wrote on the wire ({stop.message})"
     return stop.message if stop is not None else "\n".join(said)

@@ -13,7 +13,7 @@ LIST = Path(__file__).parent / "expected" / "system-calls.txt"
 
 
 def decide(program: bytes, number: int, arguments: Sequence[int] = (), architecture: int = X86_64) -> str:
-    """``allow``, ``kill``, or the name of the error. ``arguments`` are whole 64-bit registers."""
+    """``allow``, ``kill``, ``ask``, or the name of the error. ``arguments`` are whole 64-bit registers."""
     full = [*arguments, *[0] * (6 - len(arguments))]
     data = struct.pack("=IIQ6Q", number & 0xFFFFFFFF, architecture, 0x7F0000001234, *full)
     code = list(struct.iter_unpack("=HBBI", program))
@@ -45,6 +45,8 @@ def _named(value: int) -> str:
             return "allow"
         case 0x80000000:
             return "kill"
+        case 0x7FC00000:
+            return "ask"
         case 0x00050000:
             return errno.errorcode[value & 0xFFFF]
     raise AssertionError(f"a decision that this machine does not know: {value:#x}")

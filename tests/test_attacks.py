@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,22 +15,36 @@ from pathlib import Path
 import pytest
 
 from attacks import tools
-from battery import GETS_THROUGH, SECRET, SETTINGS, SYSTEM_PYTHON, Attack, Victim, attacks, canaries, run
-from responders.sandbox.manager import Role, Sandboxes
+from battery import (
+    GETS_THROUGH,
+    SECRET,
+    SETTINGS,
+    SYSTEM_PYTHON,
+    Attack,
+    Victim,
+    attacks,
+    canaries,
+    memories,
+    readable_tree,
+    remembered,
+    run,
+    unread,
+)
+from responders.sandbox import manager, private_folders
+from responders.sandbox.manager import Role, Sandboxes, Walls
 
 ATTACKS = attacks()
+MEMORIES = memories()
 WALLED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
 
-#: The machine's name is one that bubblewrap makes up, and the link leads to the interpreter.
+#: The machine's name is one that bubblewrap makes up.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
     {
-        "read_a_link",
         "list_names_of_packages",
         "name_the_working_folder",
         "name_the_machine",
         "see_the_orders_of_the_zygote",
         "read_the_real_clock",
-        "read_the_load_of_the_machine",
         "run_machine_code",
         "load_a_library_of_ones_own",
         "switch_off_pythons_refusals",
@@ -136,8 +151,81 @@ def test_without_its_wall_it_gets_through(
     assert outcome.startswith("LEAK"), outcome
 
 
+@pytest.fixture
+def tree(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """What is readable of ours, with more in it to leave a trace on."""
+    with tempfile.TemporaryDirectory() as made:
+        folder = readable_tree(Path(made))
+        monkeypatch.setattr(manager, "_package_folder", lambda name: folder / name)
+        yield folder
+
+
+def _remembered(attack: Attack, walls: Walls, tree: Path, role: Role = "robot") -> str:
+    with Sandboxes(walls) as sandboxes:
+        sandboxes.check(role)
+        unread(tree)
+        assert (sandboxes.remembers() is None) == walls.doorkeeper
+        more = tree / ("sim/brick" if role == "robot" else "responders/kit") / "more"
+        return remembered(sandboxes, role, attack, {"readable": str(more), "links": str(tree / "links")})
+
+
+@pytest.mark.parametrize(
+    ("setting", "role"),
+    [WALLED[0], *(pytest.param(*each, marks=pytest.mark.long) for each in WALLED[1:])],
+    ids=lambda value: value,
+)
+@pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
+def test_a_trial_leaves_nothing_for_another(attack: Attack, setting: str, role: Role, tree: Path) -> None:
+    outcome = _remembered(attack, SETTINGS[setting], tree, role)
+    assert outcome.startswith("blocked"), outcome
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
+def test_a_trial_inside_bubblewrap_leaves_nothing_for_another(attack: Attack, wrapped: Sandboxes, tree: Path) -> None:
+    outcome = _remembered(attack, SETTINGS["bubblewrap"], tree)
+    assert outcome.startswith("blocked"), outcome
+
+
+@pytest.mark.long
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
+@pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
+def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
+    attack: Attack, tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", SYSTEM_PYTHON)
+    outcome = _remembered(attack, SETTINGS["full"], tree)
+    assert outcome.startswith("blocked"), outcome
+
+
+@pytest.mark.parametrize(
+    ("attack", "setting"),
+    [
+        pytest.param(attack, setting, id=f"{attack.id}-{setting}", marks=[] if setting == "none" else pytest.mark.long)
+        for attack in MEMORIES
+        for setting in sorted(GETS_THROUGH[attack.stopped_by])
+    ],
+)
+def test_without_its_wall_a_trial_leaves_something(attack: Attack, setting: str, tree: Path) -> None:
+    outcome = _remembered(attack, SETTINGS[setting], tree)
+    assert outcome.startswith("LEAK"), outcome
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a file system that numbers files on and on")
+@pytest.mark.parametrize(("skipped", "outcome"), [(private_folders._SKIPPED, "blocked"), (1, "LEAK")])
+def test_numbers_are_left_out_where_they_go_on(
+    skipped: int, outcome: str, tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The walls stop nobody from making a few files; only that the next number is anybody's guess helps."""
+    attack = next(attack for attack in MEMORIES if attack.name == "number_of_own_files")
+    monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
+    monkeypatch.setattr(private_folders, "_SKIPPED", skipped)
+    assert _remembered(attack, SETTINGS["full"], tree).startswith(outcome)
+
+
 def test_there_are_enough_attacks_of_every_kind() -> None:
-    counts = Counter(attack.group for attack in ATTACKS)
+    counts = Counter(attack.group for attack in ATTACKS + MEMORIES)
     assert sum(counts.values()) >= 250
     assert min(counts.values()) >= 9
     assert len({attack.id for attack in ATTACKS}) == len(ATTACKS)

@@ -22,7 +22,8 @@ def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
         said = sandboxes.check(role)  # type: ignore[arg-type]
     assert re.fullmatch(
-        r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?process limits, policy \w{8} \(battery .*\)",
+        r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?process limits, "
+        r"policy [0-9a-f]{8} \(battery .*\)",
         said,
     )
     assert f"{len(ATTEMPTS)} of {len(ATTEMPTS)} refused" in said

@@ -8,10 +8,12 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from filter_machine import AARCH64, I386, X86_64, decide, listed
-from responders.sandbox.inside.lockdown import ALLOWED, program
+from responders.sandbox.inside.system_calls import ALLOWED, PATHS, asking, program
 
 PID = 54321
 FILTER = program(PID)
+#: None that only others send, and none that is queued.
+SIGNALS = set(range(32)) - {9}
 X32 = 1 << 30
 HIGH = 1 << 32
 CALLS = {number: (name, decision) for number, name, decision in listed()}
@@ -22,23 +24,39 @@ SOME: dict[str, Callable[[Sequence[int]], bool]] = {
     "openat": lambda a: _opens(a[2], a[3]),
     "ioctl": lambda a: _low(a[1]) in (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451),
     "fcntl": lambda a: _low(a[1]) in (0, 1, 2, 3, 4, 1030),
-    "kill": lambda a: _low(a[0]) == PID,
-    "tgkill": lambda a: _low(a[0]) == PID,
+    "kill": lambda a: _low(a[0]) == PID and _low(a[1]) in SIGNALS,
+    "tgkill": lambda a: _low(a[0]) == PID and _low(a[2]) in SIGNALS,
     "prctl": lambda a: _low(a[0]) in (15, 16),
     "arch_prctl": lambda a: _low(a[0]) in (0x1002, 0x1003),
     "renameat2": lambda a: _low(a[4]) in (0, 1, 2),
-    "prlimit64": lambda a: a[2] == 0,
+    "prlimit64": lambda a: _own(a[0]) and a[2] == 0,
+    "getsid": lambda a: _own(a[0]),
+    "getpriority": lambda a: _low(a[0]) == 0 and _own(a[1]),
+    "sched_getparam": lambda a: _own(a[0]),
+    "sched_getscheduler": lambda a: _own(a[0]),
+    "sched_getaffinity": lambda a: _own(a[0]),
+    "get_robust_list": lambda a: _own(a[0]),
+    "clock_gettime": lambda a: _low(a[0]) < 12,
+    "clock_getres": lambda a: _low(a[0]) < 12,
+    "clock_nanosleep": lambda a: _low(a[0]) < 12,
+    "futex": lambda a: _low(a[1]) & ~256 in range(128, 142),
+    "madvise": lambda a: _low(a[2]) in (4, 8, 14, 15),
 }
 #: Each is put in each place: processes, flags, requests and pointers, and what they become in 32 bits.
 EDGES = (
     *(0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1),
     *(0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C),
+    *(9, 11, 12, 14, 19, 21, 31, 32, 40, 127, 128, 141, 142, 393, 397, 398, (~PID << 3) | 2, -6),
     *(0o4755, 0o2755, 0x5421, 0x5450, 0x5451, 0x8901, 0x1001, 0x1002, 0x1003, 0x1004, 0x7FFFFFFFF000),
 )
 
 
 def _low(value: int) -> int:
     return value & 0xFFFFFFFF
+
+
+def _own(pid: int) -> bool:
+    return _low(pid) in (0, PID)
 
 
 def _opens(flags: int, mode: int) -> bool:
@@ -54,7 +72,7 @@ def _arguments(everything: bool) -> list[list[int]]:
     values = {edge & (1 << 64) - 1 for plain in EDGES for edge in (plain, plain | HIGH)}
     found = []
     for place, value in itertools.product(range(6), sorted(values)):
-        for fill in (0, 0o102, (1 << 64) - 1):
+        for fill in (0, 0o102, PID, (1 << 64) - 1):
             arguments = [fill] * 6
             arguments[place] = value
             found.append(arguments)
@@ -94,3 +112,30 @@ def test_nothing_that_reaches_others_is_allowed() -> None:
     words += ("setuid", "setgid", "cap", "landlock", "seccomp", "handle", "inotify", "fanotify", "module", "xattr")
     found = {name for name in ALLOWED if any(word in name for word in words)}
     assert not found
+
+
+def test_whoever_names_a_path_has_to_ask() -> None:
+    """No call is let through that takes a path and is not asked about."""
+    words = (
+        "open",
+        "stat",
+        "access",
+        "link",
+        "rename",
+        "dir",
+        "node",
+        "mount",
+        "trunc",
+        "utime",
+        "swap",
+        "acct",
+        "root",
+    )
+    naming = {
+        name
+        for name, decision in CALLS.values()
+        if decision in ("allow", "some") and any(word in name for word in words)
+    }
+    asked = {CALLS[number][0] for number in range(601) if decide(asking(), number) == "ask"}
+    assert asked == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATHS}
+    assert {decide(asking(), number) for number in range(601) if number not in PATHS} == {"allow"}

@@ -59,18 +59,19 @@ class _ZygoteEnded(KilledFromOutside):
 class Walls:
     """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter.
 
-    Bubblewrap is put round them where it works, and done without where it does not.
+    The doorkeeper and bubblewrap are added where they work, and done without where they do not.
     """
 
     landlock: int = 99
     seccomp: bool = True
+    doorkeeper: bool = True
     bubblewrap: bool = True
 
 
 #: What every grading needs.
 FULL = Walls()
 #: Limits on the process and nothing else: for development only.
-NONE = Walls(landlock=0, seccomp=False, bubblewrap=False)
+NONE = Walls(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
 
 
 def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
@@ -187,6 +188,7 @@ class Zygote:
                     "folder": folder is not None,
                     "landlock": self._walls.landlock,
                     "seccomp": self._walls.seccomp,
+                    "doorkeeper": self._walls.doorkeeper,
                 },
                 [theirs.fileno(), *descriptors],
             )

@@ -1,37 +1,52 @@
 """What can be learnt without opening anything: names, sizes, times, and who else is there.
 
-Some of it remains; docs/walls.md names it. No answer may ever be told by the name or the size of a file.
+A little of it remains; docs/walls.md names it.
 """
 
 from __future__ import annotations
 
 import ctypes
+import mmap
 import os
+import signal
+import struct
 import sys
 import sysconfig
 import time
 
-from attacks.tools import EITHER, REMAINS, SECCOMP, UNTRIED, attack, call, space, system_calls, targets
+from attacks.tools import (
+    DOORKEEPER,
+    EITHER,
+    REMAINS,
+    SECCOMP,
+    UNTRIED,
+    attack,
+    call,
+    libc,
+    space,
+    system_calls,
+    targets,
+)
 
 AT_FDCWD = -100
 
 
-@attack(REMAINS)
+@attack(DOORKEEPER)
 def stat_the_key():
     return os.stat(targets.key).st_size
 
 
-@attack(REMAINS)
+@attack(DOORKEEPER)
 def ask_whether_a_path_exists():
     return os.path.exists(targets.folder) and not os.path.exists(targets.folder + "-not")
 
 
-@attack(REMAINS)
+@attack(DOORKEEPER)
 def ask_for_access():
     return os.access(targets.key, os.R_OK)
 
 
-@attack(REMAINS)
+@attack(DOORKEEPER)
 def read_a_link():
     return os.readlink("/proc/self/exe")
 
@@ -41,7 +56,7 @@ def list_names_of_packages():
     return os.listdir(sysconfig.get_path("purelib"))
 
 
-@attack(REMAINS)
+@attack(DOORKEEPER)
 def open_a_path_descriptor():
     return os.fstat(os.open(targets.key, os.O_PATH)).st_size
 
@@ -61,16 +76,111 @@ def see_the_orders_of_the_zygote():
     return sys.argv[1:] and os.getppid()
 
 
-@attack(REMAINS)
+@attack(SECCOMP)
 def read_the_clock_of_another_process():
     clock = (~targets.victim << 3) | 2
     libc_time = ctypes.CDLL(None).clock_gettime
     return libc_time(ctypes.c_int(clock), space(16)) == 0
 
 
-@attack(REMAINS)
+@attack(SECCOMP)
 def ask_whether_a_process_exists():
     return os.sched_getaffinity(targets.victim) and os.getpriority(os.PRIO_PROCESS, targets.victim) is not None
+
+
+@attack(DOORKEEPER)
+def ask_whether_a_path_exists_by_how_it_is_refused():
+    """What is there and may not be opened is refused otherwise than what is not there."""
+    return _refused(targets.key) != _refused(targets.key + "-not")
+
+
+@attack(DOORKEEPER)
+def ask_whether_a_process_exists_by_how_it_is_refused():
+    return _refused(f"/proc/{targets.victim}/environ") != _refused("/proc/4194304/environ")
+
+
+@attack(DOORKEEPER)
+def ask_whether_a_path_exists_by_removing_it():
+    return _refused(targets.folder, os.unlink) != _refused(targets.folder + "-not", os.unlink)
+
+
+@attack(DOORKEEPER)
+def ask_whether_a_path_exists_by_renaming_it():
+    return _refused(targets.folder, _rename) != _refused(targets.folder + "-not", _rename)
+
+
+def _rename(path):
+    """To a name that is taken, so that nothing comes of it."""
+    os.close(os.open("taken", os.O_WRONLY | os.O_CREAT))
+    call("renameat2", AT_FDCWD, path.encode(), AT_FDCWD, b"taken", 1)
+
+
+def _refused(path, attempt=lambda path: os.open(path, os.O_RDONLY)):
+    try:
+        attempt(path)
+    except OSError as error:
+        return error.errno
+    return 0
+
+
+@attack(DOORKEEPER)
+def climb_to_the_key():
+    """From the own folder upwards, and down again."""
+    return os.stat("../" * 20 + targets.key).st_size
+
+
+@attack(DOORKEEPER)
+def climb_to_the_key_through_what_may_be_read():
+    return os.stat(f"/usr/share/zoneinfo/{'../' * 5}{targets.key}").st_size
+
+
+@attack(DOORKEEPER)
+def climb_to_the_key_from_a_descriptor():
+    folder = os.open("/usr/share/zoneinfo", os.O_RDONLY)
+    return os.stat("../../../" + targets.key, dir_fd=folder).st_size
+
+
+@attack(DOORKEEPER)
+def name_the_key_by_the_own_process():
+    return os.stat(f"/proc/self/root/{targets.key}").st_size
+
+
+@attack(DOORKEEPER)
+def stat_with_the_whole_path_beside_a_descriptor():
+    """The flag says that the descriptor is meant; a path that is there all the same is meant more."""
+    found = space(256)
+    call("newfstatat", os.open("/dev/null", os.O_RDONLY), targets.key.encode(), found, 0x1000)
+    return int.from_bytes(found[48:56], "little") == len("the grading key")
+
+
+@attack(DOORKEEPER)
+def stat_a_path_at_the_end_of_a_page():
+    """Whoever reads a whole block of memory to see the path finds nothing behind it."""
+    pages = mmap.mmap(-1, 8192)
+    start = ctypes.addressof(ctypes.c_char.from_buffer(pages))
+    libc.mprotect(ctypes.c_void_p(start + 4096), ctypes.c_size_t(4096), 0)
+    path = targets.key.encode() + b"\0"
+    ctypes.memmove(start + 4096 - len(path), path, len(path))
+    found = space(256)
+    call("stat", start + 4096 - len(path), found)
+    return True
+
+
+@attack(DOORKEEPER)
+def change_the_path_after_it_was_looked_at():
+    """A timer's handler, in machine code, puts a slash where the harmless path ended, and takes it away again."""
+    path = ctypes.create_string_buffer(b"/usr/share/zoneinfo\0" + b"../" * 5 + targets.key.encode())
+    place = ctypes.addressof(path) + len("/usr/share/zoneinfo")
+    page = mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)
+    page.write(b"\x48\xb8" + struct.pack("=Q", place) + b"\x80\x30\x2f\xc3")  # xor byte [place], "/"; ret
+    libc.signal.restype = ctypes.c_void_p
+    libc.signal(signal.SIGALRM, ctypes.c_void_p(ctypes.addressof(ctypes.c_char.from_buffer(page))))
+    signal.setitimer(signal.ITIMER_REAL, 1e-5, 5e-5)
+    found, seen = space(256), False
+    for _ in range(5000):
+        seen |= libc.stat(path, found) == 0 and int.from_bytes(found[48:56], "little") == len("the grading key")
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    return seen
 
 
 @attack(REMAINS)
@@ -78,7 +188,7 @@ def read_the_real_clock():
     return call("clock_gettime", time.CLOCK_REALTIME, space(16)) == 0
 
 
-@attack(REMAINS)
+@attack(SECCOMP)
 def read_the_load_of_the_machine():
     return call("sysinfo", space(256)) == 0
 

@@ -5,8 +5,22 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import resource
 
-from attacks.tools import EITHER, LANDLOCK, NEWER, SECCOMP, UNTRIED, attack, call, contents, libc, space, targets
+from attacks.tools import (
+    DOORKEEPER,
+    EITHER,
+    LANDLOCK,
+    NEWER,
+    SECCOMP,
+    UNTRIED,
+    attack,
+    call,
+    contents,
+    libc,
+    space,
+    targets,
+)
 
 PTRACE_ATTACH, PTRACE_DETACH, PTRACE_SEIZE, PTRACE_TRACEME = 16, 17, 0x4206, 0
 
@@ -180,3 +194,71 @@ def make_namespaces():
 @attack(UNTRIED)
 def make_namespaces_with_clone():
     return call("clone", 0x10000000 | 17, 0, 0, 0, 0) > 0
+
+
+@attack(DOORKEEPER)
+def count_the_files_of_another():
+    """How many it has open is the size of a folder that may not even be listed."""
+    return os.stat(f"/proc/{targets.victim}/fd").st_size
+
+
+@attack(DOORKEEPER)
+def count_all_processes():
+    return os.stat("/proc").st_nlink
+
+
+@attack(DOORKEEPER)
+def see_whose_process_it_is():
+    return os.stat(f"/proc/{targets.victim}").st_ino
+
+
+@attack(LANDLOCK)
+def follow_the_program_of_another():
+    return os.readlink(f"/proc/{targets.victim}/exe")
+
+
+@attack(DOORKEEPER)
+def see_the_own_program_and_descriptors():
+    return os.readlink("/proc/self/exe") and os.readlink("/proc/self/fd/3")
+
+
+@attack(SECCOMP)
+def read_the_limits_of_another():
+    return resource.prlimit(targets.victim, resource.RLIMIT_NOFILE)
+
+
+@attack(SECCOMP)
+def read_the_scheduler_of_another():
+    return call("sched_getscheduler", targets.victim) >= 0
+
+
+@attack(SECCOMP)
+def read_the_parameters_of_another():
+    return call("sched_getparam", targets.victim, space(8)) == 0
+
+
+@attack(SECCOMP)
+def read_the_session_of_another():
+    return call("getsid", targets.victim) > 0
+
+
+@attack(SECCOMP)
+def read_the_lowest_priority_of_all_own():
+    """Of a user: every process of whoever runs this one."""
+    return call("getpriority", 2, 0) > 0
+
+
+@attack(SECCOMP)
+def sleep_by_the_clock_of_another():
+    clock = (~targets.victim << 3) | 2
+    return libc.clock_getres(ctypes.c_int(clock), space(16)) == 0
+
+
+@attack(SECCOMP)
+def read_the_processors_of_another():
+    return call("sched_getaffinity", targets.victim, 128, space(128)) > 0
+
+
+@attack(SECCOMP)
+def read_the_limits_of_another_with_a_high_half():
+    return call("prlimit64", targets.victim | 1 << 32, 7, 0, space(16)) == 0

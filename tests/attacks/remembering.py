@@ -20,6 +20,7 @@ import struct
 import sys
 
 from attacks.tools import (
+    DOORKEEPER,
     LANDLOCK,
     NEWER,
     NOWHERE,
@@ -49,7 +50,7 @@ def touched(status):
     return max(status.st_atime, status.st_mtime) > targets.since
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_reading_a_file(turn, bit):
     if bit:
         contents(f"{targets.readable}/file-{turn}")
@@ -60,7 +61,7 @@ def find_time_of_reading_a_file(turn):
     return touched(os.stat(f"{targets.readable}/file-{turn}"))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_mapping_a_file(turn, bit):
     fd = os.open(f"{targets.readable}/file-{turn}", os.O_RDONLY)
     if bit:
@@ -72,7 +73,7 @@ def find_time_of_mapping_a_file(turn):
     return touched(os.fstat(os.open(f"{targets.readable}/file-{turn}", os.O_RDONLY)))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_listing_a_folder(turn, bit):
     if bit:
         os.listdir(f"{targets.readable}/folder-{turn}")
@@ -83,7 +84,7 @@ def find_time_of_listing_a_folder(turn):
     return touched(os.stat(f"{targets.readable}/folder-{turn}"))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_following_a_link(turn, bit):
     if bit:
         os.path.exists(f"{targets.readable}/link-{turn}")
@@ -94,7 +95,7 @@ def find_time_of_following_a_link(turn):
     return touched(os.lstat(f"{targets.readable}/link-{turn}"))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_following_a_link_elsewhere(turn, bit):
     """Anywhere on the machine: a link need not be readable to be followed."""
     if bit:
@@ -106,7 +107,7 @@ def find_time_of_following_a_link_elsewhere(turn):
     return touched(os.lstat(f"{targets.links}/link-{turn}"))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_being_refused_behind_a_link(turn, bit):
     """The way to a file is walked before Landlock is asked."""
     if bit:
@@ -119,7 +120,7 @@ def find_time_of_being_refused_behind_a_link(turn):
     return touched(os.fstat(os.open(f"{targets.links}/link-{turn}", os.O_PATH | os.O_NOFOLLOW)))
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def time_of_reading_a_link(turn, bit):
     if bit:
         os.readlink(f"{targets.links}/link-{turn}")
@@ -275,7 +276,7 @@ def find_number_of_an_own_file(turn):
     return os.fstat(os.open("own", os.O_WRONLY | os.O_CREAT)).st_ino
 
 
-@leaves(SECCOMP)
+@leaves(NOWHERE)
 def number_of_own_files(turn, bit):
     """Made and removed until the number is the one that is wanted, where files are numbered on and on."""
     for _ in range(600):
@@ -321,7 +322,7 @@ def find_number_of_a_pipe(turn):
     return os.fstat(os.pipe()[0]).st_ino & 1023 >= 512
 
 
-@leaves(SECCOMP)
+@leaves(DOORKEEPER)
 def number_of_what_the_kernel_shows(turn, bit):
     """What is asked about in /proc for the first time gets the next number of the same counter."""
     _on_the_first_processor()
@@ -444,7 +445,7 @@ def find_waiting_at_a_place_of_a_file(turn):
     return 0
 
 
-@leaves(SECCOMP, at_once=True)
+@leaves(NOWHERE, at_once=True)
 def signals_that_wait(turn, bit):
     """How many may wait is counted for a user, not for a process."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {40})
@@ -486,7 +487,7 @@ def find_time_that_another_has_computed(turn):
     return seconds * 10**9 + nanoseconds
 
 
-@leaves(SECCOMP, at_once=True)
+@leaves(DOORKEEPER, at_once=True)
 def files_that_another_has_open(turn, bit):
     for _ in range(8 * bit):
         os.open("/dev/null", os.O_RDONLY)

@@ -7,6 +7,7 @@ import os
 import resource
 import signal
 import struct
+import threading
 
 from attacks.tools import NEWER, SECCOMP, UNTRIED, attack, call, libc, space, system_calls, targets
 
@@ -203,11 +204,91 @@ def leave_the_session():
     return True
 
 
-@attack(SECCOMP)
+@attack(UNTRIED)
 def time_with_signals():
     """A timer that signals a thread of one's choice."""
     event = struct.pack("=QiiI", 0, signal.SIGALRM, 0, 0) + bytes(44)
     return call("timer_create", 0, event, space(8)) == 0
+
+
+@attack(SECCOMP)
+def kill_oneself():
+    """Who dies of SIGKILL and not by the worker looks like a victim of the machine's."""
+    os.kill(os.getpid(), signal.SIGKILL)
+    return True
+
+
+@attack(SECCOMP)
+def kill_oneself_with_a_high_half():
+    return call("kill", os.getpid() | HIGH, signal.SIGKILL | HIGH) == 0
+
+
+@attack(SECCOMP)
+def kill_the_own_thread():
+    return call("tgkill", os.getpid(), os.getpid(), signal.SIGKILL) == 0
+
+
+@attack(SECCOMP)
+def kill_the_own_thread_by_its_number_alone():
+    return call("tkill", os.getpid(), signal.SIGKILL) == 0
+
+
+@attack(SECCOMP)
+def raise_the_signal_that_kills():
+    return libc["raise"](signal.SIGKILL) == 0
+
+
+@attack(SECCOMP)
+def kill_oneself_as_a_thread():
+    signal.pthread_kill(threading.get_ident(), signal.SIGKILL)
+    return True
+
+
+@attack(SECCOMP)
+def kill_oneself_with_the_own_handle():
+    signal.pidfd_send_signal(os.pidfd_open(os.getpid()), signal.SIGKILL)
+    return True
+
+
+@attack(SECCOMP)
+def queue_the_signal_that_kills():
+    information = struct.pack("=iii", signal.SIGKILL, 0, -1) + bytes(116)
+    return call("rt_sigqueueinfo", os.getpid(), signal.SIGKILL, information) == 0
+
+
+@attack(SECCOMP)
+def have_the_kernel_kill_at_a_limit():
+    """The second limit of processor time is enforced with SIGKILL."""
+    signal.signal(signal.SIGXCPU, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_CPU, (1, 1))
+    while True:
+        pass
+
+
+@attack(SECCOMP)
+def have_a_pipe_kill():
+    reading, writing = os.pipe()
+    fcntl.fcntl(reading, fcntl.F_SETOWN, os.getpid())
+    call("fcntl", reading, 10, signal.SIGKILL)
+    fcntl.fcntl(reading, fcntl.F_SETFL, os.O_ASYNC)
+    os.write(writing, b"x")
+
+
+@attack(UNTRIED)
+def have_a_timer_kill():
+    event = struct.pack("=QiiI", 0, signal.SIGKILL, 0, 0) + bytes(44)
+    timer = space(8)
+    call("timer_create", 1, event, timer)
+    call("timer_settime", int.from_bytes(timer.raw[:4], "little"), 0, struct.pack("=qqqq", 0, 0, 0, 1000), None)
+    libc.usleep(100_000)
+
+
+@attack(SECCOMP)
+def send_a_signal_that_has_no_name():
+    """One of those that are queued, and counted for all processes of a user."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {40})
+    os.kill(os.getpid(), 40)
+    return True
 
 
 globals().update(

@@ -18,8 +18,8 @@ libc.mmap.restype = ctypes.c_void_p
 
 #: Which wall stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
 LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "either", "newer", "remains", "untried"
-#: What there is nowhere to be found, with or without walls.
-NOWHERE = "nowhere"
+#: By the doorkeeper alone; by nothing, as it is nowhere to be found.
+DOORKEEPER, NOWHERE = "doorkeeper", "nowhere"
 
 #: The numbers of system calls by name, and the canaries; filled before an attack runs.
 numbers: dict[str, int] = {}

@@ -113,7 +113,7 @@ def _limits(order: dict[str, Any]) -> None:
     memory = mapped + order["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     seconds = int(order["cpu"]) + 2
-    # Counted in ticks, which a program can be charged without computing: dying of it must not look like our doing.
+    # The worker is there long before the second limit: a SIGKILL that it did not send is never this one's.
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 60))
     resource.setrlimit(resource.RLIMIT_FSIZE, (order["file_size"], order["file_size"]))
     resource.setrlimit(resource.RLIMIT_NOFILE, (32, 32))
@@ -136,8 +136,9 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame
         lockdown.forbid_new_privileges()
         if order["landlock"]:
             landlock = _files(order, grants)
-        if order["seccomp"]:
+        if order["doorkeeper"]:
             without_doorkeeper = _ask_about_paths(memory)
+        if order["seccomp"]:
             lockdown.restrict_system_calls()
             _must_fail("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
             _must_fail("seccomp", lambda: os.kill(os.getppid(), 0))
