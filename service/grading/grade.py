@@ -127,6 +127,7 @@ class CriterionResult:
     accuracy: Accuracy | None = None
     sights: tuple[Sight, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
+    for_staff: str = ""  # where somebody should look, which no student is told
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ BEFORE_PUBLICATION = frozenset({"visible"})
 
 
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> Grade:
-    """``grade`` without the criteria and trials whose visibility is not in ``released``.
+    """``grade`` without what is for staff, and the criteria and trials whose visibility is not in ``released``.
 
     Evidence and pictures from hidden trials go too; a criterion that loses pictures also loses its confusion
     counts, and one that loses trials its curves, because they would tell what the hidden trials ask. Totals are then
@@ -27,7 +27,9 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     return replace(
         grade,
         criteria=tuple(
-            _without_hidden_trials(result, new_index) for result in grade.criteria if result.visibility in released
+            replace(_without_hidden_trials(result, new_index), for_staff="")
+            for result in grade.criteria
+            if result.visibility in released
         ),
         trials=tuple(grade.trials[index] for index in kept),
     )

@@ -139,6 +139,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         confidence=accuracy and to_plain(accuracy.confidence),
         curves=to_plain(result.curves),
         sights=sights,
+        for_staff=result.for_staff,
     )
 
 
@@ -191,6 +192,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         accuracy=_accuracy(row),
         sights=tuple(_sight(plain, trials) for plain in row.sights),
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
+        for_staff=row.for_staff,
     )
 
 

@@ -292,6 +292,7 @@ class CriterionRow(Base):
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
     curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
     sights: Mapped[Any]
+    for_staff: Mapped[str] = mapped_column(default="")  # where somebody should look, which no student is told
 
 
 class Artifact(Base):
