@@ -6,6 +6,7 @@ The role (robot program or responder) takes over once every layer stands.
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import os
 import resource
 import signal
@@ -47,7 +48,7 @@ def start(
         wire.send(_walls(order, grants, zygote))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
-        role(wire, grants)
+        role(wire, dataclasses.replace(grants, without=tuple(order["without"])))
     finally:
         os._exit(0)
 

@@ -9,6 +9,7 @@ import array
 import contextlib
 import ctypes
 import gc
+import importlib
 import json
 import os
 import signal
@@ -20,8 +21,11 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
 
-def main(role_name: str, folders: str, roots: list[str]) -> None:
-    """Serve orders on descriptor 3 until the worker closes it. ``folders`` is where children have theirs."""
+def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
+    """Serve orders on descriptor 3 until the worker closes it.
+
+    ``folders`` is where children have theirs, ``without`` are modules that none of them may have.
+    """
     _first_to_go()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -29,16 +33,19 @@ def main(role_name: str, folders: str, roots: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, child, determinism, grants, lockdown, refusals, student_code  # noqa: F401
+    from . import battery, child, determinism, grants, lockdown, refusals, student_code, withheld  # noqa: F401
 
     if role_name == "robot":
         from . import robot_role as role
     else:
         from . import responder_role as role  # type: ignore[no-redef]
-    role.preload()
+    for name in role.NEEDED:
+        importlib.import_module(name)
+    closed = withheld.keep_out(tuple(without))
+    role.preload(without)
     plays = {"role": role.run, "battery": battery.run}
-    readable = grants.readable(roots)
-    allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
+    readable = grants.readable(roots, closed)
+    allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
     zygote = os.getpid()
     _one_thread()
     gc.collect()
