@@ -15,7 +15,7 @@ from responders.bridge import ProgramOrder, TrialOrder
 from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
 from responders.sandbox.running_child import ChildLimits
-from service.grading.findings import HandedIn, look_at, reads_program
+from service.grading.findings import HandedIn, does_without, look_at, reads_program, responder_limits
 from service.grading.grade import Grade, TrialResult
 from service.grading.judging.judge import judge
 from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
@@ -31,7 +31,7 @@ from sim.world import Noise
 from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
-from submissions.plain_cells import modules_of, python_of
+from submissions.plain_cells import python_of
 from submissions.submission import Notebook, Source, Submission
 
 _MEGABYTE = 1 << 20
@@ -135,7 +135,8 @@ def _handed_in(submission: Submission, parts: _Parts) -> HandedIn:
     responder = parts.responder
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
-    return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission))
+    cells = parts.notebook.cells if parts.notebook is not None else ()
+    return HandedIn(parts.program, responder, parts.flags, parts.files, submission.files, cells)
 
 
 class _Watch:
@@ -248,8 +249,7 @@ def _recording(
 ) -> Recording:
     limits, obstacles = assignment.limits, assignment.world.obstacles
     if parts.notebook is not None:
-        child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE)
-        hand_in = NotebookHandIn(parts.notebook, parts.files, child_limits, limits.output_bytes)
+        hand_in = NotebookHandIn(parts.notebook, parts.files, responder_limits(assignment), limits.output_bytes)
         as_read = parts.marked_cell is not None and reads_program(assignment)
         return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, pulse)
     recording = rig.run(order, obstacles, pulse)
@@ -271,14 +271,14 @@ def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor) -
         responder = ResponderOrder(
             Code(parts.responder.name, parts.responder.text),
             parts.files,
-            ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
+            responder_limits(assignment),
             limits.output_bytes,
         )
     return TrialOrder(
         program=ProgramOrder(
             Code(parts.program.name, parts.program.text),
             parts.flags.preamble,
-            ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE),
+            ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, does_without(assignment, "program")),
             limits.output_bytes,
         ),
         responder=responder,

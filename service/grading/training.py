@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from responders.conversation import Code
-from responders.sandbox.running_child import ChildLimits
 from responders.training import Images, Trained, TrainingOrder
+from service.grading.findings import responder_limits
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
 from service.grading.judging.patches import grey_picture
@@ -25,7 +25,6 @@ from sim.recording import Fault, Image, Message, Recording, Verdict
 from submissions.assignment import Assignment, Training
 from submissions.submission import Source
 
-_MEGABYTE = 1 << 20
 _HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
 _SIDE = {"focus": 14, "whole": 20}
 
@@ -53,7 +52,6 @@ def with_models_answers(
     seed = results[0].seed if results else 0
     # Not in the order of the track: neighbours on it mostly show the same.
     order = sorted(range(len(unseen)), key=Stream(seed, "order of pictures").integer)
-    limits = assignment.limits
     trained = rig.train(
         TrainingOrder(
             Code(hand_in.name, hand_in.text),
@@ -62,8 +60,8 @@ def with_models_answers(
             _arrays([pair for pair, _ in known], training),
             [truth for _, truth in known],
             _arrays([unseen[place] for place in order], training),
-            ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
-            limits.output_bytes,
+            responder_limits(assignment),
+            assignment.limits.output_bytes,
             seed,
         ),
         pulse,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 
-from . import model_files
+from . import model_files, source_reader  # noqa: F401
 from .answering import Responder
 from .frames import Wire
 from .lockdown import Grants
