@@ -19,6 +19,7 @@ from typing import Literal
 
 from sim.errors import UsageError
 from submissions.assignment import Parts
+from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
@@ -206,6 +207,9 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     files = dict(raw.files)
     notes = list(raw.notes)
     meta = _read_meta(files.pop(_META, b""), where)
+    for compiled in [each for each, data in files.items() if is_compiled(each, data)]:
+        del files[compiled]
+        notes.append(f"{shown(compiled)} was left out: it is compiled code; submit the Python that it was made of.")
     if not files:
         raise UsageError(f"{where}: has no files in it, expected robot.py and responder.py.")
     notebook = _find_notebook(files, where, notes)

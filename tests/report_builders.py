@@ -153,7 +153,10 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
                 evidence=tuple(Evidence(index, index != wrong, "") for index in range(6)),
                 accuracy=accuracy, sights=sights,
             ),
-            CriterionResult("asks-aloud", "Asks “Is that a …” aloud", Decimal(2), Decimal(2), "It asked every time."),
+            CriterionResult(
+                "asks-aloud", "Asks “Is that a …” aloud", Decimal(2), Decimal(2), "It asked every time.",
+                for_staff="SECRETDOUBT",
+            ),
         ),
         **changes,
     )  # fmt: skip

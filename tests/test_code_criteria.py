@@ -14,7 +14,8 @@ from responders.sandbox.running_child import ChildLimits
 from service.grading.findings import HandedIn, look_at
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.source_rules import SourceFacts, judge_source
+from service.grading.judging.outcome import Outcome
+from service.grading.judging.source_rules import SourceAnswers, judge_source
 from service.grading.rig import Rig
 from sim.errors import AssignmentError
 from sim.recording import Verdict
@@ -22,7 +23,7 @@ from submissions.assignment import Assignment, Limits, Parts, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.magics import split_program
-from submissions.plain_cells import modules_of, python_of
+from submissions.plain_cells import python_of
 from submissions.submission import Cell, Notebook, Source, Submission
 
 LIMITS = ChildLimits(1.0, 256 << 20)
@@ -37,9 +38,14 @@ def without_robot(*criteria: Criterion) -> Assignment:
     return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), criteria)
 
 
-def facts_of(text: str, rig: Rig) -> SourceFacts:
-    asked = without_robot(criterion("source", uses=["for"]))
-    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, JobMeter()).facts["program"]
+def answers(text: str, rig: Rig, **rules: Any) -> SourceAnswers:
+    asked = without_robot(criterion("source", **rules))
+    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, JobMeter()).answers["c"]
+
+
+def judged(text: str, rig: Rig, **rules: Any) -> Outcome:
+    flags, program = split_program(text)
+    return judge_source(criterion("source", **rules), answers(program, rig, **rules), flags)  # type: ignore[arg-type]
 
 
 def graded(text: str, rig: Rig, *criteria: Criterion) -> Grade:
@@ -61,13 +67,8 @@ def square(side):
         say("done")
 while True:
     square(2)
-names = [name for name in "abc"]
+    names = [name for name in "abc"]
 """
-
-
-@pytest.fixture(scope="module")
-def facts(rig: Rig) -> SourceFacts:
-    return facts_of(split_program(PROGRAM)[1], rig)
 
 
 @pytest.mark.parametrize(
@@ -93,14 +94,13 @@ def facts(rig: Rig) -> SourceFacts:
         ({"flags": ["--autorun"]}, True),
     ],
 )
-def test_rules_on_the_text(facts: SourceFacts, rules: dict[str, Any], holds: bool) -> None:
-    outcome = judge_source(criterion("source", **rules), facts, split_program(PROGRAM)[0])  # type: ignore[arg-type]
+def test_rules_on_the_text(rules: dict[str, Any], holds: bool, rig: Rig) -> None:
+    outcome = judged(PROGRAM, rig, **rules)
     assert outcome.passed is holds, outcome.message
 
 
-def test_rule_that_is_broken_is_told_with_its_line(facts: SourceFacts) -> None:
-    rules = criterion("source", avoids=["while", "say()"], uses=["for"])
-    outcome = judge_source(rules, facts, split_program(PROGRAM)[0])  # type: ignore[arg-type]
+def test_rule_that_is_broken_is_told_with_its_line(rig: Rig) -> None:
+    outcome = judged(PROGRAM, rig, avoids=["while", "say()"], uses=["for"])
     assert outcome.message == (
         "Expected your program to do without a while loop, but line 11 has it. "
         "Expected your program to do without say(), but line 10 has it."
@@ -126,18 +126,15 @@ def test_rule_that_is_broken_is_told_with_its_line(facts: SourceFacts) -> None:
     ],
 )
 def test_hostile_texts_are_read_or_refused_inside_the_walls(text: str, error: str, rig: Rig) -> None:
-    found = facts_of(text, rig)
+    found = answers(text, rig, avoids=["say()", "import time"], uses=["for"])
     assert error in found.error
     assert bool(found.error) is bool(error)
 
 
 def test_what_is_avoided_cannot_be_hidden_behind_many_names(rig: Rig) -> None:
-    rules = criterion("source", avoids=["eval()"])
-    few = facts_of("\n".join(f"name_{i} = {i}" for i in range(300)), rig)
-    many = facts_of("\n".join(f"name_{i}({i})" for i in range(500)) + "\neval('1')", rig)
-    assert judge_source(rules, few, split_program("")[0]).passed  # type: ignore[arg-type]
-    outcome = judge_source(rules, many, split_program("")[0])  # type: ignore[arg-type]
-    assert "too many names to be sure" in outcome.message
+    many = "\n".join(f"name_{i}({i})" for i in range(9_000))
+    assert judged(many, rig, avoids=["eval()"]).passed
+    assert "line 9001 has it" in judged(f"{many}\neval('1')", rig, avoids=["eval()"]).message
 
 
 LONG = "robot_" * 12
@@ -166,23 +163,23 @@ LONG = "robot_" * 12
     ],
 )
 def test_another_name_does_not_hide_what_is_avoided(rule: str, text: str, line: int | None, rig: Rig) -> None:
-    outcome = judge_source(criterion("source", avoids=[rule]), facts_of(text, rig), split_program("")[0])  # type: ignore[arg-type]
+    outcome = judged(text, rig, avoids=[rule])
     assert outcome.passed is (line is None), outcome.message
     assert line is None or f"line {line} has it" in outcome.message
 
 
-def test_what_a_text_cannot_show_is_told_to_whoever_wants_to_look(rig: Rig) -> None:
-    found = facts_of("x = 1\nexec('s' + 'ay(1)')", rig)
-    outcome = judge_source(criterion("source", avoids=["say()"]), found, split_program("")[0])  # type: ignore[arg-type]
+def test_what_a_text_cannot_show_is_told_to_staff(rig: Rig) -> None:
+    outcome = judged("x = 1\nexec(''.join(['s', 'ay(1)']))", rig, avoids=["say()"])
     assert outcome.passed
-    assert "Line 2 has exec, which can do more than its text shows." in outcome.message
+    assert outcome.message == "The text of your program is as expected."
+    assert outcome.for_staff == "Can do more than its text shows: line 2 has exec."
 
 
 @pytest.mark.parametrize(
     ("helper", "words"),
     [
         ("import math\nfrom sklearn import svm", "line 2 of helper.py has it"),
-        ("x = 1\n" * 60_000, "helper.py has too many names to be sure"),
+        ("x = 1\n" * 60_000, "helper.py cannot be read: it has more than 300000 characters"),
         ("print 'this was never Python 3'", ""),
         ("import math", ""),
     ],
@@ -199,13 +196,30 @@ def test_files_beside_the_responder_are_read_too(helper: str, words: str, rig: R
     assert words in result.message
 
 
+SOUND: dict[str, Any] = {
+    "unread": None,
+    "uses": [["", 3]],
+    "avoids": [],
+    "in_loop": [],
+    "defines": [],
+    "shown": [None, None],
+    "doubts": [],
+}
+
+
 @pytest.mark.parametrize(
     "told",
-    [None, 3, [], {"error": None}, {"error": {"line": "x"}}, {"calls": {"say": "x"}}, {"calls": [[1, 2, 3], "ab"]}],
+    [
+        *(None, 3, [], {}, {"unread": None}),
+        *(SOUND | {"uses": uses} for uses in ([], [None, None], [3], [["x"]], [["x", "y"]], None)),
+        *(SOUND | {"doubts": doubts} for doubts in ([1], [["", "x", ""]], None)),
+        *(SOUND | {"unread": unread} for unread in (["x"], ["", "", "x"], 3)),
+    ],
 )
-def test_nonsense_from_the_reader_is_no_facts(told: Any) -> None:
-    found = SourceFacts.read(told)
-    assert found.error or not any(found.found.values())
+def test_nonsense_from_the_reader_is_no_answer(told: Any) -> None:
+    rules = criterion("source", uses=["for"])
+    assert SourceAnswers.read(SOUND, rules).uses  # type: ignore[arg-type]
+    assert SourceAnswers.read(told, rules).error == "it cannot be read"  # type: ignore[arg-type]
 
 
 def test_text_of_a_notebook_is_its_plain_cells() -> None:
@@ -215,7 +229,6 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
         "if re:\n    !ls\n",
         "%%writefile a\nx",
         "%%capture out\nimport math\n%time import json",
-        "%%writefile -a helper.py\nimport pickle",
     )
     notebook = Notebook("a.ipynb", tuple(Cell(number, text) for number, text in enumerate(cells, 1)))
     text = python_of(notebook)
@@ -223,7 +236,6 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
     assert "say" not in text
     assert "import re" in text
     assert "import math\nimport json" in text
-    assert modules_of(Submission("ada", notebook=notebook)) == (Source("helper.py", "import pickle"),)
 
 
 # what functions return

@@ -84,11 +84,19 @@ def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
 
 
 class Zygote:
-    """A process with the imports of one role loaded, from which children are forked."""
+    """A process with the imports of one role loaded, but those that it is ``without``; children are forked from it."""
 
-    def __init__(self, role: Role, walls: Walls, folders: PrivateFolders, group: ControlGroup | None = None) -> None:
+    def __init__(
+        self,
+        role: Role,
+        walls: Walls,
+        folders: PrivateFolders,
+        group: ControlGroup | None = None,
+        without: tuple[str, ...] = (),
+    ) -> None:
         self._role = role
         self._group = group
+        self._without = without
         self._walls = walls
         self._folders = folders
         self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
@@ -184,6 +192,7 @@ class Zygote:
                     "play": play,
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
+                    "without": limits.without,
                     "file_size": _FILE_BYTES,
                     "folder": folder is not None,
                     "landlock": self._walls.landlock,
@@ -249,10 +258,11 @@ class Zygote:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         code = (
             "import os, sys; os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
-            "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5:])"
+            "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5].split(), sys.argv[6:])"
         )
-        arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), *roots]
         joining = self._group.joining if self._group is not None else []
+        without = " ".join(self._without)
+        arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), without, *roots]
         try:
             self._process = subprocess.Popen(
                 [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
@@ -313,10 +323,11 @@ class Sandboxes:
         self._walls = walls
         self._group = group
         self._memory_limits: dict[Role, int] = {}  # of the newest child of each; one lives at a time
-        self._zygotes: dict[Role, Zygote] = {}
+        self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
         self._forgets_until = 0.0
+        self._cpu_of_closed = 0.0
 
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
@@ -328,7 +339,7 @@ class Sandboxes:
         if self._group is not None:
             self._memory_limits[role] = limits.memory_bytes
             self._group.make_room(sum(self._memory_limits.values()))
-        return self._zygote(role).spawn(limits, folder, meter, blamed=self._blamed)
+        return self._zygote(role, limits.without).spawn(limits, folder, meter, blamed=self._blamed)
 
     @contextlib.contextmanager
     def blaming(self) -> Iterator[None]:
@@ -367,15 +378,24 @@ class Sandboxes:
         """A folder for one trial, removed afterwards whatever the student's code has put into it."""
         return self._folders.one()
 
-    def _zygote(self, role: Role) -> Zygote:
-        if role not in self._zygotes:
-            self._zygotes[role] = Zygote(role, self._walls, self._folders, self._group)
-        return self._zygotes[role]
+    def _zygote(self, role: Role, without: tuple[str, ...] = ()) -> Zygote:
+        """Beside the usual one of a role there is one without some packages, for the job at hand.
+
+        Python's own modules are loaded in both: they are put away in the child.
+        """
+        packages = tuple(name for name in without if name.partition(".")[0] not in sys.stdlib_module_names)
+        key = (role, packages)
+        if key not in self._zygotes:
+            for other in [other for other in self._zygotes if other[0] == role and other[1] and packages]:
+                self._cpu_of_closed += self._zygotes[other].children_cpu_seconds
+                self._zygotes.pop(other).close()
+            self._zygotes[key] = Zygote(role, self._walls, self._folders, self._group, packages)
+        return self._zygotes[key]
 
     @property
     def children_cpu_seconds(self) -> float:
         """What all children that are gone have used."""
-        return sum(zygote.children_cpu_seconds for zygote in self._zygotes.values())
+        return self._cpu_of_closed + sum(zygote.children_cpu_seconds for zygote in self._zygotes.values())
 
     def close(self) -> None:
         while self._zygotes:

@@ -46,10 +46,11 @@ _MOST_GIVEN = 10_000
 
 @dataclass(frozen=True, slots=True)
 class ChildLimits:
-    """CPU seconds and bytes of memory beyond the interpreter's own."""
+    """CPU seconds, bytes of memory beyond the interpreter's own, and modules that it may not import."""
 
     cpu_seconds: float
     memory_bytes: int
+    without: tuple[str, ...] = ()
 
 
 class KilledFromOutside(HostError):

@@ -1,4 +1,4 @@
-"""What is found out about a hand-in without driving: facts of its text, values of its functions, a check's answers.
+"""What is found out about a hand-in without driving: what its text has, values of its functions, a check's answers.
 
 All of it is found inside the walls; what it is worth is decided in the modules of the kinds.
 """
@@ -6,10 +6,9 @@ All of it is found inside the walls; what it is worth is decided in the modules 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned
@@ -18,42 +17,50 @@ from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
 from service.grading.judging.function_checks import calls_of, checked
 from service.grading.judging.outcome import Outcome, fault_words
-from service.grading.judging.source_rules import SourceFacts
+from service.grading.judging.source_rules import SPEECH, SourceAnswers
 from sim.chance import Stream
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.magics import Flags
-from submissions.submission import Source
+from submissions.submission import Cell, Source
 
 _MEGABYTE = 1 << 20
 #: Much more than the longest text takes: how fast a machine is must make no difference.
-_READER_LIMITS = ChildLimits(20.0, 256 * _MEGABYTE)
-_READER_OUTPUT = 1000
+_READER_LIMITS = ChildLimits(30.0, 512 * _MEGABYTE)
+_READER_OUTPUT = 100_000
+#: What is handed to it of all files together, and of one; a little more than it reads, so that it says so.
+_MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001
+_READER = Code("source_reader.py", "from inside.source_reader import read")
+#: The names by which a responder's functions are found.
+_RESPONDERS = ("responder", "*_responder")
 
 
 @dataclass(frozen=True, slots=True)
 class HandedIn:
-    """What is looked at: the sources of the parts, the flags of the program's magic line, the responder's files."""
+    """What is looked at: the sources of the parts, the flags of the program's magic line, the responder's files.
+
+    ``own`` are those of the files that were handed in; ``cells`` those of a notebook that is the responder.
+    """
 
     program: Source | None = None
     responder: Source | None = None
     flags: Flags = field(default_factory=Flags)
     files: Mapping[str, bytes] = field(default_factory=dict)
-    modules: tuple[Source, ...] = ()  # other Python files of the hand-in's own, which the responder may import
+    own: Mapping[str, bytes] = field(default_factory=dict)
+    cells: tuple[Cell, ...] = ()
     child_seed: int = 0  # of the chance that its functions see
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """``called`` is by the id of a criterion, ``checks`` by that and the place of the trial, ``modules`` by name."""
+    """``answers`` and ``called`` are by the id of a criterion, ``checks`` by that and the place of the trial."""
 
-    facts: Mapping[str, SourceFacts] = field(default_factory=dict)
+    answers: Mapping[str, SourceAnswers] = field(default_factory=dict)
     flags: Flags = field(default_factory=Flags)
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Outcome] = field(default_factory=dict)
     walls: str = ""
-    modules: Mapping[str, SourceFacts] = field(default_factory=dict)
 
 
 class Caller(Protocol):
@@ -83,26 +90,40 @@ def look_at(
     Raises AssignmentError when a check of the instructor's fails, HostError when the machine does.
     """
     sources = {"program": handed_in.program, "responder": handed_in.responder}
-    parts: set[str] = {criterion.part for criterion in assignment.criteria if isinstance(criterion, SourceRules)}
-    facts = {part: _facts(source, caller, meter) for part in sorted(parts) if (source := sources[part]) is not None}
-    reads_modules = "responder" in facts
-    modules = {each.name: _facts(each, caller, meter) for each in handed_in.modules} if reads_modules else {}
+    answers: dict[str, SourceAnswers] = {}
     called: dict[str, Called] = {}
     checks: dict[tuple[str, int], Outcome] = {}
     for criterion in assignment.criteria:
-        if isinstance(criterion, Functions) and handed_in.responder is not None:
+        if isinstance(criterion, SourceRules) and sources[criterion.part] is not None:
+            answers[criterion.id] = _answers(criterion, handed_in, assignment, caller, meter)
+        elif isinstance(criterion, Functions) and handed_in.responder is not None:
             called[criterion.id] = _called(criterion, handed_in, assignment, caller, meter)
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
                     checks[criterion.id, place] = _check(criterion, trial, assignment, caller, meter)
     walls = next((each.walls for each in called.values()), "")
-    return Findings(facts, handed_in.flags, called, checks, walls, modules)
+    return Findings(answers, handed_in.flags, called, checks, walls)
 
 
 def reads_program(assignment: Assignment) -> bool:
     """Whether the text of the robot program is marked."""
     return any(isinstance(each, SourceRules) and each.part == "program" for each in assignment.criteria)
+
+
+def does_without(assignment: Assignment, part: Literal["program", "responder"]) -> tuple[str, ...]:
+    """The modules that a student's part may not import: what carries marks is refused when it is run, too."""
+    if getattr(assignment.parts, part) != "student":
+        return ()
+    rules = (each for each in assignment.criteria if isinstance(each, SourceRules) and each.part == part and each.marks)
+    return tuple(sorted({module for each in rules for module in each.avoided_modules}))
+
+
+def responder_limits(assignment: Assignment) -> ChildLimits:
+    """What a responder may use, whatever it is run for."""
+    limits = assignment.limits
+    without = does_without(assignment, "responder")
+    return ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, without)
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:
@@ -134,28 +155,62 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
     }
 
 
-def _facts(source: Source, caller: Caller, meter: JobMeter) -> SourceFacts:
-    reader = resources.files("responders") / "library" / "source_facts.py"
-    code = Code("source_facts.py", reader.read_text("utf-8"))
-    calls = [FunctionCall("facts", [source.text])]
-    called = caller.call(code, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, meter)
+def _answers(
+    criterion: SourceRules, handed_in: HandedIn, assignment: Assignment, caller: Caller, meter: JobMeter
+) -> SourceAnswers:
+    asked = {
+        "uses": criterion.uses,
+        "avoids": criterion.avoids,
+        "in_loop": criterion.in_loop,
+        "defines": criterion.defines,
+        "shown": SPEECH,
+        "entries": (*criterion.defines, *_entries(assignment)) if criterion.part == "responder" else criterion.defines,
+    }
+    calls = [FunctionCall("read", [list(_read_files(criterion.part, handed_in)), asked])]
+    called = caller.call(_READER, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:
-        return SourceFacts(error=f"it cannot be taken apart ({fault_words(fault)})")
-    return SourceFacts.read(called.returned[0].value)
+        return SourceAnswers(error=f"it cannot be taken apart ({fault_words(fault)})")
+    return SourceAnswers.read(called.returned[0].value, criterion)
+
+
+def _read_files(part: str, handed_in: HandedIn) -> Iterator[Mapping[str, Any]]:
+    """The part, and the Python files beside a responder, as bytes: they say themselves how they are written."""
+    source = handed_in.program if part == "program" else handed_in.responder
+    assert source is not None
+    if part == "responder" and handed_in.cells:
+        yield {"name": "", "cells": [(cell.number, cell.source) for cell in handed_in.cells]}
+    else:
+        yield {"name": "", "text": source.text[:_MOST_OF_ONE]}
+    left = _MOST_READ - len(source.text)
+    beside = {name: data for name, data in handed_in.own.items() if name.lower().endswith(".py")}
+    for name, data in beside.items() if part == "responder" else ():
+        if left > 0:
+            yield {"name": name, "bytes": data[:_MOST_OF_ONE].decode("latin-1")}
+        left -= len(data)
+
+
+def _entries(assignment: Assignment) -> Iterator[str]:
+    """The functions of a responder that are called from outside."""
+    yield from _RESPONDERS
+    if assignment.training is not None:
+        yield assignment.training.function
+    for criterion in assignment.criteria:
+        if isinstance(criterion, Functions):
+            yield from {criterion.function, *(call.function for call in criterion.calls)} - {""}
 
 
 def _called(
     criterion: Functions, handed_in: HandedIn, assignment: Assignment, caller: Caller, meter: JobMeter
 ) -> Called:
-    limits, responder = assignment.limits, handed_in.responder
+    responder = handed_in.responder
     assert responder is not None
     return caller.call(
         Code(responder.name, responder.text),
         handed_in.files,
         calls_of(criterion),
-        ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
-        limits.output_bytes,
+        responder_limits(assignment),
+        assignment.limits.output_bytes,
         Stream(handed_in.child_seed, f"calls {criterion.id}").integer(0) >> 1,
         meter,
     )

@@ -142,6 +142,7 @@ class CriterionResult:
     curves: tuple[AccuracyCurve, ...] = ()
     shown: Shown | None = None  # None where every trial is visible
     unjudged: str = ""  # why it could not be judged, for staff; empty if it was
+    for_staff: str = ""  # where somebody should look, which no student is told
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from responders.channel import Channel
 from responders.conversation import Code, ResponderOrder
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from service.grading.findings import HandedIn, look_at, reads_program
+from service.grading.findings import HandedIn, does_without, look_at, reads_program, responder_limits
 from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
@@ -33,7 +33,7 @@ from sim.world import Noise
 from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
-from submissions.plain_cells import modules_of, python_of
+from submissions.plain_cells import python_of
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
 from submissions.submission import Notebook, Source, Submission
 
@@ -157,7 +157,8 @@ def _handed_in(submission: Submission, parts: _Parts, own_seed: int) -> HandedIn
     responder = parts.responder
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
-    return HandedIn(parts.program, responder, parts.flags, parts.files, modules_of(submission), own_seed)
+    cells = parts.notebook.cells if parts.notebook is not None else ()
+    return HandedIn(parts.program, responder, parts.flags, parts.files, submission.files, cells, own_seed)
 
 
 def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
@@ -273,8 +274,7 @@ def _own_floor(name: str, picture: bytes) -> Floor:
 def _recording(order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Rig, meter: JobMeter) -> Recording:
     limits, obstacles = assignment.limits, assignment.world.obstacles
     if parts.notebook is not None:
-        child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE)
-        hand_in = NotebookHandIn(parts.notebook, parts.files, child_limits, limits.output_bytes)
+        hand_in = NotebookHandIn(parts.notebook, parts.files, responder_limits(assignment), limits.output_bytes)
         as_read = parts.marked_cell is not None and reads_program(assignment)
         return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, meter)
     recording = rig.run(order, obstacles, meter)
@@ -296,14 +296,14 @@ def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor, s
         responder = ResponderOrder(
             Code(parts.responder.name, parts.responder.text),
             parts.files,
-            ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
+            responder_limits(assignment),
             limits.output_bytes,
         )
     return TrialOrder(
         program=ProgramOrder(
             Code(parts.program.name, parts.program.text),
             parts.flags.preamble,
-            ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE),
+            ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, does_without(assignment, "program")),
             limits.output_bytes,
         ),
         responder=responder,

@@ -15,8 +15,8 @@ import numpy as np
 
 from responders.conversation import Code
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.running_child import ChildLimits
 from responders.training import Images, Named, TrainingOrder
+from service.grading.findings import responder_limits
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
 from service.grading.judging.patches import grey_picture
@@ -26,7 +26,6 @@ from sim.recording import Fault, Image, Message, Recording, Verdict
 from submissions.assignment import Assignment, Training
 from submissions.submission import Source
 
-_MEGABYTE = 1 << 20
 _HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
 _SIDE = {"focus": 14, "whole": 20}
 
@@ -56,7 +55,6 @@ def with_models_answers(
     # Not in the order of the track: neighbours on it mostly show the same.
     chance = Stream(child_seed, "order of pictures")
     orders = [sorted(range(len(pictures)), key=chance.integer) for pictures in unseen]
-    limits = assignment.limits
     named = rig.train(
         TrainingOrder(
             Code(hand_in.name, hand_in.text),
@@ -68,8 +66,8 @@ def with_models_answers(
                 _arrays([pictures[place] for place in order], training)
                 for pictures, order in zip(unseen, orders, strict=True)
             ],
-            ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
-            limits.output_bytes,
+            responder_limits(assignment),
+            assignment.limits.output_bytes,
             child_seed,
         ),
         meter,

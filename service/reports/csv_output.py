@@ -17,11 +17,11 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 def marks_csv(grades: Sequence[Grade]) -> str:
-    """One row a grade: student, assignment, marks, verdict, accuracy, hashes, then a column a criterion."""
+    """One row a grade: student, assignment, marks, verdict, accuracy, hashes, a column a criterion, words for staff."""
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = ["student", "assignment", "marks", "max_marks", "verdict"]
     header += ["accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version"]
-    header += [f"marks: {criterion}" for criterion in criteria]
+    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff"]
     return _table([header, *(_row(grade, criteria) for grade in grades)])
 
 
@@ -52,6 +52,7 @@ def _row(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.submission,
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
+        "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
     ]
 
 

@@ -30,6 +30,7 @@ def json_document(grade: Grade) -> dict[str, Any]:
                 "marks": json_number(result.marks),
                 "max_marks": json_number(result.max_marks),
                 "message": storable(result.message),
+                **({"for_staff": storable(result.for_staff)} if result.for_staff else {}),
             }
             for result in grade.criteria
         ],

@@ -36,6 +36,7 @@ class CriterionLine:
     state: str  # full, part, none
     visibility: str
     where: str
+    for_staff: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +183,7 @@ def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:
         state="full" if full else ("part" if result.marks > 0 else "none"),
         visibility=result.visibility,
         where="" if full or failed is None else _where(grade, failed),
+        for_staff=readable(result.for_staff, 1000, lines=4),
     )
 
 

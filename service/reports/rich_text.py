@@ -44,6 +44,8 @@ def marks_table(grade: Grade) -> Table:
         style = "green" if full else ("red" if result.marks == 0 else "yellow")
         marks = Text(f"{number(result.marks)} / {number(result.max_marks)}", style=style)
         message = Text(readable(result.message, 600, lines=6), style="dim")
+        if result.for_staff:
+            message.append(f"\nFor staff: {readable(result.for_staff, 600)}")
         table.add_row(marks, Group(Text(one_line(result.title)), message))
     return table
 

@@ -25,6 +25,8 @@ def plain_text(grade: Grade) -> str:
         marks = f"{number(result.marks)}/{number(result.max_marks)}"
         lines += _wrapped(f"{marks:>9}  {one_line(result.title)}", indent=11)
         lines += _wrapped(" " * 11 + readable(result.message, 600, lines=6), indent=11)
+        if result.for_staff:
+            lines += _wrapped(" " * 11 + f"For staff: {readable(result.for_staff, 600)}", indent=11)
     lines += ["", *_wrapped(f"{words.happened} {words.whose} {words.next_step}")]
     for group in fault_groups(grade):
         lines += ["", *_fault_lines(group)]

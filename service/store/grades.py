@@ -147,6 +147,7 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         unjudged=result.unjudged or None,
         sights=sights,
         shown=result.shown and to_plain(result.shown),
+        for_staff=result.for_staff,
     )
 
 
@@ -199,6 +200,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
         shown=None if row.shown is None else from_plain(Shown, row.shown),
         unjudged=row.unjudged or "",
+        for_staff=row.for_staff,
     )
 
 

@@ -307,6 +307,7 @@ class CriterionRow(Base):
     unjudged: Mapped[str | None]  # why it could not be judged; staff have to look
     sights: Mapped[Any]
     shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} as of the visible trials alone
+    for_staff: Mapped[str] = mapped_column(default="")  # where somebody should look, which no student is told
 
 
 class Artifact(Base):

@@ -33,6 +33,8 @@ CONSTRUCTS = (
     "dict",
     "comprehension",
 )
+#: Begins what names a module.
+IMPORT = "import "
 
 
 class SourceRules(CriterionBase):
@@ -42,7 +44,8 @@ class SourceRules(CriterionBase):
     ``tank_drive.on()``, ``on_for_*()`` with any ending), imports (``import time``) and names (``colorLeft``,
     ``colorLeft.rgb``). A name without a dot is found behind a dot as well: ``on()`` is also
     ``tank_drive.on()``. ``in_loop`` lists calls that must stand inside a loop, ``defines`` functions that must
-    be defined. ``flags`` are flags that the magic line must have: ``["-b Simple_Shapes", "-R"]``.
+    be defined. ``flags`` are flags that the magic line must have: ``["-b Simple_Shapes", "-R"]``. A module that
+    it ``avoids`` cannot be imported either when the part is run.
 
     The score is the part of all this that holds.
     """
@@ -75,6 +78,12 @@ class SourceRules(CriterionBase):
         if not all(text.endswith("()") for text in value):
             raise ValueError('has what is no call, expected calls like "say()"')
         return value
+
+    @property
+    def avoided_modules(self) -> Texts:
+        """``sklearn`` for ``import sklearn``."""
+        names = (text.removeprefix(IMPORT).strip() for text in self.avoids if text.startswith(IMPORT))
+        return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -9,8 +9,6 @@ import datetime
 from collections.abc import Callable
 from typing import Any
 
-import pandas as pd
-
 _EPOCH = datetime.datetime(2020, 1, 1)
 
 
@@ -40,6 +38,8 @@ class RoboSim:
         """The logged images: a data frame of side, vals and clock, or the raw list."""
         if datatype == "raw":
             return self.raw_image_data
+        import pandas as pd  # here alone: some assignments do without it
+
         rows = []
         for entry in self.raw_image_data:
             side, values, clock = entry.split(" ")[:3]

@@ -97,7 +97,8 @@ def install(shell: Any) -> None:
         "matplotlib.pyplot": {"hist": lambda *args, **kwargs: (Unseen(), Unseen(), Unseen())},
     }
     sys.meta_path.insert(0, _Finder(known))
-    _hide_pandas_plots()
+    if "pandas" in sys.modules:
+        _hide_pandas_plots()
 
 
 def _hide_pandas_plots() -> None:

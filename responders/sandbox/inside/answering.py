@@ -50,8 +50,10 @@ class Responder:
         student_code.install_output(self._emit)
         determinism.install_clock(lambda: self._units, self._sleep)
         determinism.install_chance(self._job["seed"])
-        refusals.install(self._grants.read, self._name, self._refused)
+        refusals.install(self._grants, self._name, self._refused)
         model_files.install_version_notes(self._name, self._refused)
+        # Last, so that no file of the student's stands in for a library's.
+        sys.path.append(os.getcwd())
         module = types.ModuleType("__main__")
         sys.modules["__main__"] = module
         self._namespace = module.__dict__

@@ -68,6 +68,17 @@ def expanded(line: str, names: Mapping[str, Any]) -> str:
         return line
 
 
+def expressions(line: str) -> Iterator[str]:
+    """The Python that ``expanded`` works out, as far as the line can be taken apart."""
+    try:
+        for literal, expression, _, _ in string.Formatter().parse(line):
+            yield from (match["name"] for match in _DOLLAR.finditer(literal) if match["name"])
+            if expression is not None:
+                yield expression
+    except ValueError:
+        return
+
+
 def _expanded(line: str, names: Mapping[str, Any]) -> Iterator[str]:
     formatter = string.Formatter()
     for literal, expression, form, conversion in formatter.parse(line):

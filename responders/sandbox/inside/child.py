@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import dataclasses
 import os
 import resource
 import signal
@@ -51,7 +52,7 @@ def start(
         wire.send(_walls(order, grants, zygote))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
-        role(wire, grants)
+        role(wire, dataclasses.replace(grants, without=tuple(order["without"])))
     finally:
         os._exit(0)
 

@@ -45,14 +45,18 @@ _SYSTEM = (
 )
 
 
-def readable(roots: list[str]) -> tuple[str, ...]:
-    """Files and folders that may be read."""
-    return tuple({*roots, *_standard_library(), *_packages(), *_system_libraries(), *_SYSTEM})
+def readable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Files and folders that may be read: nothing of what is ``closed``, not even where it lies in one of them."""
+    granted = {*roots, *_standard_library(), *_packages(), *_system_libraries(), *_SYSTEM}
+    return tuple({path for place in granted for path in _outside(place, {os.path.realpath(path) for path in closed})})
 
 
-def listable() -> tuple[str, ...]:
-    """Folders whose names may be listed, as the import system does."""
-    return tuple({path for key in ("purelib", "platlib") if (path := sysconfig.get_path(key))})
+def listable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Folders whose names may be listed, as the import system does; those round what is ``closed`` can be no more."""
+    sites = _site_folders()
+    tops = tuple(f"{folder}/" for folder in (*sites, *roots))
+    round_closed = {folder for path in closed for folder in _folders_above(path) if f"{folder}/".startswith(tops)}
+    return tuple(sites | round_closed)
 
 
 def open_to_others(paths: tuple[str, ...]) -> bool:
@@ -91,8 +95,30 @@ def _standard_library() -> Iterator[str]:
                 yield os.path.join(folder, name)
 
 
+def _outside(place: str, closed: set[str]) -> Iterator[str]:
+    """``place``, or what lies in it and is not closed."""
+    real = os.path.realpath(place)
+    if real in closed:
+        return
+    if any(path.startswith(f"{real}/") for path in closed):
+        for name in os.listdir(place):
+            yield from _outside(os.path.join(place, name), closed)
+    else:
+        yield place
+
+
+def _folders_above(path: str) -> Iterator[str]:
+    while (above := os.path.dirname(path)) != path:
+        yield above
+        path = above
+
+
+def _site_folders() -> set[str]:
+    return {path for key in ("purelib", "platlib") if (path := sysconfig.get_path(key))}
+
+
 def _packages() -> Iterator[str]:
-    for folder in listable():
+    for folder in _site_folders():
         for name in os.listdir(folder):
             if name in _PACKAGES:
                 yield os.path.join(folder, name)

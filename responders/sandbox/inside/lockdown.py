@@ -49,6 +49,7 @@ class Grants:
     list_only: tuple[str, ...] = ()
     write: int | None = None  # a descriptor of the folder
     open_to_others: bool = False  # whether a user who owns nothing could read them
+    without: tuple[str, ...] = ()  # modules that student code does without
 
 
 def landlock_version() -> int:

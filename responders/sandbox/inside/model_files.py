@@ -65,6 +65,8 @@ def explain_joblib() -> None:
 
 def install_version_notes(name: str, tell: Callable[[str, int | None], None]) -> None:
     """Tell, once for each version, that a model was saved by another scikit-learn; other warnings are shown as ever."""
+    if "sklearn" not in sys.modules:
+        return
     from sklearn.exceptions import InconsistentVersionWarning
 
     show = warnings.showwarning

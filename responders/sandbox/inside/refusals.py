@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from . import withheld
+from .lockdown import Grants
 from .student_code import line_of
 
 NETWORK = "programs here may not open network connections"
@@ -33,19 +35,23 @@ _SENTENCES = {
 }
 
 
-def install(readable: tuple[str, ...], name: str, tell: Callable[[str, int | None], None]) -> None:
+def install(grants: Grants, name: str, tell: Callable[[str, int | None], None]) -> None:
     """Refuse with a sentence from now on; ``tell(sentence, line)`` for the first few, line being the student's."""
     here = os.getcwd()
     own = (here,) if here != "/" else ()
-    folders = tuple(path.rstrip("/") + "/" for path in (*readable, *own))
-    files = frozenset((*readable, *own))
+    libraries = tuple(path.rstrip("/") + "/" for path in grants.read)
+    folders = (*libraries, *(f"{path}/" for path in own))
+    files = frozenset((*grants.read, *own))
     told: set[tuple[str, int | None]] = set()
 
-    def refuse(sentence: str) -> PermissionError:
+    def note(sentence: str) -> None:
         line = line_of(sys._getframe(), name)
         if (sentence, line) not in told and len(told) < _MOST_TOLD:
             told.add((sentence, line))
             tell(sentence, line)
+
+    def refuse(sentence: str) -> PermissionError:
+        note(sentence)
         return PermissionError(1, sentence)
 
     def hook(event: str, args: tuple[Any, ...]) -> None:
@@ -61,3 +67,6 @@ def install(readable: tuple[str, ...], name: str, tell: Callable[[str, int | Non
                 raise PermissionError(1, FILES)
 
     sys.addaudithook(hook)
+    if grants.without:
+        ours = (os.path.dirname(__file__), "<preamble>")
+        withheld.put_away(grants.without, (*grants.read, *libraries, *ours), note)

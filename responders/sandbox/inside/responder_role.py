@@ -5,14 +5,17 @@ What runs then is in ``answering.py`` and ``notebook_role.py``.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 
-from . import model_files
+from . import model_files, source_reader  # noqa: F401
 from .answering import Responder
 from .frames import Wire
 from .lockdown import Grants
 from .notebook_role import Player
 
+#: What answering takes.
+NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
 _PRELOADED = (
     "joblib",
     "numpy",
@@ -33,20 +36,22 @@ _PRELOADED = (
     "math",
     "re",
     "statistics",
-    "nbev3devsim.load_nbev3devwidget",
     "nn_tools.network_views",
     "nn_tools.sensor_data",
     "nn_tools.weights",
 )
 
 
-def preload() -> None:
-    """Import what responders use, before any fork."""
+def preload(without: list[str]) -> None:
+    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
+    missing = (ImportError,) if without else ()
     for name in _PRELOADED:
-        importlib.import_module(name)
+        with contextlib.suppress(*missing):
+            importlib.import_module(name)
     model_files.preload_onnx()
-    model_files.explain_joblib()
-    _ask_the_machine()
+    with contextlib.suppress(*missing):
+        model_files.explain_joblib()
+        _ask_the_machine()
 
 
 def _ask_the_machine() -> None:

@@ -9,6 +9,7 @@ import array
 import contextlib
 import ctypes
 import gc
+import importlib
 import json
 import os
 import signal
@@ -21,8 +22,11 @@ _PR_SET_DUMPABLE = 4
 _ENDED = (ctypes.c_char * 152)()  # the status and, from the eighth byte, what was used; zeroes but for a moment
 
 
-def main(role_name: str, folders: str, roots: list[str]) -> None:
-    """Serve orders on descriptor 3 until the worker closes it. ``folders`` is where children have theirs."""
+def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
+    """Serve orders on descriptor 3 until the worker closes it.
+
+    ``folders`` is where children have theirs, ``without`` are modules that none of them may have.
+    """
     _before_the_worker()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -30,17 +34,20 @@ def main(role_name: str, folders: str, roots: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, child, determinism, doorkeeper, grants, lockdown, refusals, student_code  # noqa: F401
+    from . import battery, child, determinism, doorkeeper, grants, lockdown, refusals, withheld  # noqa: F401
 
     control = socket.socket(fileno=3)
-    readable = grants.readable(roots)
-    allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
-    door, keeper = doorkeeper.start(allowed, control.fileno())
     if role_name == "robot":
         from . import robot_role as role
     else:
         from . import responder_role as role  # type: ignore[no-redef]
-    role.preload()
+    for name in role.NEEDED:
+        importlib.import_module(name)
+    closed = withheld.keep_out(tuple(without))
+    readable = grants.readable(roots, closed)
+    allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
+    door, keeper = doorkeeper.start(allowed, control.fileno())
+    role.preload(without)
     plays = {"role": role.run, "battery": battery.run}
     zygote = os.getpid()
     _one_thread()

@@ -156,7 +156,7 @@ def judge_one(
 ) -> CriterionResult:
     """The result of one criterion; ``results`` are those of the criteria before it in turn, by id."""
     if isinstance(criterion, SourceRules | Functions):
-        return _judged_once(criterion, findings)
+        return _judged_once(criterion, findings, trials)
     own = [
         (index, trial)
         for index, trial in enumerate(trials)
@@ -180,11 +180,13 @@ def judge_one(
     )
 
 
-def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> CriterionResult:
+def _judged_once(
+    criterion: SourceRules | Functions, findings: Findings, trials: SequenceOf[TrialResult]
+) -> CriterionResult:
     """For what is looked at once a hand-in: no trial is its evidence."""
     if isinstance(criterion, SourceRules):
-        modules = findings.modules if criterion.part == "responder" else {}
-        outcome = judge_source(criterion, findings.facts.get(criterion.part), findings.flags, modules)
+        driven = trials if criterion.part == "program" else ()
+        outcome = judge_source(criterion, findings.answers.get(criterion.id), findings.flags, driven)
     else:
         outcome = judge_functions(criterion, findings.called.get(criterion.id))
     share = Fraction(outcome.passed) if criterion.over == "all" else outcome.score
@@ -195,6 +197,7 @@ def _judged_once(criterion: SourceRules | Functions, findings: Findings) -> Crit
         max_marks=criterion.marks,
         message=outcome.message,
         visibility=criterion.visibility,
+        for_staff=outcome.for_staff,
     )
 
 

@@ -25,12 +25,17 @@ class Outcome:
     t: float | None = None
     pose: Pose | None = None
     measures: tuple[Measure, ...] = ()
+    for_staff: str = ""  # where somebody should look, which no student is told
 
 
 def passed(
-    message: str, t: float | None = None, pose: Pose | None = None, measures: tuple[Measure, ...] = ()
+    message: str,
+    t: float | None = None,
+    pose: Pose | None = None,
+    measures: tuple[Measure, ...] = (),
+    for_staff: str = "",
 ) -> Outcome:
-    return Outcome(True, Fraction(1), message, t, pose, measures)
+    return Outcome(True, Fraction(1), message, t, pose, measures, for_staff)
 
 
 def failed(
@@ -39,9 +44,10 @@ def failed(
     pose: Pose | None = None,
     score: Fraction = Fraction(0),
     measures: tuple[Measure, ...] = (),
+    for_staff: str = "",
 ) -> Outcome:
     """``score`` is kept below 1: everything may have been there, and yet in the wrong order."""
-    return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose, measures)
+    return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose, measures, for_staff)
 
 
 def quoted(text: str) -> str:

@@ -1,4 +1,4 @@
-"""For staff: why a criterion could not be judged, and what our own code stumbled over in a trial."""
+"""For staff: what to look at in a criterion, why it could not be judged, what our own code stumbled over in a trial."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ depends_on = None
 
 
 def upgrade() -> None:
+    op.add_column("criterion_result", sa.Column("for_staff", SafeText(), nullable=False, server_default=""))
     op.add_column("criterion_result", sa.Column("unjudged", SafeText(), nullable=True))
     op.add_column("trial", sa.Column("surprise", SafeText(), nullable=True))
 

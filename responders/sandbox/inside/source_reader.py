@@ -1,0 +1,253 @@
+"""Reads the files of a submission, and says where they have what each rule names; a parser can be made to crash.
+
+Whether a rule is broken, and what to tell of it, is the worker's to say.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.machinery
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from . import cell_source
+from .source_walk import Mention, Place, Unit, Walk
+from .source_words import CONSTRUCTS
+from .withheld import rule_for
+
+_IMPORT = "import "
+_CONSTRUCTS = frozenset({*CONSTRUCTS.values(), "else"})
+_LONGEST_TEXT = 300_000
+_LONGEST_IN_ALL = 1_000_000
+#: Deep enough for all that the parser lets through.
+_DEEPEST_WALK = 30_000
+_MOST_DOUBTS = 4
+_LONGEST_NAME = 60
+#: What robot programs import, which is not on a responder's path, and what a notebook has stand-ins for.
+_OF_THE_COURSE = frozenset({"ev3dev2", "ev3dev2_glue", "brick_link", "brick_preambles"})
+_SHOWING = frozenset({"matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", "plotly", "pylab", "mpl_toolkits"})
+
+Answer = list[Any] | None
+#: Of each kind of mention, the first place of each name.
+Places = Mapping[str, Mapping[str, Place]]
+
+
+def read(files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """The answers for rules ``asked``: lists of ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown``, ``entries``.
+
+    Each of ``files`` has a ``name`` (empty: the part itself) and a ``text``, ``bytes`` (as Latin-1) or ``cells``.
+    An answer is a file's name and a line, or None. ``unread`` is the first file that cannot be read, and why; of files
+    beside the part, and of cells, that are no Python it is not told, because they cannot be run either.
+    """
+    reading = _Reading(files)
+    units = reading.units
+    everything = _places((mention, place) for unit in units for mention, place in unit.mentions.items())
+    run = _places(_run(units, asked["entries"]))
+    return {
+        "unread": reading.unread,
+        "uses": [_first(run, rule, _USED) for rule in asked["uses"]],
+        "avoids": [_first(everything, rule, _AVOIDED) for rule in asked["avoids"]],
+        "in_loop": [_first(run, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
+        "defines": [_answer(run["function"].get(name)) for name in asked["defines"]],
+        "shown": [_first(everything, rule, _AVOIDED) for rule in asked["shown"]],
+        "doubts": _doubts(everything, asked["avoids"])[:_MOST_DOUBTS] if asked["avoids"] else [],
+    }
+
+
+class _Reading:
+    """All files, read one after the other, and those that a notebook writes."""
+
+    def __init__(self, files: Sequence[Mapping[str, Any]]) -> None:
+        self.units: list[Unit] = []
+        self.unread: list[Any] | None = None
+        self._left = _LONGEST_IN_ALL
+        self._own = {str(file["name"]).partition(".")[0] for file in files}
+        for file in files:
+            self._read(file)
+
+    def _read(self, file: Mapping[str, Any]) -> None:
+        name = str(file["name"])
+        walk = Walk(self._is_known)
+        if "cells" in file:
+            for number, cell in file["cells"]:
+                self._read_cell(walk, f"cell {number}", cell)
+        else:
+            source = file["bytes"].encode("latin-1") if "bytes" in file else file["text"]
+            tree = self._parsed(source, name)
+            if tree is not None:
+                unit = Unit(name.partition(".")[0], always=not name)
+                self._guarded(name, lambda: walk.read(tree, name, unit))
+        self.units += walk.units
+        for written, text in walk.written:
+            self._own.add(written.partition(".")[0])
+            self._read({"name": written or "a file", "text": text})
+
+    def _read_cell(self, walk: Walk, name: str, cell: str) -> None:
+        magic = cell_source.cell_magic(cell)
+        unit = Unit("", always=True)
+        if magic is not None:
+            self._guarded(name, lambda: walk.read_magic(magic, name, unit))
+            return
+        tree = self._parsed(cell_source.python_source(cell), name)
+        if tree is not None:
+            self._guarded(name, lambda: walk.read(tree, name, unit))
+
+    def _parsed(self, source: str | bytes, name: str) -> ast.Module | None:
+        self._left -= len(source)
+        try:
+            if len(source) > _LONGEST_TEXT:
+                self._cannot(name, f"it has more than {_LONGEST_TEXT} characters")
+            elif self._left < 0:
+                self._cannot(name, f"with the others it has more than {_LONGEST_IN_ALL} characters")
+            else:
+                return ast.parse(source)
+        except SyntaxError as error:
+            if not name:
+                self._cannot(name, str(error.msg)[:200], error.lineno)
+        except ValueError:
+            if not name:
+                self._cannot(name, "it has characters that no Python file has")
+        except (RecursionError, MemoryError):
+            self._cannot(name, "it is nested too deeply")
+        return None
+
+    def _guarded(self, name: str, walk: Callable[[], None]) -> None:
+        limit = sys.getrecursionlimit()
+        sys.setrecursionlimit(_DEEPEST_WALK)
+        try:
+            walk()
+        except (RecursionError, MemoryError):
+            self._cannot(name, "it is nested too deeply")
+        finally:
+            sys.setrecursionlimit(limit)
+
+    def _cannot(self, name: str, why: str, line: int | None = None) -> None:
+        if self.unread is None:
+            self.unread = [name[:_LONGEST_NAME], why, line]
+
+    def _is_known(self, top: str) -> bool:
+        if top in sys.stdlib_module_names or top in self._own | _OF_THE_COURSE | _SHOWING:
+            return True
+        return importlib.machinery.PathFinder.find_spec(top) is not None
+
+
+# what is run
+
+
+def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mention, Place]]:
+    """What is mentioned by code that can be run at all; ``looped`` is true where a loop leads to it.
+
+    A function is run if its name is used by what is run, whoever's function of that name it is; all are if something
+    may be taken by any name.
+    """
+    any_name = any(mention.kind == "any_name" for unit in units for mention in unit.mentions)
+    by_name: dict[str, list[Unit]] = defaultdict(list)
+    for unit in units:
+        by_name[unit.name].append(unit)
+        if unit.owner and unit.name.startswith("__"):
+            by_name[unit.owner].append(unit)
+    used: dict[str, bool] = {}  # names, and whether in a loop
+    looped: dict[Unit, bool] = {}  # units that are run, and whether a loop leads there
+
+    def way_to(unit: Unit) -> bool | None:
+        """Whether a loop leads to the unit; None if nothing does."""
+        if not unit.made or (unit.made_in is not None and unit.made_in not in looped):
+            return None
+        names = (unit.name, unit.owner) if unit.name.startswith("__") else (unit.name,)
+        ways = [used[name] for name in names if name in used]
+        entry = unit.made_in is not None and any(fnmatchcase(unit.name, pattern) for pattern in entries)
+        return any(ways) if ways or entry or unit.always or any_name else None
+
+    waiting = list(units)
+    while waiting:
+        unit = waiting.pop()
+        way = way_to(unit)
+        if way is None or (unit in looped and looped[unit] >= way):
+            continue
+        looped[unit] = way
+        waiting += unit.units
+        for mention in unit.mentions:
+            if not mention.live or mention.kind in ("construct", "function", "doubt", "any_name"):
+                continue
+            in_loop = way or mention.looped
+            for name in mention.name.split("."):
+                if name not in used or used[name] < in_loop:
+                    used[name] = in_loop
+                    waiting += by_name.get(name, ())
+    for unit, way in looped.items():
+        for mention, place in unit.mentions.items():
+            if mention.live:
+                yield mention._replace(looped=way or mention.looped), place
+
+
+# rules
+
+#: Which kinds of mention answer a call, a module and a name.
+_USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
+_AVOIDED = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
+
+
+def _places(mentions: Iterable[tuple[Mention, Place]]) -> Places:
+    found: dict[str, dict[str, Place]] = defaultdict(dict)
+    for mention, place in mentions:
+        for kind in (mention.kind, "looped") if mention.kind == "call" and mention.looped else (mention.kind,):
+            found[kind][mention.name] = min(place, found[kind].get(mention.name, place))
+    return found
+
+
+def _first(places: Places, rule: str, kinds: Mapping[str, Sequence[str]]) -> Answer:
+    if rule in _CONSTRUCTS:
+        return _answer(places["construct"].get(rule))
+    form = "()" if rule.endswith("()") else _IMPORT if rule.startswith(_IMPORT) else ""
+    fits = [place for kind in kinds.get(form, ()) for name, place in places[kind].items() if _MATCHES[form](name, rule)]
+    return _answer(min(fits, default=None))
+
+
+def _is_called(name: str, rule: str) -> bool:
+    pattern = rule.removesuffix("()")
+    return fnmatchcase(name, pattern) or fnmatchcase(name, f"*.{pattern}")
+
+
+def _is_imported(name: str, rule: str) -> bool:
+    return rule_for(name, (_module(rule),)) is not None
+
+
+def _is_named(name: str, rule: str) -> bool:
+    return f".{rule}." in f".{name}."
+
+
+_MATCHES = {"()": _is_called, _IMPORT: _is_imported, "": _is_named}
+
+
+def _module(rule: str) -> str:
+    return rule.removeprefix(_IMPORT).strip()
+
+
+def _doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
+    """What could be what a rule avoids, or hide it: the file, the line and the words, in the order of the files."""
+    found: dict[Place, str] = {}
+    for kind in ("doubt", "any_name"):
+        for what, place in places[kind].items():
+            found.setdefault(place, what)
+    for rule in rules:
+        for what, place in _look_alikes(places, rule):
+            found.setdefault(place, what)
+    return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(found.items())]
+
+
+def _look_alikes(places: Places, rule: str) -> Iterable[tuple[str, Place]]:
+    if rule.endswith("()"):
+        yield from ((name, place) for name, place in places["unsure"].items() if _is_called(name, rule))
+        owner, _, last = rule.removesuffix("()").rpartition(".")
+        if owner and any(_is_called(name, f"{last}()") for name in places["call"]):
+            yield from ((name, place) for name, place in places["handed_on"].items() if _is_named(name, owner))
+    elif rule.startswith(_IMPORT) and "." not in _module(rule):
+        for kind in ("import", "through"):
+            yield from ((name, place) for name, place in places[kind].items() if f".{_module(rule)}." in f"{name}.")
+
+
+def _answer(place: Place | None) -> Answer:
+    return None if place is None else [place.file[:_LONGEST_NAME], place.line]

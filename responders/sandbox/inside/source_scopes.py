@@ -1,0 +1,141 @@
+"""What names mean in a Python file: other names of things, and which names the file itself has given to something.
+
+It follows assignments and imports as they stand, and knows nothing of values.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from .source_names import bound_in, dotted, root
+from .source_words import TABLE_CALLS
+
+_MOST_NAMES = 8
+
+
+@dataclass(slots=True)
+class _Scope:
+    """``bound`` is what it binds somewhere, ``so_far`` above the place that is read, ``sure`` on every way to it."""
+
+    kind: str  # module, class, function, comprehension
+    bound: set[str] = field(default_factory=set)
+    so_far: set[str] = field(default_factory=set)
+    sure: set[str] = field(default_factory=set)
+
+
+class Naming:
+    """The names of one file, while it is walked through."""
+
+    def __init__(self) -> None:
+        self._scopes = [_Scope("module")]
+        self._stands_for: dict[str, set[str]] = {}
+        self._imported: set[str] = set()
+        #: Names that are bound or unbound from elsewhere.
+        self._unsure: set[str] = set()
+
+    def learn(self, tree: ast.Module) -> None:
+        """Take note of all assignments and imports in a tree, before it is walked through."""
+        for node in ast.walk(tree):
+            match node:
+                case ast.Import(names=aliases):
+                    for alias in aliases:
+                        bound = alias.asname or alias.name.partition(".")[0]
+                        self._note(bound, alias.name if alias.asname else bound, imported=True)
+                case ast.ImportFrom(module=module, names=aliases):
+                    for alias in aliases:
+                        self._note(alias.asname or alias.name, f"{module or ''}.{alias.name}", imported=True)
+                case ast.Assign(targets=targets, value=value):
+                    for target in targets:
+                        self._assigned(target, value)
+                case ast.NamedExpr(target=target, value=value):
+                    self._assigned(target, value)
+                case ast.AnnAssign(target=target, value=ast.expr() as value):
+                    self._assigned(target, value)
+                case ast.arguments():
+                    self._defaults(node)
+                case ast.Global(names=names):
+                    self._unsure |= set(names)
+                case ast.Delete(targets=deleted):
+                    self._unsure |= {target.id for target in deleted if isinstance(target, ast.Name)}
+        self._scopes[0].bound |= bound_in(tree.body)
+
+    def names(self, node: ast.AST) -> list[str]:
+        """The dotted name of a chain, and what it is where its first name stands for something else."""
+        name, first = dotted(node), root(node)
+        found, waiting = [name], [first] if first else []
+        while waiting and len(found) < _MOST_NAMES:
+            for other in sorted(self._stands_for.get(waiting.pop(), ())):
+                whole = f"{other}{name.removeprefix(first)}"
+                if whole not in found:
+                    found.append(whole)
+                    waiting.append(other)
+        return found
+
+    def is_imported(self, node: ast.AST) -> bool:
+        """Whether a chain begins with something that was imported."""
+        return root(node) in self._imported
+
+    def own(self, name: str) -> bool | None:
+        """Whether a name that is read here is one that the text gave to something itself; None if that is not sure."""
+        later = False
+        for scope in reversed(self._scopes[1:]):
+            if scope.kind == "class":
+                if scope is self._scopes[-1] and name in scope.so_far:
+                    return True if name in scope.sure else None
+                continue
+            if name in scope.bound:
+                return True
+            later = later or scope.kind == "function"
+        module = self._scopes[0]
+        if name in module.sure and name not in self._unsure:
+            return True
+        unsure = name in module.so_far or (later and (name in module.bound or name in self._unsure))
+        return None if unsure else False
+
+    @contextlib.contextmanager
+    def scope(self, kind: str, bound: set[str] | None = None) -> Iterator[None]:
+        self._scopes.append(_Scope(kind, bound or set()))
+        yield
+        self._scopes.pop()
+
+    @contextlib.contextmanager
+    def block(self) -> Iterator[None]:
+        """Code that may be passed by: what it binds is not sure below it."""
+        scope = self._scopes[-1]
+        before = set(scope.sure)
+        yield
+        scope.sure = before
+
+    def bind(self, names: set[str], *, sure: bool = True) -> None:
+        """From here on these names are bound, or may be."""
+        scope = self._scopes[-1]
+        scope.so_far |= names
+        if sure:
+            scope.sure |= names
+
+    def _note(self, name: str, stands_for: str, *, imported: bool = False) -> None:
+        self._stands_for.setdefault(name, set()).add(stands_for)
+        if imported:
+            self._imported.add(name)
+
+    def _assigned(self, target: ast.AST, value: ast.AST) -> None:
+        if isinstance(target, ast.Tuple | ast.List) and isinstance(value, ast.Tuple | ast.List):
+            for one, other in zip(target.elts, value.elts, strict=False):
+                self._assigned(one, other)
+        elif isinstance(target, ast.Name):
+            if isinstance(value, ast.Call) and dotted(value.func) in TABLE_CALLS:
+                self._note(target.id, dotted(value.func))
+            elif root(value):
+                self._note(target.id, dotted(value))
+
+    def _defaults(self, arguments: ast.arguments) -> None:
+        given = [*arguments.posonlyargs, *arguments.args]
+        with_default = given[len(given) - len(arguments.defaults) :]
+        pairs = [*zip(with_default, arguments.defaults, strict=True)]
+        pairs += [(one, each) for one, each in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if each]
+        for argument, default in pairs:
+            if root(default):
+                self._note(argument.arg, dotted(default))

@@ -1,0 +1,424 @@
+"""Walks through a syntax tree and writes down what stands in it: where, whether it can be come to, whether in a loop.
+
+It runs nothing of what it reads, and judges nothing: what the rules make of it is ``source_reader.py``'s.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from . import cell_source
+from .source_names import (
+    arguments_of,
+    blocks,
+    bound_in,
+    declared_elsewhere,
+    ends,
+    is_empty,
+    surely_bound,
+    text_of,
+    truth,
+)
+from .source_scopes import Naming
+from .source_words import (
+    CONSTRUCTS,
+    DOUBTFUL,
+    DOUBTFUL_ALONE,
+    DOUBTFUL_MODULES,
+    GETTERS,
+    IMPORTERS,
+    MAGICS,
+    RUNNERS,
+    TABLES,
+    TAKES_NAME,
+    TAKES_NAMES,
+)
+
+_DEEPEST = 8
+
+
+class Mention(NamedTuple):
+    """Something that stands in a file; ``live`` if the code that is run with its unit can come to it.
+
+    The kinds are ``construct``, ``function`` (it is defined), ``name``, ``call``, ``handed_on`` (kept or given away),
+    ``base`` (something of it is asked for), ``unsure`` (handed on, if it is not a name of the text's own), ``import``,
+    ``through`` (something of a module), ``taken`` (out of a module), ``doubt`` and ``any_name``, which is doubt about
+    what may take anything by its name.
+    """
+
+    kind: str
+    name: str
+    live: bool
+    looped: bool
+
+
+class Place(NamedTuple):
+    """A file's name, as messages have it, and a line."""
+
+    file: str
+    line: int
+
+
+@dataclass(eq=False, slots=True)
+class Unit:
+    """Code that is run at one go: a file's or a function's own. ``owner`` is the class that it is a method of.
+
+    Of each mention the first place is kept.
+    """
+
+    name: str
+    owner: str = ""
+    made_in: Unit | None = None
+    made: bool = True  # its definition can be come to
+    always: bool = False  # it is run without being named
+    mentions: dict[Mention, Place] = field(default_factory=dict)
+    units: list[Unit] = field(default_factory=list)
+
+
+class _Here(NamedTuple):
+    live: bool = True
+    looped: bool = False
+
+
+class Walk:
+    """What stands in one file, or in the cells of one notebook."""
+
+    def __init__(self, is_known: Callable[[str], bool]) -> None:
+        """``is_known`` tells of a top module whether it is a library or among the files."""
+        self.units: list[Unit] = []
+        #: Files that a notebook writes: names and texts.
+        self.written: list[tuple[str, str]] = []
+        self._is_known = is_known
+        self._naming = Naming()
+        self._file = ""
+        self._unit = Unit("")
+        self._owner = ""
+        self._understood: set[ast.AST] = set()  # pieces that are doubtful, but show what they take
+        self._depth = 0
+
+    def read(self, tree: ast.Module, file: str, unit: Unit) -> None:
+        """Add what stands in ``tree``; ``file`` is its name in messages."""
+        self._begin(file, unit)
+        self._naming.learn(tree)
+        self._statements(tree.body, _Here())
+
+    def read_magic(self, magic: cell_source.CellMagic, file: str, unit: Unit) -> None:
+        """Add what the magic of a whole cell comes to."""
+        self._begin(file, unit)
+        self._magic(magic.name, magic.line, magic.body, magic.number, _Here())
+
+    def _begin(self, file: str, unit: Unit) -> None:
+        self._file, self._unit = file, unit
+        self.units.append(unit)
+
+    def _add(self, kind: str, name: str, node: ast.AST, here: _Here) -> None:
+        if name:
+            place = Place(self._file, getattr(node, "lineno", 0))
+            self._unit.mentions.setdefault(Mention(kind, name, here.live, here.looped), place)
+
+    def _by_text(self, text: str, node: ast.AST, here: _Here) -> None:
+        self._add("handed_on", text, node, here)
+        self._add("name", text, node, here)
+
+    # statements
+
+    def _statements(self, body: Sequence[ast.stmt], here: _Here) -> None:
+        for statement in body:
+            self._visit(statement, here)
+            if here.live:
+                self._naming.bind(surely_bound(statement))
+            here = here._replace(live=here.live and not ends(statement))
+
+    def _block(self, body: Sequence[ast.stmt], here: _Here, bound: Sequence[ast.AST] = ()) -> None:
+        """A block that may be passed by; ``bound`` is what it begins with."""
+        with self._naming.block():
+            if here.live:
+                self._naming.bind(bound_in(bound))
+            self._statements(body, here)
+
+    def _visit(self, node: ast.AST, here: _Here) -> None:
+        construct = CONSTRUCTS.get(type(node))
+        if construct is not None:
+            self._add("construct", construct, node, here)
+        if isinstance(node, ast.If | ast.For | ast.AsyncFor | ast.While) and node.orelse:
+            self._add("construct", "else", node, here)
+        _WAYS.get(type(node), Walk._parts)(self, node, here)
+
+    def _parts(self, node: ast.AST, here: _Here) -> None:
+        for _, value in ast.iter_fields(node):
+            parts = value if isinstance(value, list) else [value]
+            if parts and isinstance(parts[0], ast.stmt):
+                self._block(parts, here)
+            else:
+                self._each((part for part in parts if isinstance(part, ast.AST)), here)
+
+    def _each(self, nodes: Iterable[ast.AST | None], here: _Here) -> None:
+        for node in nodes:
+            if node is not None:
+                self._visit(node, here)
+
+    def _if(self, node: ast.If, here: _Here) -> None:
+        self._visit(node.test, here)
+        for block, live in blocks(node):
+            self._block(block, here._replace(live=here.live and live))
+
+    def _while(self, node: ast.While, here: _Here) -> None:
+        inside = _Here(here.live and truth(node.test) is not False, True)
+        self._visit(node.test, inside)
+        self._block(node.body, inside)
+        self._block(node.orelse, here)
+
+    def _for(self, node: ast.For | ast.AsyncFor, here: _Here) -> None:
+        self._each((node.iter, node.target), here)
+        self._block(node.body, _Here(here.live and not is_empty(node.iter), True), [node.target])
+        self._block(node.orelse, here)
+
+    def _with(self, node: ast.With | ast.AsyncWith, here: _Here) -> None:
+        self._each(node.items, here)
+        self._block(node.body, here, node.items)
+
+    def _handler(self, node: ast.ExceptHandler, here: _Here) -> None:
+        self._each([node.type], here)
+        self._block(node.body, here, [ast.Name(node.name, ast.Store())] if node.name else [])
+
+    def _case(self, node: ast.match_case, here: _Here) -> None:
+        self._each((node.pattern, node.guard), here)
+        self._block(node.body, here, [node.pattern])
+
+    def _class_pattern(self, node: ast.MatchClass, here: _Here) -> None:
+        for attribute in node.kwd_attrs:
+            self._by_text(attribute, node, here)
+        self._parts(node, here)
+
+    def _function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, here: _Here) -> None:
+        self._add("function", node.name, node, here)
+        # Its arguments with their defaults and annotations are worked out where it is made.
+        self._each([*node.decorator_list, node.args, node.returns], here)
+        within = Unit(node.name, self._owner, self._unit, here.live, bool(node.decorator_list))
+        self.units.append(within)
+        self._unit.units.append(within)
+        around = self._unit, self._owner
+        self._unit, self._owner = within, ""
+        bound = arguments_of(node) | bound_in(node.body) - declared_elsewhere(node)
+        with self._naming.scope("function", bound):
+            self._statements(node.body, _Here())
+        self._unit, self._owner = around
+
+    def _lambda(self, node: ast.Lambda, here: _Here) -> None:
+        self._visit(node.args, here)
+        with self._naming.scope("function", arguments_of(node)):
+            self._visit(node.body, here)
+
+    def _class(self, node: ast.ClassDef, here: _Here) -> None:
+        self._each([*node.decorator_list, *node.bases, *node.keywords], here)
+        owner, self._owner = self._owner, node.name
+        with self._naming.scope("class"):
+            self._statements(node.body, here)
+        self._owner = owner
+
+    # expressions
+
+    def _comprehension(self, node: Any, here: _Here) -> None:
+        first, *others = node.generators
+        self._visit(first.iter, here)
+        inside = _Here(here.live and not is_empty(first.iter), True)
+        with self._naming.scope("comprehension", bound_in([each.target for each in node.generators])):
+            self._each([first.target, *first.ifs, *others], inside)
+            self._each([getattr(node, name, None) for name in ("elt", "key", "value")], inside)
+
+    def _either(self, node: ast.IfExp, here: _Here) -> None:
+        known = truth(node.test)
+        self._visit(node.test, here)
+        self._visit(node.body, here._replace(live=here.live and known is not False))
+        self._visit(node.orelse, here._replace(live=here.live and known is not True))
+
+    def _walrus(self, node: ast.NamedExpr, here: _Here) -> None:
+        self._each((node.value, node.target), here)
+        if here.live:
+            self._naming.bind({node.target.id}, sure=False)
+
+    def _and_or(self, node: ast.BoolOp, here: _Here) -> None:
+        decides = isinstance(node.op, ast.Or)
+        for value in node.values:
+            self._visit(value, here)
+            here = here._replace(live=here.live and truth(value) is not decides)
+
+    def _chain(self, node: ast.Name | ast.Attribute, here: _Here, kind: str = "handed_on") -> None:
+        """A name, or names with dots between; ``kind`` is what is done with it."""
+        names = self._naming.names(node)
+        own = self._naming.own(node.id) if isinstance(node, ast.Name) else False
+        for name in names:
+            self._add("name", name, node, here)
+            if kind == "call":
+                self._add(kind, name, node, here)
+            elif isinstance(node.ctx, ast.Load) and own is not True:
+                self._add("unsure" if own is None else kind, name, node, here)
+        if isinstance(node, ast.Attribute):
+            if self._naming.is_imported(node):
+                self._add("through", names[-1], node, here)
+            self._before_dot(node.value, here)
+        if own is not True and node not in self._understood:
+            self._doubt_chain(names, node, here)
+
+    def _before_dot(self, node: ast.expr, here: _Here) -> None:
+        if isinstance(node, ast.Name | ast.Attribute):
+            self._chain(node, here, "base")
+        else:
+            self._visit(node, here)
+
+    def _doubt_chain(self, names: list[str], node: ast.AST, here: _Here) -> None:
+        last = names[0].rpartition(".")[2]
+        if last in DOUBTFUL or (last in DOUBTFUL_ALONE and isinstance(node, ast.Name)):
+            self._add("any_name" if last in TABLES | RUNNERS | MAGICS else "doubt", last, node, here)
+        elif "sys.modules" in names:
+            self._add("doubt", "sys.modules", node, here)
+
+    def _index(self, node: ast.Subscript, here: _Here) -> None:
+        self._ask_table(node.value, node.slice, node, here)
+        self._parts(node, here)
+
+    def _ask_table(self, table: ast.expr, key: ast.expr, node: ast.AST, here: _Here) -> None:
+        """``globals()["say"]``: what a table of names is asked for, if it is one and the text shows what for."""
+        named = table.func if isinstance(table, ast.Call) else table
+        names = self._naming.names(named)
+        text = text_of(key)
+        if text is None:
+            return
+        if "sys.modules" in names:
+            self._add("import", text, node, here)
+        elif any(name.rpartition(".")[2] in TABLES for name in names):
+            self._by_text(text, node, here)
+        else:
+            return
+        self._understood.add(named)
+
+    def _call(self, node: ast.Call, here: _Here) -> None:
+        function = node.func
+        calls = {name.rpartition(".")[2] for name in self._naming.names(function)}
+        texts = [text_of(argument) for argument in node.args]
+        if isinstance(function, ast.Attribute) and function.attr in GETTERS and node.args:
+            self._ask_table(function.value, node.args[0], node, here)
+        for call in sorted(calls & TAKES_NAME.keys()):
+            place = TAKES_NAME[call]
+            self._take(call, texts[place] if len(texts) > place else None, node, here)
+        for call in sorted(calls & TAKES_NAMES):
+            for argument, text in zip(node.args, texts, strict=True):
+                if text is not None or not isinstance(argument, ast.Constant):
+                    self._take(call, text, node, here)
+        named = next((text for text in texts if text), None)
+        if calls & IMPORTERS and named is not None:
+            self._understood.add(function)
+            self._add("import", named.replace(":", "."), node, here)
+        if calls & RUNNERS and texts and texts[0] is not None:
+            self._understood.add(function)
+            self._run_text(texts[0], node.lineno, here)
+        for call in sorted(calls & MAGICS):
+            self._call_magic(call, texts, node, here)
+        if isinstance(function, ast.Name | ast.Attribute):
+            self._chain(function, here, "call")
+        else:
+            self._visit(function, here)
+        self._each([*node.args, *node.keywords], here)
+
+    def _take(self, call: str, text: str | None, node: ast.AST, here: _Here) -> None:
+        if text is None:
+            self._add("any_name", call, node, here)
+        else:
+            self._by_text(text, node, here)
+
+    # imports
+
+    def _import(self, node: ast.Import, here: _Here) -> None:
+        for alias in node.names:
+            self._import_module(alias.name, node, here)
+
+    def _import_from(self, node: ast.ImportFrom, here: _Here) -> None:
+        self._import_module(node.module or "", node, here)
+        for alias in node.names:
+            self._add("import", f"{node.module or ''}.{alias.name}", node, here)
+            self._add("taken", alias.name, node, here)
+            if alias.asname not in (None, alias.name):
+                self._add("handed_on", alias.name, node, here)
+
+    def _import_module(self, module: str, node: ast.AST, here: _Here) -> None:
+        self._add("import", module, node, here)
+        top = module.partition(".")[0]
+        if top in DOUBTFUL_MODULES:
+            self._add("doubt", top, node, here)
+        elif top and not self._is_known(top):
+            self._add("doubt", f"the module {top}, which is not among the files,", node, here)
+
+    # texts that are run
+
+    def _run_text(self, text: str, line: int, here: _Here) -> None:
+        """Python in a text, as if it stood in the place of the text."""
+        if self._depth >= _DEEPEST:
+            return
+        try:
+            tree = ast.parse(text)
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            return
+        ast.increment_lineno(tree, line - 1)
+        self._naming.learn(tree)
+        self._depth += 1
+        self._block(tree.body, here)
+        self._depth -= 1
+
+    def _call_magic(self, call: str, texts: list[str | None], node: ast.Call, here: _Here) -> None:
+        known = [text for text in texts if text is not None]
+        if not texts or len(known) < len(texts) or node.keywords:
+            self._add("any_name", call, node, here)
+            return
+        self._understood.add(node.func)
+        if call == "magic":
+            known = list(known[0].partition(" ")[::2])
+        name, line, body = (*known, "", "")[:3]
+        self._magic(name.lstrip("%"), line, body if call == "run_cell_magic" else None, node.lineno, here)
+
+    def _magic(self, name: str, line: str, body: str | None, number: int, here: _Here) -> None:
+        """What a magic runs: the expressions in its line; of some the line, or the rest of the cell."""
+        place = ast.Pass(lineno=number)
+        expressions = list(cell_source.expressions(line))
+        for expression in expressions:
+            self._run_text(expression, number, here)
+        if name == "time" and body is None:
+            if expressions:
+                self._add("any_name", "a value in the line of %time", place, here)
+            self._run_text(cell_source.python_source(line), number, here)
+        elif name in ("time", "capture") and body is not None:
+            self._run_text(cell_source.python_source(body), number + 1, here)
+        elif name in ("writefile", "file") and body is not None:
+            self.written.append(("".join(line.split()[-1:]).strip("'\""), body))
+
+
+_WAYS: Mapping[type[ast.AST], Callable[[Walk, Any, _Here], None]] = {
+    ast.If: Walk._if,
+    ast.While: Walk._while,
+    ast.For: Walk._for,
+    ast.AsyncFor: Walk._for,
+    ast.With: Walk._with,
+    ast.AsyncWith: Walk._with,
+    ast.ExceptHandler: Walk._handler,
+    ast.match_case: Walk._case,
+    ast.MatchClass: Walk._class_pattern,
+    ast.FunctionDef: Walk._function,
+    ast.AsyncFunctionDef: Walk._function,
+    ast.Lambda: Walk._lambda,
+    ast.ClassDef: Walk._class,
+    ast.ListComp: Walk._comprehension,
+    ast.SetComp: Walk._comprehension,
+    ast.DictComp: Walk._comprehension,
+    ast.GeneratorExp: Walk._comprehension,
+    ast.IfExp: Walk._either,
+    ast.NamedExpr: Walk._walrus,
+    ast.BoolOp: Walk._and_or,
+    ast.Name: Walk._chain,
+    ast.Attribute: Walk._chain,
+    ast.Subscript: Walk._index,
+    ast.Call: Walk._call,
+    ast.Import: Walk._import,
+    ast.ImportFrom: Walk._import_from,
+}

@@ -1,0 +1,35 @@
+"""Which files of a submission are code that nobody can read: compiled modules, libraries, archives of modules.
+
+Python would import them from the folder like any module. Model files, archives of arrays among them, are none.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from io import BytesIO
+
+_SUFFIXES = (".pyc", ".pyo", ".pyd", ".so", ".egg", ".whl")
+_MODULES = (".py", *_SUFFIXES)
+_ELF = b"\x7fELF"
+_ENTRY = b"PK\x01\x02"
+#: What is looked at in an archive; zipfile makes an object of each entry.
+_MOST_ENTRIES = 2000
+
+
+def is_compiled(name: str, data: bytes) -> bool:
+    """By its name, or by what it is whatever it is called."""
+    return name.lower().endswith(_SUFFIXES) or data.startswith(_ELF) or _has_modules(data)
+
+
+def _has_modules(data: bytes) -> bool:
+    """Whether it is an archive, however it begins, from which Python could import; one that is too large may be."""
+    entries = data.count(_ENTRY)
+    if entries == 0 or not zipfile.is_zipfile(BytesIO(data)):
+        return False
+    if entries > _MOST_ENTRIES:
+        return True
+    try:
+        with zipfile.ZipFile(BytesIO(data)) as archive:
+            return any(entry.lower().endswith(_MODULES) for entry in archive.namelist())
+    except Exception:  # zipfile raises all kinds of things for archives that were made to break it
+        return True
