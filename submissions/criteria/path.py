@@ -94,7 +94,8 @@ class Closest(CriterionBase):
 class Circuits(CriterionBase):
     """How often the path goes round the point (x, y): ``times`` is [least, most], parts of a round included.
 
-    ``direction`` is on the screen. ``gyro`` is [least, most] of how much the gyro changes in each whole
+    ``direction`` is on the screen; ``clear_of`` is how far from the point it must always be, mm, so that spinning
+    beside it is no round. ``gyro`` is [least, most] of how much the gyro changes in each whole
     round, degrees, without regard to the direction; ``corners`` is in how many about equal steps it does so.
     """
 
@@ -104,6 +105,7 @@ class Circuits(CriterionBase):
     times: Range
     direction: Literal["either", "clockwise", "anticlockwise"] = "either"
     of: Literal["robot", "pen"] = "robot"
+    clear_of: float = Field(default=0.0, ge=0)
     gyro: Range | None = None
     corners: int | None = Field(default=None, ge=1)
 

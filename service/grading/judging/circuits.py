@@ -52,6 +52,16 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
             score=score,
             measures=tuple(measures),
         )
+    nearest = float(
+        np.nanmin(np.hypot(*(positions(recording, criterion.of) - (criterion.x, criterion.y)).T), initial=np.inf)
+    )
+    if nearest < criterion.clear_of:
+        return failed(
+            f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but it came as near as "
+            f"{nearest:.0f} mm.",
+            *end,
+            measures=tuple(measures),
+        )
     for number, (first, last) in enumerate(_whole_rounds(round_it), 1):
         turned = headings(recording)[first : last + 1]
         change = float(abs(turned[-1] - turned[0]))

@@ -18,7 +18,7 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.labels import LabelFinder
 from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
-from service.grading.judging.patterns import by_pattern
+from service.grading.judging.patterns import Side, by_pattern, without_repeats
 from service.grading.judging.tally import Fate, Reply, reply_to
 from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
@@ -106,9 +106,13 @@ def _that_count(
     finder: LabelFinder,
 ) -> Sequence[Naming]:
     """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
-    counted: list[Naming] = own
-    if criterion.each_pattern is not None:
-        counted = by_pattern(own, criterion.each_pattern, max(30.0, 2 * criterion.within))
+    if criterion.each_pattern is None:
+        counted = without_repeats(own, trial.recording)
+    else:
+        # What a grey patch tells lies under the right sensor.
+        side: Side = "right" if criterion.truth == "grey" else "left"
+        apart = max(30.0, 2 * criterion.within)
+        counted = by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
     if counted and len(counted) >= criterion.patterns:
         return counted
     if not counted and criterion.patterns <= 1:

@@ -14,7 +14,7 @@ from itertools import pairwise
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
 from service.grading.judging.patches import decoded
-from service.grading.judging.places import part_at
+from service.grading.judging.places import look_at, part_at
 from sim.backgrounds import floor, label_names, names
 from sim.recording import Image, Recording
 from submissions.criteria.collecting import Collects
@@ -41,9 +41,8 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     found = pairs(recording, criterion.source, trial.light_noise)
     classes = criterion.classes or label_names(recording.background)
     usable = [pair for pair in found if pair.label in classes]
-    different = {pair.image.left: pair for pair in reversed(usable)}
-    counts = Counter(pair.label for pair in different.values())
-    repeated = len(found) - len({pair.image.left for pair in found})
+    counts = Counter(pair.label for pair in _different(usable, recording))
+    repeated = len(found) - len(_different(found, recording))
     measures = (
         Measure("pairs", float(len(found))),
         Measure("usable", float(len(usable))),
@@ -66,6 +65,19 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     if reached == 1:
         reached = 1 - _PART_FOR_THE_REST * Fraction(sum(not holds for holds, _ in checks), len(checks))
     return failed(f"{wrong}.", where.t if where else None, where.pose if where else None, reached, measures)
+
+
+def _different(found: Sequence[Pair], recording: Recording) -> list[Pair]:
+    """The pairs whose left image is of another window of the floor, and not the same, as that of any before."""
+    known: set[object] = set()
+    fresh = []
+    for pair in found:
+        where = look_at(recording, "left", pair.image.pose)
+        own: set[object] = {pair.image.left, (where.column, where.row)}
+        if own.isdisjoint(known):
+            fresh.append(pair)
+        known |= own
+    return fresh
 
 
 def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[Pair]:

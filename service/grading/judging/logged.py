@@ -14,9 +14,11 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.measured import measured_only
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at
+from service.grading.judging.patches import GREYS, decoded
+from service.grading.judging.places import on_floor, part_at
 from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask
-from sim.recording import Datum, Pose, Recording
+from sim.recording import Datum, Image, Pose, Recording
 from sim.robot import ROBOTS, LightSensor, robot
 from sim.sensors import look
 from sim.trigonometry import sincos
@@ -81,10 +83,13 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
             )
         )
     if criterion.uniform is not None:
-        own = [entry[1] for entry in log if entry[0] == criterion.uniform]
-        flat = bool(own) and all(_is_uniform(csv) for csv in own)
+        own = [entry for entry in log if entry[0] == criterion.uniform]
+        flat = bool(own) and all(_is_uniform(entry[1]) and _shows_something(entry, recording) for entry in own)
         checks.append(
-            (flat, f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not")
+            (
+                flat,
+                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not or has no patch",
+            )
         )
     measures = (Measure("images", float(len(log))),)
     wrong = next((words for holds, words in checks if not holds), None)
@@ -197,6 +202,21 @@ def _is_uniform(csv: str) -> bool:
     side = math.isqrt((csv.count(",") + 1) // 4)
     pixels = _pixels(csv, side)
     return pixels is not None and bool((np.ptp(pixels[sensor_mask(side)], axis=0) == 0).all())
+
+
+def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
+    """Whether there was floor under the sensor and, where the floor has label patches, one that fills its picture."""
+    side, csv, tick = entry
+    pose = pose_at(recording, tick / 30)
+    if not on_floor(part_at(recording, "left" if side == "left" else "right", pose)):
+        return False
+    if side == "left" or recording.background not in GREYS or not recording.patches:
+        return True
+    pixels = bytes(map(int, csv.split(",")))
+    return (
+        decoded(Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4)), recording.background)
+        is not None
+    )
 
 
 def _where(recording: Recording, tick: int) -> str:

@@ -17,10 +17,14 @@ from submissions.criteria.logged import Instrument
 _AGE = 0.5
 #: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
 _ROUNDED = 1.0
+#: What a reading of a sensor takes, seconds; what is printed sooner after another sample repeats it.
+_READING = 0.01
 
 
 def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: Recording) -> list[Datum]:
     """The samples that the instrument read in the half second before they were printed, in any unit of the brick's.
+
+    Of those that were printed in less time than a reading takes only the first counts.
 
     Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
     of turning degrees. Nothing has been read before the first tick.
@@ -28,7 +32,11 @@ def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: R
     readings = _readings(instrument, recording)
     if not len(readings):
         return []
-    return [datum for datum in samples if _was_read(datum, readings)]
+    found: list[Datum] = []
+    for datum in samples:
+        if _was_read(datum, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
+            found.append(datum)
+    return found
 
 
 def _was_read(datum: Datum, readings: NDArray[np.float64]) -> bool:

@@ -16,6 +16,7 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.whereabouts import place_at, positions, robot_of, standing, stretches, times, travel
+from sim.camera import HEIGHT, WIDTH
 from sim.recording import Floats, Recording
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
@@ -316,13 +317,15 @@ def _wheels(recording: Recording) -> tuple[float, float]:
 
 
 def _falls(criterion: Encounters, recording: Recording) -> list[int]:
-    """The rows at which a sensor began to read less than the threshold."""
+    """The rows at which a sensor began to read less than the threshold; beside the floor there is nothing to see."""
     ticks = recording.ticks
     readings = {"left": ticks.left_rgb, "right": ticks.right_rgb}
     dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
     for side, rgb in readings.items():
         if criterion.light in (side, "either"):
-            dark |= rgb[:, 0] / 255 * 100 < criterion.below
+            x, y = positions(recording, "left_light" if side == "left" else "right_light")[1:].T
+            on_floor = (x >= 0) & (x <= WIDTH) & (y >= 0) & (y <= HEIGHT)
+            dark |= on_floor & (rgb[:, 0] / 255 * 100 < criterion.below)
     return [first + 1 for first, _ in stretches(dark)]
 
 

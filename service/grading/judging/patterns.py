@@ -1,42 +1,76 @@
 """Several pictures of one pattern, sent while the robot drives over it, made into one answer.
 
-Pictures belong together if they show the same thing at the same place, whenever they were sent.
+Pictures belong together if they show the same thing at the same place under the sensor, wherever the robot stood.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Literal
 
 from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import listed
+from service.grading.judging.places import look_at, part_at
+from sim.recording import Recording
 
 How = Literal["first", "any", "majority"]
+Side = Literal["left", "right"]
+_Place = tuple[float, float]
 
 
-def by_pattern(pictures: Sequence[Naming], how: How, apart: float) -> list[Naming]:
+def by_pattern(
+    pictures: Sequence[Naming], recording: Recording, how: How, apart: float, side: Side = "left"
+) -> list[Naming]:
     """One naming for each pattern among a trial's ``pictures``, in the order in which the robot came to them.
 
-    Pictures of the same truth that were taken at most ``apart`` mm from the first of them are of one pattern.
+    Pictures of the same truth are of one pattern if the sensor of that ``side`` was at most ``apart`` mm from where it
+    took the first of them.
     """
-    groups: list[list[Naming]] = []
+    groups = _Groups(apart)
     for picture in pictures:
-        group = next((group for group in groups if _same(group[0], picture, apart)), None)
-        if group is None:
-            groups.append([picture])
+        if picture.image is not None:
+            groups.add(picture, part_at(recording, side, picture.image.pose))
+    return [_one(group, how) for group in groups.found]
+
+
+def without_repeats(pictures: Sequence[Naming], recording: Recording) -> list[Naming]:
+    """Pictures of the same window of the floor made into one, which is what was answered most often."""
+    groups: dict[Hashable, list[Naming]] = {}
+    for picture in pictures:
+        if picture.image is not None:
+            where = look_at(recording, "left", picture.image.pose)
+            groups.setdefault((picture.truth, where.column, where.row), []).append(picture)
+    return [group[0] if len(group) == 1 else _majority(group) for group in groups.values()]
+
+
+@dataclass(slots=True)
+class _Groups:
+    """Pictures by pattern. The floor is cut into squares, so that only neighbours have to be compared."""
+
+    apart: float
+    found: list[list[Naming]] = field(default_factory=list)
+    _near: dict[tuple[str, int, int], list[tuple[int, _Place]]] = field(default_factory=dict)
+
+    def add(self, picture: Naming, place: _Place) -> None:
+        own = (picture.truth, *self._square(place))
+        numbers = [number for number, first in self._neighbours(own) if math.dist(first, place) <= self.apart]
+        if numbers:
+            self.found[min(numbers)].append(picture)
         else:
-            group.append(picture)
-    return [_one(group, how) for group in groups]
+            self._near.setdefault(own, []).append((len(self.found), place))
+            self.found.append([picture])
 
+    def _square(self, place: _Place) -> tuple[int, int]:
+        return math.floor(place[0] / self.apart), math.floor(place[1] / self.apart)
 
-def _same(first: Naming, other: Naming, apart: float) -> bool:
-    if first.image is None or other.image is None or first.truth != other.truth:
-        return False
-    one, two = first.image.pose, other.image.pose
-    return math.hypot(one.x - two.x, one.y - two.y) <= apart
+    def _neighbours(self, square: tuple[str, int, int]) -> Iterable[tuple[int, _Place]]:
+        truth, column, row = square
+        for right, up in product((-1, 0, 1), repeat=2):
+            yield from self._near.get((truth, column + right, row + up), ())
 
 
 def _one(group: Sequence[Naming], how: How) -> Naming:

@@ -1,4 +1,4 @@
-"""Where the robot's parts are at a moment of a recording, and whether that is in a zone.
+"""Where the robot's parts are at a moment, what its light sensors look at, and whether that is in a zone.
 
 Geometry only; what it is worth is decided in the modules of the kinds.
 """
@@ -9,8 +9,11 @@ import math
 from typing import Literal
 
 from service.grading.judging.outcome import pose_at
+from sim.camera import HEIGHT, WIDTH
 from sim.recording import Pose, Recording
 from sim.robot import ROBOTS, robot
+from sim.sensors import Look, look
+from sim.trigonometry import sincos
 
 Part = Literal["left", "right", "middle"]
 Zone = tuple[float, float, float, float]
@@ -30,6 +33,18 @@ def part_at(recording: Recording, part: Part, pose: Pose) -> tuple[float, float]
 def part_at_time(recording: Recording, part: Part, t: float) -> tuple[float, float]:
     """As ``part_at``, after the last tick until ``t`` seconds."""
     return part_at(recording, part, pose_at(recording, t))
+
+
+def look_at(recording: Recording, side: Literal["left", "right"], pose: Pose) -> Look:
+    """The window that a light sensor sees; it does not turn with the robot, so it alone decides what is in it."""
+    bolted = robot(recording.robot if recording.robot in ROBOTS else "Default_Robot")
+    sensor = bolted.left_light if side == "left" else bolted.right_light
+    return look(sensor, pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
+
+
+def on_floor(place: tuple[float, float]) -> bool:
+    """Whether there is floor at the place; beside it a sensor sees black."""
+    return 0 <= place[0] <= WIDTH and 0 <= place[1] <= HEIGHT
 
 
 def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:

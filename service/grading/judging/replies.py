@@ -6,6 +6,7 @@ elsewhere.
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 
 from service.grading.grade import TrialResult
@@ -25,29 +26,33 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     ]
     if criterion.expect:
         return _judge_expected(criterion, asked, recording)
-    asked = [(index, message) for index, message in asked if _is_asked_about(criterion, message.text)]
-    if len(asked) < criterion.at_least:
-        few = f"only {len(asked)} reached it" if asked else "none reached it"
+    # A message that is sent again asks nothing new.
+    questions: dict[str, list[tuple[int, Message]]] = {}
+    for index, message in asked:
+        if _is_asked_about(criterion, message.text):
+            questions.setdefault(message.text, []).append((index, message))
+    count = len(questions)
+    if count < criterion.at_least:
+        few = f"only {count} different reached it" if count else "none reached it"
         return failed(
             f"Expected the responder to be sent at least {criterion.at_least} of {_messages(criterion)}, but {few}.",
             score=Fraction(0),
         )
     answers = Answers(recording)
     wrong: list[tuple[Message, str]] = []
-    for index, message in asked:
-        mistake = _mistake(criterion, answers, index)
-        if mistake:
-            wrong.append((message, mistake))
+    for times in questions.values():
+        mistakes = ((message, _mistake(criterion, answers, index)) for index, message in times)
+        wrong += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
     if not wrong:
-        return passed(f"The responder answered {len(asked)} of {len(asked)} messages as expected.")
-    message, mistake = wrong[0]
-    right = len(asked) - len(wrong)
+        return passed(f"The responder answered {count} of {count} messages as expected.")
+    message, mistake = min(wrong, key=lambda pair: pair[0].t)
+    right = count - len(wrong)
     return failed(
         f"Expected the responder to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
-        f"({right} of {len(asked)} answered as expected).",
+        f"({right} of {count} answered as expected).",
         message.t,
         pose_at(recording, message.t),
-        Fraction(right, len(asked)),
+        Fraction(right, count),
     )
 
 

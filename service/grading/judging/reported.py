@@ -44,6 +44,10 @@ def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
             score=Fraction(found, len(wanted)),
             measures=measures,
         )
+    if _suits_others(criterion, wanted, tokens):
+        return failed(
+            f"{asked} and not what belongs to other poses, but that came as well: {heard}.", measures=measures
+        )
     return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
 
 
@@ -99,6 +103,39 @@ def _found(wanted: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -
 
 def _is_near(value: float | None, wanted: float, tolerance: float) -> bool:
     return value is not None and abs(value - wanted) <= tolerance + 1e-9
+
+
+def _suits_others(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> bool:
+    """Whether what belongs to half of the other poses or more was reported as well: then nothing was read off."""
+    rows = set(criterion.expected) if criterion.expected != "label" else set()
+    others = [row for row in rows if not _alike(row, wanted, 2 * criterion.tolerance)]
+    told = sum(
+        any(_stands_at(place, row, tokens, criterion.tolerance) for place in range(len(tokens))) for row in others
+    )
+    return bool(others) and 2 * told >= len(others)
+
+
+def _alike(row: Sequence[Entry], other: Sequence[Entry], tolerance: float) -> bool:
+    """Whether one report may suit both."""
+    return len(row) == len(other) and all(
+        one == two or (not isinstance(one, str) and not isinstance(two, str) and _is_near(one, two, tolerance))
+        for one, two in zip(row, other, strict=True)
+    )
+
+
+def _stands_at(place: int, row: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> bool:
+    """Whether the entries come from there on, one right after the other."""
+    for entry in row:
+        if isinstance(entry, str):
+            parts = words_of(entry)
+            if [token.word for token in tokens[place : place + len(parts)]] != parts:
+                return False
+            place += len(parts)
+        elif place < len(tokens) and _is_near(tokens[place].value, entry, tolerance):
+            place += 1
+        else:
+            return False
+    return True
 
 
 def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> str:

@@ -64,12 +64,18 @@ def judge_word_sequence(criterion: Sequence, trial: TrialResult) -> Outcome:
 
 
 def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
-    """Each event is looked for after the one before it; the first mention at the right place counts."""
+    """Each event is looked for after the one before it; the first mention at the right place counts.
+
+    What is said where another event belongs as well does not tell the places apart, and does not count.
+    """
     recording = trial.recording
     lines = _lines(criterion, recording)
     found: list[Line] = []
     start = 0
+    strays = _strays(criterion, lines, recording)
     for event in criterion.events:
+        if event in strays:
+            return _stray(criterion, event, strays[event], found, recording)
         place = next((i for i in range(start, len(lines)) if _happens(criterion, event, lines[i], recording)), None)
         if place is None:
             return _missed(criterion, event, found, lines[start:], recording)
@@ -131,12 +137,44 @@ def _happens(criterion: Events, event: EventAt, line: Line, recording: Recording
     )
 
 
+def _strays(criterion: Events, lines: SequenceOf[Line], recording: Recording) -> dict[EventAt, Line]:
+    """For each event that was mentioned at the place of one with other words the first such line."""
+    strays: dict[EventAt, Line] = {}
+    for line in lines:
+        mentioned = [event for event in criterion.events if event not in strays and _mentions(event, line)]
+        if not mentioned:
+            continue
+        place = part_at_time(recording, criterion.sensor, line.t)
+        for event in mentioned:
+            others = (other for other in criterion.events if set(event.text).isdisjoint(other.text))
+            own = (other for other in criterion.events if not set(event.text).isdisjoint(other.text))
+            if any(in_zone(place, each.zone, criterion.margin) for each in own):
+                continue
+            if any(in_zone(place, other.zone, criterion.margin) for other in others):
+                strays[event] = line
+    return strays
+
+
+def _stray(criterion: Events, event: EventAt, line: Line, found: list[Line], recording: Recording) -> Outcome:
+    x, y = part_at_time(recording, criterion.sensor, line.t)
+    return failed(
+        f"{_expected(criterion, event)} and not where another belongs, but it came at ({x:.1f}, {y:.1f}) as well.",
+        line.t,
+        pose_at(recording, line.t),
+        Fraction(len(found), len(criterion.events)),
+    )
+
+
+def _expected(criterion: Events, event: EventAt) -> str:
+    what = "the robot" if criterion.sensor == "middle" else f"the {criterion.sensor} light sensor"
+    deed = {"speech": "said", "print": "printed", "either": "reported"}[criterion.source]
+    return f"Expected {quoted(event.text[0])} to be {deed} with {what} at {zone_words(event.zone)}"
+
+
 def _missed(
     criterion: Events, event: EventAt, found: list[Line], after: SequenceOf[Line], recording: Recording
 ) -> Outcome:
-    what = "the robot" if criterion.sensor == "middle" else f"the {criterion.sensor} light sensor"
-    deed = {"speech": "said", "print": "printed", "either": "reported"}[criterion.source]
-    expected = f"Expected {quoted(event.text[0])} to be {deed} with {what} at {zone_words(event.zone)}"
+    expected = _expected(criterion, event)
     score = Fraction(len(found), len(criterion.events))
     elsewhere = next((line for line in after if _mentions(event, line)), None)
     if elsewhere is None:

@@ -237,7 +237,10 @@ def _queue_grows(recording: Recording) -> Outcome:
     answers = Answers(recording)
     replies = [(message, answers.to(index)) for index, message in asked]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
-    score = Fraction(len(arrivals), len(asked))
+    # A message that is sent again shows nothing new.
+    different = {message.text for _, message in asked}
+    failing = {message.text for message, reply in replies if reply is None or not _joined(reply)}
+    score = Fraction(len(different) - len(failing), len(different))
     for message, reply in replies:
         if reply is None or not _joined(reply):
             happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"

@@ -61,7 +61,7 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[Shown]:
     recording = trial.recording
     found: list[Shown] = []
     for number, image in enumerate(recording.images):
-        if criterion.near_start is not None and _way_from_start(recording, image.pose) > criterion.near_start:
+        if criterion.near_start is not None and _look_from_start(recording, image.pose) > criterion.near_start:
             continue
         truth: str | None
         match criterion.truth:
@@ -78,9 +78,9 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[Shown]:
     return found
 
 
-def _way_from_start(recording: Recording, pose: Pose) -> float:
-    """How far the robot at ``pose`` is from where it started, mm."""
-    return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y))
+def _look_from_start(recording: Recording, pose: Pose) -> float:
+    """How far the left sensor is, with the robot at ``pose``, from where it was at the start, mm."""
+    return math.dist(part_at(recording, "left", pose), part_at(recording, "left", recording.start))
 
 
 def _told(criterion: Recognition, trial: TrialResult) -> str | None:
