@@ -207,5 +207,6 @@ def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(rig: R
     got = {}
     for name in ("by-the-way-driven", "counts-the-messages", "echoes-the-patch"):
         submission = read_submission(examples("shapes-on-the-move") / name, asked=forbidding.parts)
-        got[name] = [grade(submission, asked, rig=rig).criteria[1].marks for asked in (allowing, forbidding)]
+        results = [grade(submission, asked, rig=rig).criteria for asked in (allowing, forbidding)]
+        got[name] = [next(found.marks for found in criteria if found.id == "shapes") for criteria in results]
     assert got == {"by-the-way-driven": [9, 0], "counts-the-messages": [9, 0], "echoes-the-patch": [9, 0]}

@@ -40,9 +40,14 @@ def train(images, labels):
 def training() -> Assignment:
     """The catalogue's, with one trial a scenario and little to use."""
     asked = find_assignment("train-a-recogniser")
-    scenarios = tuple(replace(scenario, trials=1) for scenario in asked.scenarios[:2])
+    scenarios = tuple(
+        replace(scenario, trials=1, light_noise=(0.0,))
+        for scenario in asked.scenarios
+        if scenario.id in ("collected", "unseen")
+    )
+    criteria = tuple(criterion for criterion in asked.criteria if criterion.id == "unseen")
     limits = replace(asked.limits, responder_cpu=1.0, responder_memory_mb=512)
-    return replace(asked, scenarios=scenarios, criteria=asked.criteria[:1], limits=limits)
+    return replace(asked, scenarios=scenarios, criteria=criteria, limits=limits)
 
 
 def trained(rig: Rig, asked: Assignment, text: str) -> Grade:
