@@ -368,7 +368,8 @@ class Sandboxes:
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
-                dated = traces.read_beforehand(grants.readable([_own_modules(role) for role in _FOLDERS]))
+                own = [_own_modules(role) for role in _FOLDERS]
+                dated = traces.read_beforehand(grants.readable(own), grants.listable())
                 if dated is not None:
                     return dated
             self._forgets_until = now + traces.HOLDS_SECONDS

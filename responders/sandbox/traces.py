@@ -19,9 +19,13 @@ _FRESH_SECONDS = 11 * 3600
 _NEVER_DATED = os.ST_RDONLY | os.ST_NOATIME
 
 
-def read_beforehand(paths: Iterable[str]) -> str | None:
-    """Read ``paths``, all beneath them and the links on the way. What would be dated all the same, in a sentence."""
-    pending: list[tuple[str, int | None]] = [(path, None) for path in _and_links(paths)]
+def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | None:
+    """Read ``paths`` and all beneath them, list ``listed``, follow the links on the way to them.
+
+    What would be dated all the same, in a sentence; None if nothing would.
+    """
+    alone = _and_links(listed)
+    pending: list[tuple[str, int | None]] = [(path, None) for path in _and_links(paths) | alone]
     while pending:
         path, rule = pending.pop()
         # A file may come and go, or not be for us to read: then it is not for a child of ours either.
@@ -33,7 +37,7 @@ def read_beforehand(paths: Iterable[str]) -> str | None:
                 return f"each reading of {path} is dated: it is mounted with neither relatime nor noatime"
             if not rule & _NEVER_DATED and _is_dated_again(path, mode):
                 return f"each reading of {path} is dated: its last change is dated in the future"
-            if stat.S_ISDIR(mode):
+            if stat.S_ISDIR(mode) and path not in alone:
                 pending += [(entry.path, rule) for entry in os.scandir(path)]
     return None
 

@@ -12,6 +12,7 @@ import resource
 import signal
 import socket
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from .frames import Wire
 from .lockdown import Grants
 
 _libc = ctypes.CDLL(None, use_errno=True)
+_SPACE = ctypes.create_string_buffer(256)
 
 
 def _system_call(number: int, *arguments: int) -> Callable[[], object]:
@@ -65,6 +67,11 @@ ATTEMPTS: dict[str, Callable[[], object]] = {
     "make an anonymous file": _system_call(319, 0, 0),
     "change the limits": lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)),
     "change a file's mode": lambda: os.chmod(os.devnull, 0o666),
+    "make a pipe": os.pipe,
+    "count what came from the disk": lambda: resource.getrusage(resource.RUSAGE_SELF),
+    "ask how much memory is free": _system_call(99, ctypes.addressof(_SPACE)),
+    "read the parent's limits": lambda: resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE),
+    "read the parent's clock": lambda: time.clock_gettime((~os.getppid() << 3) | 2),
 }
 
 #: Changes whenever what is tried changes.

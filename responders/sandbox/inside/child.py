@@ -129,7 +129,7 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame
     missing = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
-    memory = os.open("/proc/self/mem", os.O_RDONLY)
+    memory = _own_memory()
     try:
         own_user = _own_user(order, grants)
         _end_with(zygote)
@@ -158,8 +158,17 @@ def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame
     }
 
 
-def _ask_about_paths(memory: int) -> str | None:
+def _own_memory() -> int | None:
+    """To be had only while this process may be read."""
+    with contextlib.suppress(OSError):
+        return os.open("/proc/self/mem", os.O_RDONLY)
+    return None
+
+
+def _ask_about_paths(memory: int | None) -> str | None:
     """Have the doorkeeper decide about every path from now on; why it cannot, or None."""
+    if memory is None:
+        return "/proc/self/mem cannot be opened"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:
         try:
             questions = lockdown.ask_about_paths()

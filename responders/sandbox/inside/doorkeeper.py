@@ -83,10 +83,10 @@ class _Known:
         """Whether a child in ``folder`` may name ``path``, and what it leads to."""
         parent, name = os.path.split(os.path.join(folder, path))
         itself = os.path.join(os.path.realpath(parent), name)
-        if name in (b"", b".", b"..") or os.path.islink(itself):
-            target = os.path.realpath(itself)
-            return self._has(target, folder) and (name in (b"", b".", b"..") or self._has(itself, folder))
-        return self._has(itself, folder)
+        if name in (b"", b".", b".."):
+            itself = os.path.realpath(itself)
+        target = os.path.realpath(itself) if os.path.islink(itself) else itself
+        return self._has(itself, folder) and self._has(target, folder)
 
     def _has(self, path: bytes, folder: bytes) -> bool:
         above = _above(path)
@@ -150,7 +150,7 @@ def _answer(guest: _Guest, known: _Known) -> None:
 
 
 def _refusal(guest: _Guest, known: _Known, number: int, arguments: list[int]) -> int:
-    """The number of an error, or 0."""
+    """The number of an error, or 0: what may not be named is not there, or may not be opened."""
     for start, place in PATHS[number]:
         path, end, _ = os.pread(guest.memory, _LONGEST, arguments[place]).partition(b"\0")
         if not end:
@@ -159,7 +159,7 @@ def _refusal(guest: _Guest, known: _Known, number: int, arguments: list[int]) ->
         # From a descriptor, which the child could open, nothing but a step up leads to what it could not.
         known_by_opening = not from_here and not path.startswith(b"/")
         if b".." in path.split(b"/") if known_by_opening else not known.has(path, guest.folder):
-            return errno.EACCES
+            return errno.EACCES if number in OPENS else errno.ENOENT
     flags = arguments[OPENS[number]] if number in OPENS else 0
     if flags & _NO_NAME or (flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path))):
         guest.made += 1

@@ -1,0 +1,164 @@
+"""What has to hold before anything hidden is graded: a trial can leave nothing for the next, or none is graded here.
+
+The channels themselves are tried in ``test_attacks.py``.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from builders import echo
+from responders.sandbox import traces
+from responders.sandbox.inside import grants
+from responders.sandbox.manager import Sandboxes, Walls
+from service.doctor import examine
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.settings import Settings
+from sim.errors import HostError
+from submissions.submission import Source, Submission
+
+_SUBMISSION = Submission("ada", Source("robot.py", "pass"), Source("responder.py", "def responder(m): return m"))
+_WEEK = 7 * 86400
+
+#: Refuses filters whose questions somebody answers, as where a container has such a filter of its own; then goes on.
+_NOBODY_ANSWERS = """
+import ctypes, struct, sys
+code = [(0x20, 0, 0, 0), (0x15, 0, 3, 317), (0x20, 0, 0, 24), (0x45, 0, 1, 8)]  # seccomp with a listener
+code += [(6, 0, 0, 0x50010), (6, 0, 0, 0x7FFF0000)]  # EBUSY, or go on
+filter = b"".join(struct.pack("=HBBI", *each) for each in code)
+buffer = ctypes.create_string_buffer(filter, len(filter))
+libc = ctypes.CDLL(None, use_errno=True)
+libc.prctl(38, 1, 0, 0, 0)
+assert libc.syscall(317, 1, 0, struct.pack("=H6xQ", len(code), ctypes.addressof(buffer))) == 0
+"""
+_CHECK = """
+from responders.sandbox.manager import Sandboxes
+with Sandboxes() as sandboxes:
+    print(sandboxes.check())
+    print(sandboxes.remembers())
+"""
+_READ = """
+import sys
+from responders.sandbox import traces
+from responders.sandbox.inside import grants
+print(traces.read_beforehand([sys.argv[1]]))
+"""
+
+
+@pytest.fixture
+def readable(tmp_path: Path) -> Path:
+    """A file, an empty one, a folder and a link, none of which was looked at for a week."""
+    folder = tmp_path / "folder"
+    (folder / "inner").mkdir(parents=True)
+    (folder / "file").write_text("content")
+    (folder / "empty").touch()
+    (folder / "link").symlink_to("file")
+    _age(folder)
+    return folder
+
+
+def _age(folder: Path) -> None:
+    for path in (*folder.iterdir(), folder):
+        os.utime(path, (time.time() - _WEEK, path.lstat().st_mtime), follow_symlinks=False)
+
+
+def _dates(folder: Path) -> dict[str, int]:
+    return {path.name: path.lstat().st_atime_ns for path in (*folder.iterdir(), folder)}
+
+
+def _read_all(folder: Path) -> None:
+    (folder / "file").read_text()
+    (folder / "empty").read_text()
+    list((folder / "inner").iterdir())
+    (folder / "link").resolve()
+    (folder / "link").readlink()
+
+
+def test_what_was_read_beforehand_is_not_dated_again(readable: Path) -> None:
+    _read_all(readable)
+    dated = _dates(readable)
+    _age(readable)
+    if _dates(readable) == dated:
+        pytest.skip("nothing is dated on this file system")
+    assert traces.read_beforehand([str(readable)]) is None
+    before = _dates(readable)
+    time.sleep(0.02)
+    _read_all(readable)
+    assert _dates(readable) == before
+
+
+def test_a_file_from_the_future_is_dated_at_each_reading(readable: Path) -> None:
+    os.utime(readable / "file", (time.time(), time.time() + _WEEK))
+    if traces.read_beforehand([str(readable)]) is None:
+        pytest.skip("nothing is dated on this file system")
+    assert "dated in the future" in str(traces.read_beforehand([str(readable)]))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [("strictatime", "neither relatime nor noatime"), ("noatime", "None"), ("relatime", "None"), ("ro", "None")],
+)
+def test_how_it_is_mounted_decides(option: str, said: str, tmp_path: Path) -> None:
+    script = f"mount -t tmpfs -o {option} none {tmp_path} && exec {sys.executable} -c '{_READ}' {tmp_path}"
+    ran = subprocess.run(["unshare", "--mount", "sh", "-c", script], capture_output=True, text=True, check=False)
+    if "unshare" in ran.stderr or "mount" in ran.stderr:
+        pytest.skip(f"this machine lets root mount nothing: {ran.stderr}")
+    assert said in ran.stdout, ran.stderr
+
+
+def test_this_machine_forgets(tmp_path: Path) -> None:
+    listed = Path(grants.listable()[0])
+    os.utime(listed, (0, listed.stat().st_mtime))
+    with Sandboxes(Walls(bubblewrap=False)) as sandboxes:
+        assert sandboxes.remembers() is None
+    assert listed.stat().st_atime > listed.stat().st_ctime
+    found = {finding.what: finding for finding in examine(Settings(home=tmp_path))}
+    assert (found["between trials"].well, found["between trials"].sentence) == (
+        True,
+        "a trial can leave nothing for the next",
+    )
+
+
+def test_without_a_doorkeeper_the_walls_stand_and_the_reason_is_told() -> None:
+    with Sandboxes(Walls(doorkeeper=False, bubblewrap=False)) as sandboxes:
+        assert "doorkeeper" not in sandboxes.check()
+        assert "not asked for" in str(sandboxes.remembers())
+    ran = subprocess.run([sys.executable, "-c", _NOBODY_ANSWERS + _CHECK], capture_output=True, text=True, check=True)
+    walls, reason = ran.stdout.splitlines()
+    assert "seccomp" in walls
+    assert "doorkeeper" not in walls
+    assert "Device or resource busy" in reason
+
+
+def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
+    hidden = replace(echo(), scenarios=tuple(replace(each, visibility="hidden") for each in echo().scenarios))
+    with Rig(Walls(doorkeeper=False)) as rig:
+        assert grade(_SUBMISSION, echo(), rig=rig).trials
+        with pytest.raises(
+            HostError, match=r"^a trial could leave something for the next, so nothing hidden is graded"
+        ):
+            grade(_SUBMISSION, hidden, rig=rig)
+    with Rig() as rig:
+        assert grade(_SUBMISSION, hidden, rig=rig).trials
+
+
+def test_what_is_read_is_read_again_after_half_a_day(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[float] = []
+    clock = [time.time()]
+    monkeypatch.setattr(traces, "read_beforehand", lambda *_: read.append(clock[0]))
+    monkeypatch.setattr("responders.sandbox.manager.time.time", lambda: clock[0])
+    with Sandboxes(Walls(bubblewrap=False)) as sandboxes:
+        for hours in (0, 1, 10, 2, 20, -100):
+            clock[0] += 3600 * hours
+            assert sandboxes.remembers() is None
+    start = read[0]
+    assert [round((when - start) / 3600) for when in read] == [0, 13, 33, -67]
