@@ -92,7 +92,7 @@ def test_whoever_was_started_by_one_that_divided_divides_nothing_anew(tmp_path: 
         ("unified/unit/cgroup.controllers", "hugetlb\n", "does not have the controllers memory and pids"),
         ("unified/unit/cgroup.controllers", "cpu io pids\n", "does not have the controllers memory"),
         ("unified/unit/cgroup.controllers", None, "cannot be read: No such file"),
-        ("unified/unit/cgroup.procs", f"1\n{os.getpid()}\n", "other processes are in"),
+        ("unified/unit/cgroup.procs", "1\nthis\n", "other processes are in"),
         ("unified/unit/cgroup.subtree_control", None, "cgroup.subtree_control cannot be written"),
     ],
 )
@@ -101,7 +101,7 @@ def test_what_keeps_it_from_being_divided_is_named(file: str, text: str | None, 
     if text is None:
         (tmp_path / file).unlink()
     else:
-        (tmp_path / file).write_text(text)
+        (tmp_path / file).write_text(text.replace("this", str(os.getpid())))
     assert reason in str(tree.why_not())
     assert control_group.divide(tree.proc) == tree.why_not()
     assert control_group.for_this_process(256, tree.proc) is None

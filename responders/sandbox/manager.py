@@ -369,7 +369,7 @@ class Sandboxes:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
                 own = [_own_modules(role) for role in _FOLDERS]
-                dated = traces.read_beforehand(grants.readable(own), grants.listable())
+                dated = traces.read_beforehand(grants.readable(own), grants.listable(own))
                 if dated is not None:
                     return dated
             self._forgets_until = now + traces.HOLDS_SECONDS

@@ -88,7 +88,8 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         checks.append(
             (
                 flat,
-                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not or has no patch",
+                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not, "
+                "or has no patch",
             )
         )
     measures = (Measure("images", float(len(log))),)
