@@ -189,9 +189,9 @@ def test_delay_loss_and_offset_are_felt(rig: Rig) -> None:
         found.id: [(level.at, level.right, level.n) for level in found.curves[0].levels] for found in result.criteria
     }
     assert curves == {
-        "offset-x": [(0, 2, 2), (80, 0, 2)],
-        "loss": [(0, 2, 2), (1, 0, 2)],
-        "delay": [(0.1, 2, 2), (0.9, 0, 2), (3, 0, 2)],
+        "offset-x": [(0, 1, 1), (80, 0, 1)],
+        "loss": [(0, 1, 1), (1, 0, 1)],
+        "delay": [(0.1, 1, 1), (0.9, 0, 1), (3, 0, 1)],
     }
     assert [found.marks for found in result.criteria] == [3, 3, 0]
     assert "By message delay (s): 1.00 at 0.1, 0.00 at 0.9, 0.00 at 3." in result.criteria[2].message

@@ -19,7 +19,8 @@ class StopOn(CriterionBase):
     ``reflected`` is [least, most] in percent, what ``reflected_light_intensity_pc`` reads; ``rgb`` is a
     colour, each part of it met within ``rgb_tolerance``. ``zone`` is [left, bottom, right, top] in mm;
     ``near`` is a point that the sensor is within ``within`` mm of. ``sensor = "either"``: one of the two
-    must do. ``still`` asks that the robot stood for so many seconds before its program ended.
+    must do. What lies beside the floor is black and does not count, unless with ``off_floor``. ``still`` asks that
+    the robot stood for so many seconds before its program ended.
 
     A program that still runs when its time is over has not stopped. One that stops by an error has.
     """
@@ -33,6 +34,7 @@ class StopOn(CriterionBase):
     near: tuple[float, float] | None = None
     within: float = Field(default=50.0, gt=0)
     still: float = Field(default=0.0, ge=0)
+    off_floor: bool = False
 
     @field_validator("zone")
     @classmethod

@@ -18,12 +18,15 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.labels import LabelFinder
 from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
-from service.grading.judging.patterns import Side, by_pattern, without_repeats
+from service.grading.judging.patterns import Side, by_pattern
 from service.grading.judging.tally import Fate, Reply, reply_to
 from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
+
+#: A picture taken so near to an earlier one, mm, shows the same again.
+_SAME_PLACE = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,7 @@ def _that_count(
 ) -> Sequence[Naming]:
     """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
     if criterion.each_pattern is None:
-        counted = without_repeats(own, trial.recording)
+        counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
     else:
         # What a grey patch tells lies under the right sensor.
         side: Side = "right" if criterion.truth == "grey" else "left"

@@ -15,7 +15,7 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.measured import measured_only
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at
 from service.grading.judging.patches import GREYS, decoded
-from service.grading.judging.places import on_floor, part_at
+from service.grading.judging.places import floor_share
 from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.recording import Datum, Image, Pose, Recording
@@ -88,8 +88,8 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         checks.append(
             (
                 flat,
-                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not, "
-                "or has no patch",
+                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
+                "or shows no label's patch",
             )
         )
     measures = (Measure("images", float(len(log))),)
@@ -209,7 +209,7 @@ def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
     """Whether there was floor under the sensor and, where the floor has label patches, one that fills its picture."""
     side, csv, tick = entry
     pose = pose_at(recording, tick / 30)
-    if not on_floor(part_at(recording, "left" if side == "left" else "right", pose)):
+    if floor_share(recording, "left" if side == "left" else "right", pose) < 1:
         return False
     if side == "left" or recording.background not in GREYS or not recording.patches:
         return True

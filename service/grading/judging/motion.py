@@ -324,7 +324,8 @@ def _falls(criterion: Encounters, recording: Recording) -> list[int]:
     for side, rgb in readings.items():
         if criterion.light in (side, "either"):
             x, y = positions(recording, "left_light" if side == "left" else "right_light")[1:].T
-            on_floor = (x >= 0) & (x <= WIDTH) & (y >= 0) & (y <= HEIGHT)
+            edge = robot_of(recording).left_light.diameter / 2
+            on_floor = (x >= edge) & (x <= WIDTH - edge) & (y >= edge) & (y <= HEIGHT - edge)
             dark |= on_floor & (rgb[:, 0] / 255 * 100 < criterion.below)
     return [first + 1 for first, _ in stretches(dark)]
 

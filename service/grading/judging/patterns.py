@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
 from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import listed
-from service.grading.judging.places import look_at, part_at
+from service.grading.judging.places import part_at
 from sim.recording import Recording
 
 How = Literal["first", "any", "majority"]
@@ -35,16 +35,6 @@ def by_pattern(
         if picture.image is not None:
             groups.add(picture, part_at(recording, side, picture.image.pose))
     return [_one(group, how) for group in groups.found]
-
-
-def without_repeats(pictures: Sequence[Naming], recording: Recording) -> list[Naming]:
-    """Pictures of the same window of the floor made into one, which is what was answered most often."""
-    groups: dict[Hashable, list[Naming]] = {}
-    for picture in pictures:
-        if picture.image is not None:
-            where = look_at(recording, "left", picture.image.pose)
-            groups.setdefault((picture.truth, where.column, where.row), []).append(picture)
-    return [group[0] if len(group) == 1 else _majority(group) for group in groups.values()]
 
 
 @dataclass(slots=True)
@@ -74,6 +64,8 @@ class _Groups:
 
 
 def _one(group: Sequence[Naming], how: How) -> Naming:
+    if len(group) == 1:
+        return group[0]
     match how:
         case "first":
             return group[0]

@@ -11,7 +11,7 @@ from typing import Literal
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.outcome import Outcome, cut, failed, passed
-from service.grading.judging.places import in_zone, on_floor, part_at, zone_words
+from service.grading.judging.places import floor_share, in_zone, part_at, zone_words
 from sim.recording import Recording, Verdict
 from submissions.criteria.stopping import StopOn
 
@@ -43,9 +43,9 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
     reflected = 100 * int(rgb[0]) / 255
     checks: list[tuple[bool, str, str]] = []  # whether it holds, what was expected, what there was
     where = f"at ({place[0]:.1f}, {place[1]:.1f})"
-    # Beside the floor all is black, which nobody was asked to find.
-    floor = on_floor(place)
-    beside = "" if floor else ", beside the floor"
+    # Beside the floor all is black: what is not floor is left out of the reading.
+    floor = 1.0 if criterion.off_floor else floor_share(recording, side, recording.end)
+    beside = "" if floor == 1 else ", partly beside the floor" if floor else ", beside the floor"
     if criterion.zone is not None:
         checks.append((in_zone(place, criterion.zone), f"at {zone_words(criterion.zone)}", where))
     if criterion.near is not None:
@@ -55,10 +55,12 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
         checks.append((away <= criterion.within, wanted, f"{where}, {away:.1f} mm away"))
     if criterion.reflected is not None:
         least, most = criterion.reflected
-        reads = floor and least <= reflected <= most
+        reads = floor > 0 and least <= reflected / floor <= most
         checks.append((reads, f"reading {_range(least, most)} %", f"reading {reflected:.2f} %{beside}"))
     if criterion.rgb is not None:
-        close = floor and all(abs(a - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True))
+        close = floor > 0 and all(
+            abs(a / floor - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True)
+        )
         seen = ", ".join(str(int(part)) for part in rgb)
         colour = ", ".join(f"{part:g}" for part in criterion.rgb)
         checks.append((close, f"over the colour ({colour})", f"over ({seen}){beside}"))

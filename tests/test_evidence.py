@@ -1,0 +1,311 @@
+"""Attacks on evidence: the same thing shown many times, or marks for what was not done at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+
+from driving import along, driven, rest, spin, straight
+from service.grading.grade import CriterionResult
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from sim.recording import Datum, Image, Line, Message, Pose, Recording
+from submissions.assignment_file import find_assignment
+from submissions.submission import Source, Submission
+from test_judging import criterion, judged, recorded
+
+_BEGIN = "%%sim_magic_preloaded\nimport time\n"
+_TINY_SQUARE = """
+def turn(way):
+    tank_drive.on(SpeedPercent(10 * way), SpeedPercent(-10 * way))
+    time.sleep(2.75)
+    tank_drive.off()
+    time.sleep(0.5)
+def ahead(seconds):
+    tank_drive.on(SpeedPercent(20), SpeedPercent(20))
+    time.sleep(seconds)
+    tank_drive.off()
+    time.sleep(0.5)
+turn(1)
+ahead(2.5)
+for corner in range(5):
+    turn(-1)
+    ahead(1)
+"""
+_ALL_AT_ONCE = """
+tank_drive.on(SpeedPercent(30), SpeedPercent(30))
+for step in range(45):
+    for words in {words}:
+        print(words)
+        say(words)
+    time.sleep(0.2)
+tank_drive.off()
+"""
+_EVERY_BOX = "rows 7 rows 9 rows 10 rows 11 columns 7 columns 9 columns 11 black 49 black 51 black 53 black 60"
+
+
+#: Assignment, robot program, responder, the marks that it must not exceed, and those it had before this was thought of.
+_SUBMISSIONS: Sequence[tuple[str, str, str, str, str]] = [
+    ("count-bands", _ALL_AT_ONCE.format(words='["1 2 3 4"]'), "", "2.00", "8.00"),
+    ("count-bands", _ALL_AT_ONCE.format(words='"1234"'), "", "2.00", "8.00"),
+    (
+        "stop-at-black-line",
+        "tank_drive.on(SpeedPercent(-50), SpeedPercent(-50))\ntime.sleep(3)\ntank_drive.off()\nsay('x')\n",
+        "",
+        "2.00",
+        "6.00",
+    ),
+    (
+        "log-bands",
+        "tank_drive.on(SpeedPercent(50), SpeedPercent(50))\nlight = 1\nwhile light > 0:\n"
+        "    light = colorLeft.reflected_light_intensity_pc\n"
+        "    for again in range(10):\n        print('Colour: ' + str(light))\n    time.sleep(0.9)\n",
+        "",
+        "3.50",
+        "5.50",
+    ),
+    (
+        "bounding-boxes",
+        "print('IMG_DATA')\ntime.sleep(1)\n",
+        f'def responder(text):\n    return \'JSON::{{"message": "{_EVERY_BOX}"}}\'\n',
+        "2.00",
+        "9.00",
+    ),
+    ("calibrate-on-line", "print('255 100 0 0')\n", "", "1.00", "6.00"),
+    ("calibrate-on-lollipop", "print('82.75 82.75 0 0 100 66.67 100 33.33')\n", "", "1.00", "7.00"),
+    (
+        "grey-band-readings",
+        "print('100 86.27 82.75 50.2 0 255 255 255 220 220 220 211 211 211 128 128 128 0 0 0')\n",
+        "",
+        "1.00",
+        "6.00",
+    ),
+    (
+        "labelled-digits",
+        "tank_drive.on(SpeedPercent(50), SpeedPercent(50))\ntime.sleep(6)\nprint('image_data both')\n",
+        "",
+        "0.00",
+        "2.00",
+    ),
+    ("follow-a-shape-and-log-the-gyro", _TINY_SQUARE, "", "0.00", "3.00"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "robot", "responder", "most", "before"), _SUBMISSIONS, ids=lambda value: value if "-" in value else ""
+)
+def test_what_does_not_do_what_was_asked_gets_little(
+    name: str, robot: str, responder: str, most: str, before: str, rig: Rig
+) -> None:
+    submission = Submission(
+        "x", Source("robot.py", _BEGIN + robot), Source("responder.py", responder) if responder else None
+    )
+    graded = grade(submission, find_assignment(name), rig=rig)
+    assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
+
+
+# Pictures
+
+#: The middle of the left sensor, to the robot's right and ahead, as it is mounted.
+_LEFT = (-20.0, 30.0)
+
+
+def _looking_at(x: float, y: float, heading: float) -> Pose:
+    """Where the robot stands with its left sensor at (x, y)."""
+    turn = math.radians(heading - 90)
+    right, ahead = _LEFT
+    return Pose(
+        x - (math.cos(turn) * right - math.sin(turn) * ahead),
+        y - (math.sin(turn) * right + math.cos(turn) * ahead),
+        heading,
+    )
+
+
+def _photographed(*seen: tuple[Pose, str, str], **parts: Any) -> Recording:
+    """Pictures from these poses: what each shows, and the answer."""
+    images, messages = [], []
+    for number, (pose, truth, answer) in enumerate(seen):
+        t = number / 10
+        pixels = np.full(1600, 255, np.uint8)
+        pixels[: number + 1] = number
+        images.append(Image(t, int(30 * t), pose, pixels.tobytes(), bytes(1600), len(messages), truth))
+        messages += [Message(t, "robot", "IMG_DATA::{}", t), Message(t, "responder", answer, t, len(messages))]
+    return recorded(images=tuple(images), messages=tuple(messages), background="Simple_Shapes", **parts)
+
+
+def _counted(result: CriterionResult) -> int:
+    assert result.accuracy is not None
+    return result.accuracy.n
+
+
+@pytest.mark.parametrize("how", ["majority", "any", "first"])
+@pytest.mark.parametrize("headings", [range(0, 360, 60), range(0, 360, 5)])
+def test_one_pattern_from_many_headings_is_one_pattern(how: str, headings: range) -> None:
+    """Each of these six stands some 36 mm from the next, and gave 6 of 6 patterns."""
+    one = [(_looking_at(310, 920, heading), "square", "square") for heading in headings]
+    result = judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*one))
+    assert result.marks == 0
+    assert "pictures of 1 patterns, and 6 were expected" in result.message
+    six = [(_looking_at(230 + 80 * number, 920, 60 * number), "square", "square") for number in range(6)]
+    assert judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*six)).marks == 4
+
+
+def test_a_pattern_that_a_patch_names_is_where_the_patch_is() -> None:
+    """Turning round the patch moves the left sensor far, and the right one, which reads it, not at all."""
+    patch = np.full((20, 20, 4), 255, np.uint8)
+    patch[:, :, :3] = 0
+    seen = []
+    for heading in range(0, 360, 60):
+        turn = math.radians(heading - 90)
+        x = 350 - (math.cos(turn) * 20 - math.sin(turn) * 30)
+        y = 920 - (math.sin(turn) * 20 + math.cos(turn) * 30)
+        seen.append((Pose(x, y, heading), "square", "square"))
+    run = _photographed(*seen)
+    run = replace(run, images=tuple(replace(image, right=patch.tobytes(), truth=None) for image in run.images))
+    result = judged(criterion("classification", truth="grey", each_pattern="majority", patterns=6), run)
+    assert _counted(result) == 6
+    assert result.marks == Decimal("0.67")
+
+
+def test_a_robot_may_not_turn_to_what_is_easier() -> None:
+    """The robot stays at its start, and its sensor looks at the shape before."""
+    start = _looking_at(310, 920, 0)
+    turned = Pose(start.x, start.y, 180)
+    run = _photographed((turned, "square", "square"), start=start)
+    near = criterion("classification", near_start=30, pictures="last")
+    assert judged(near, run).marks == 0
+    assert "the robot sent none from within 30 mm of where it started" in judged(near, run).message
+    stayed = _photographed((_looking_at(318, 915, 15), "square", "square"), start=start)
+    assert judged(near, stayed).marks == 4
+
+
+def test_sending_the_same_picture_again_counts_nothing() -> None:
+    """One that is known, a hundred times, made up for all that are not."""
+    known = [(_looking_at(230, 920, heading), "square", "square") for heading in range(100)]
+    other = [(_looking_at(310 + 80 * number, 920, 0), "diamond", "square") for number in range(3)]
+    result = judged(criterion("classification"), _photographed(*known, *other))
+    assert _counted(result) == 4
+    assert result.marks == 1
+    again = [(_looking_at(230, 920, 0), "square", answer) for answer in ("square", "diamond", "square")]
+    assert judged(criterion("classification"), _photographed(*again)).marks == 4
+
+
+def test_one_place_gives_one_image_whatever_the_noise() -> None:
+    """With noise no two pictures are the same, and standing still gave as many different ones as were asked for."""
+    patch = np.zeros((20, 20, 4), np.uint8).tobytes()
+
+    def collected(*places: float) -> Recording:
+        run = _photographed(*((_looking_at(x, 920, 0), "square", "") for x in places))
+        return replace(run, images=tuple(replace(image, right=patch) for image in run.images))
+
+    asked = criterion("collects", source="sent", each=4, classes=["square"], over="mean")
+    still = judged(asked, collected(310, 310, 310, 310))
+    assert still.marks == 1
+    assert "3 repeat" in judged(criterion("collects", source="sent", classes=["square"]), collected(*[310] * 4)).message
+    assert judged(asked, collected(306, 308, 310, 312)).marks == 4
+
+
+# What is dark, said, logged and answered
+
+
+def test_what_lies_beside_the_floor_is_nothing_to_come_upon() -> None:
+    dark = [(255, 255, 255)] * 20 + [(0, 0, 0)] * 40
+    moves = (straight(100), straight(-50), spin(90))
+    asked = criterion("encounters", below=40)
+    assert judged(asked, driven(*moves, rgb=dark[: 20 + 10 + 30], start=Pose(1000, 500, 0))).marks == 4
+    off = driven(*moves, rgb=dark[: 20 + 10 + 30], start=Pose(1000, 1120, 90))
+    assert judged(asked, off).marks == 0
+
+
+@pytest.mark.parametrize(
+    ("y", "reads", "keys", "passes"),
+    [
+        (500, 0, {"reflected": [0, 5]}, True),
+        (1200, 0, {"reflected": [0, 5]}, False),
+        (1200, 0, {"reflected": [0, 5], "off_floor": True}, True),
+        (1143, 255 * 0.5, {"reflected": [0, 60]}, False),
+        (1200, 0, {"rgb": [0, 0, 0]}, False),
+        (1200, 0, {"near": [1000, 1200], "within": 20}, True),
+    ],
+)
+def test_black_beside_the_floor_is_not_stopped_on(y: float, reads: float, keys: dict[str, Any], passes: bool) -> None:
+    end = _looking_at(1000, y, 90)
+    points = np.array([[end.x, end.y - 100], [end.x, end.y]])
+    run = along(points, np.array([90.0, 90.0]), rgb=[(reads, reads, reads)])
+    assert (judged(criterion("stop_on", **keys), run).marks == 4) is passes
+
+
+def test_an_event_is_not_said_where_another_belongs() -> None:
+    run = driven(straight(600), start=Pose(100, 500, 0))
+    here, there = {"text": "1", "zone": [100, 400, 300, 600]}, {"text": "2", "zone": [400, 400, 700, 600]}
+    asked = criterion("events", sensor="middle", source="speech", events=[here, there], over="mean")
+
+    def said(*lines: tuple[float, str]) -> CriterionResult:
+        return judged(asked, replace(run, spoken=tuple(Line(t, text) for t, text in lines)))
+
+    assert said((1.0, "1"), (3.0, "2")).marks == 4
+    assert said((1.0, "1"), (1.8, "nearly 2"), (3.0, "2"), (3.5, "2")).marks == 4  # between the places
+    both = said((1.0, "1 2"), (3.0, "1 2"))
+    assert both.marks == 0
+    assert "and not where another belongs, but it came at" in both.message
+    assert said((1.0, "1"), (1.1, "2"), (3.0, "2")).marks == 2
+
+
+def test_a_reading_that_is_printed_again_is_one_sample() -> None:
+    run = driven(rest(90))
+    repeated = tuple(Datum(0.5 + n / 1000, "Light_left", 255.0 - n / 10, None) for n in range(10))
+    asked = criterion("datalog", series="Light_left", measured="left light", at_least=10, over="mean")
+    assert judged(asked, replace(run, datalog=repeated)).marks == Decimal("0.40")
+    read = tuple(Datum(0.5 + n / 100, "Light_left", 255.0, None) for n in range(10))
+    assert judged(asked, replace(run, datalog=read)).marks == 4
+
+
+def _talk(*exchanges: tuple[str, str]) -> Recording:
+    messages: list[Message] = []
+    for number, (text, answer) in enumerate(exchanges):
+        messages += [Message(number / 10, "robot", text, number / 10)]
+        messages += [Message(number / 10, "responder", answer, number / 10 + 0.05, len(messages) - 1)]
+    return recorded(messages=tuple(messages))
+
+
+def test_a_message_that_is_sent_again_asks_nothing_new() -> None:
+    easy, hard = ("PY::0", 'JSON::{"n": 0}'), ("PY::1", "no idea")
+    answers = criterion("replies", is_json=True, over="mean")
+    assert judged(answers, _talk(*[easy] * 9, hard)).marks == 2
+    assert judged(answers, _talk(easy, hard)).marks == 2
+    assert judged(criterion("replies", is_json=True, at_least=3), _talk(easy, easy, easy)).marks == 0
+    queue = criterion("messages", queue_grows=True, over="mean")
+    assert judged(queue, _talk(*[easy] * 9, hard)).marks == 2
+
+
+def test_what_belongs_to_other_poses_is_not_reported_as_well() -> None:
+    places = (Pose(100, 800, 0), Pose(200, 800, 0), Pose(300, 800, 0))
+    asked = criterion("reports", expected=[["rows", 7], ["rows", 9], ["rows", 11]])
+
+    def told(*texts: str) -> CriterionResult:
+        runs = (recorded(printed=(Line(1.0, text),)) for text in texts)
+        return judged(asked, *runs, poses=places)
+
+    assert told("rows 7 columns 9", "columns 11, rows 9", "rows 11 of 20").marks == 4
+    assert told(*["rows 7 rows 9 rows 11"] * 3).marks == 0
+    assert told(*["rows 7 rows 9"] * 3).marks == 0
+
+
+def test_spinning_beside_a_point_is_no_round() -> None:
+    angles = np.linspace(0, 2 * math.pi, 200)
+
+    def circle(radius: float) -> Recording:
+        points = np.column_stack([450 + radius * np.cos(angles), 493 + radius * np.sin(angles)])
+        return along(points, np.degrees(angles) + 90)
+
+    asked = criterion("circuits", x=450, y=493, times=[0.9, 1.1], clear_of=150)
+    assert judged(asked, circle(200)).marks == 4
+    near = judged(asked, circle(20))
+    assert near.marks == 0
+    assert "150 mm clear of (450, 493), but it came as near as 20 mm" in near.message
