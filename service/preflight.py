@@ -208,8 +208,9 @@ def _unzip(path: Path, folder: Path) -> None:
                         if left < 0:
                             raise UsageError(f"{path.name}: unpacks to more than {_MOST_BYTES // 10**9} GB.")
                         sink.write(chunk)
-    except FileExistsError:
-        raise UsageError(f"{path.name}: holds two files of the same name.") from None
+    except FileExistsError as error:
+        double = shown(str(Path(error.filename).relative_to(folder)))
+        raise UsageError(f"{path.name}: holds two files of the same name, {double}.") from None
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, ValueError) as error:
         raise UsageError(f"{path.name}: cannot be unpacked: {error}.") from None
     except OSError as error:

@@ -204,6 +204,15 @@ def test_grade_keeps_reports_apart(tmp_path: Path) -> None:
         assert any(f"{path}: bob is named more than once" in sentence for sentence in sentences)
 
 
+def test_a_report_made_later_does_not_take_the_place_of_anothers(tmp_path: Path) -> None:
+    ada, blank = _submit(tmp_path, "ada", "ada's"), _submit(tmp_path, " ada", "eve's")
+    reports = tmp_path / "reports"
+    for path in (ada, blank):
+        assert robomark("grade", path, "-a", ASSIGNMENT, "--report", reports).returncode == 0
+    assert len(list(reports.iterdir())) == 2
+    assert "ada&#39;s" in (reports / "ada.html").read_text()
+
+
 def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> None:
     intake.accept(store, hand_in("ada"), max_attempts=3)
     with store.transaction() as session:

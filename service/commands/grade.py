@@ -95,7 +95,7 @@ def grade(
                 continue
             _PRINT[form](graded)
             if report is not None:
-                written = write_report(report, graded, submission)
+                written = write_report(report, graded, submission, named_by(path))
                 print(f"report: {written}", file=sys.stderr)
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError

@@ -68,7 +68,7 @@ def write_page(folder: Path, name: str, page: str) -> Path:
     return path
 
 
-def write_report(folder: Path, grade: Grade, submission: Submission | None = None) -> Path:
-    """Draw the plots of a grade and write the student's report; where it is."""
+def write_report(folder: Path, grade: Grade, submission: Submission, written: str) -> Path:
+    """Draw the plots of a grade and write the report, called after the student as the name was written; where it is."""
     page = student_report(grade, draw_all(grade), submission)
-    return write_page(folder, f"{file_stem(grade.student)}.html", page)
+    return write_page(folder, f"{file_stem(written)}.html", page)
