@@ -1,0 +1,268 @@
+"""A table made at home with the same tool is worth nothing where marks are given: the worlds and the chance are others.
+
+Each attack is a hand-in that looks up what a spy wrote down in other installations' worlds. That it works at all is
+shown where it has to: in the worlds that it was made in.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.judging.patches import grey_picture
+from service.grading.rig import Rig
+from submissions.assignment import Assignment
+from submissions.assignment_file import find_assignment
+from submissions.example_folder import examples
+from submissions.seeds import PUBLIC, Secret
+from submissions.submission import Source, Submission
+
+MARKING = Secret("of the installation where marks are given")
+HOMES = (PUBLIC, Secret("of the home of a student"))
+
+#: All that may tell one trial from another before anything was seen, and where the robot stands.
+TELLTALE = """
+import os, random, secrets, uuid
+import numpy
+told = {
+    "random": random.random(), "numpy": float(numpy.random.random()), "system": os.urandom(8).hex(),
+    "secrets": secrets.token_hex(8), "node": uuid.getnode(), "uuid": uuid.uuid4().hex,
+    "shuffled": random.sample(range(99), 9),
+}
+"""
+STANDS = """
+import json, time
+import ev3dev2_glue as glue
+{telltale}
+told["place"] = [round(ultrasonic.distance_centimeters, 1), gyro.angle]
+print("PY::" + json.dumps(told))
+time.sleep(0.3)
+print("IMG_DATA")
+time.sleep(0.5)
+if glue.pyState()["messages"]:
+    say("It is " + str(glue.pyState()["messages"][-1]["message"]["shape"]))
+"""
+DRIVES = """
+import json, time
+{telltale}
+tank_drive.on(5, 5)
+for step in range(100):
+    told["place"] = round(tank_drive.left_motor.position)
+    told["step"] = step
+    print("PY::" + json.dumps(told))
+    print("IMG_DATA")
+    time.sleep(0.2)
+tank_drive.off()
+"""
+RESPONDER = """
+import base64, hashlib, json, zlib
+{telltale}
+TABLE = json.loads(zlib.decompress(base64.b64decode({table!r})))
+heard = {}
+
+def responder(text):
+    global heard
+    if text.startswith("PY::"):
+        heard = json.loads(text[4:])
+        return "noted"
+    left = json.loads(text[10:])["left"]
+    keys = {"picture": hashlib.sha256(left.encode()).hexdigest()}
+    keys |= {"mine " + kind: value for kind, value in told.items()}
+    keys |= {"its " + kind: value for kind, value in heard.items()}
+    keys = {kind: json.dumps(value) for kind, value in keys.items()}
+    print(json.dumps(keys))
+    hits = [TABLE[kind][key] for kind, key in keys.items() if key in TABLE.get(kind, {})]
+    answer = hits[0] if hits else None
+    return "JSON::" + json.dumps({"message": {"shape": answer, "digit": answer}})
+"""
+
+Table = dict[str, dict[str, str]]
+
+
+def hand_in(program: str, table: Mapping[str, Mapping[str, str]], name: str) -> Submission:
+    packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
+    # numpy is not there for robot programs.
+    own = TELLTALE.replace("import numpy\n", "").replace('"numpy": float(numpy.random.random()), ', "")
+    responder = RESPONDER.replace("{telltale}", TELLTALE).replace("{table!r}", repr(packed))
+    return Submission(
+        name, Source("robot.py", program.replace("{telltale}", own)), Source("responder.py", f"# {name}\n{responder}")
+    )
+
+
+def marked(name: str) -> Assignment:
+    """The assignment with what its marks for recognition depend on, and nothing else."""
+    asked = find_assignment(name)
+    hidden = [scenario for scenario in asked.scenarios if scenario.visibility == "hidden"]
+    ids = {scenario.id for scenario in hidden}
+    wanted = [each for each in asked.criteria if set(each.scenarios) & ids and each.marks]
+    return replace(asked, scenarios=tuple(hidden), criteria=tuple(wanted))
+
+
+def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
+    """The keys that the responder saw with each picture, and what the picture showed."""
+    for trial in graded.trials:
+        lines = [line for line in trial.recording.responder_output.splitlines() if line.startswith("{")]
+        for line, image in zip(lines, trial.recording.images, strict=True):
+            yield json.loads(line), image.truth
+
+
+def table_of(grades: Sequence[Grade]) -> Table:
+    """What a student writes down at home, where the tool tells what each picture showed."""
+    table: Table = {}
+    for graded in grades:
+        for keys, truth in looked_up(graded):
+            for kind, key in keys.items() if truth is not None else ():
+                table.setdefault(kind, {})[key] = truth
+    return table
+
+
+ATTACKED = {
+    "digits-on-a-sheet": STANDS,
+    "shape-at-random": STANDS,
+    "rules-without-a-network": STANDS,
+    "shapes-off-centre": STANDS,
+    "shapes-on-the-move": DRIVES,
+}
+_LONG = [pytest.param(name, marks=pytest.mark.long) if name == "shapes-on-the-move" else name for name in ATTACKED]
+
+
+@pytest.mark.parametrize("name", _LONG)
+def test_a_table_made_at_home_earns_nothing(rig: Rig, name: str) -> None:
+    asked, program = marked(name), ATTACKED[name]
+    offered = sum(criterion.marks for criterion in asked.criteria)
+    assert offered >= 8
+    at_home = [grade(hand_in(program, {}, "spy"), asked, secret=home, rig=rig) for home in HOMES]
+    table = table_of(at_home)
+    assert len(table["picture"]) >= 20
+
+    # Where it was made, the pictures tell everything. So would the chance, if it did not differ by hand-in.
+    seen = hand_in(program, {"picture": table["picture"]}, "table of pictures")
+    assert grade(seen, asked, secret=HOMES[1], rig=rig).marks == offered
+    chances = {kind: entries for kind, entries in table.items() if kind != "picture" and "place" not in kind}
+    chances.pop("its step", None)
+    assert len(chances) == 13
+    by_chance = hand_in(program, chances, "table of chance")
+    assert grade(by_chance, asked, secret=HOMES[1], rig=rig).marks == 0
+
+    # Where marks are given, no picture and no chance is met again.
+    everything = grade(
+        hand_in(program, {**chances, "picture": table["picture"]}, "both"), asked, secret=MARKING, rig=rig
+    )
+    hits = [kind for keys, _ in looked_up(everything) for kind, key in keys.items() if key in table[kind]]
+    assert {kind for kind in hits if "place" not in kind and kind != "its step"} == set()
+    assert everything.marks == 0
+    # A place tells no more than a guess does.
+    places = {kind: entries for kind, entries in table.items() if kind in ("its place", "its step")}
+    assert grade(hand_in(program, places, "table of places"), asked, secret=MARKING, rig=rig).marks <= offered / 3
+
+
+TRAINS = """
+import base64, json, zlib
+import numpy
+TABLE = json.loads(zlib.decompress(base64.b64decode({table!r})))
+
+class Model:
+    def predict(self, rows):
+        return [TABLE.get(str(numpy.round(row * 255).astype(int).tolist()), "unknown") for row in rows]
+
+def train(images, labels):
+    return Model()
+"""
+
+
+def test_a_table_made_at_home_is_no_model(rig: Rig) -> None:
+    asked = find_assignment("train-a-recogniser")
+    marking = tuple(criterion for criterion in asked.criteria if criterion.marks)
+    asked = replace(asked, criteria=marking)
+    table = {}
+    for trial in grade(_model({}), asked, secret=HOMES[1], rig=rig).trials:
+        for image in trial.recording.images:
+            row = grey_picture(image, focus=True).astype(float).ravel()
+            table[str(np.round(row / max(1.0, row.max()) * 255).astype(int).tolist())] = str(image.truth)
+    assert grade(_model(table), asked, secret=HOMES[1], rig=rig).marks == asked.max_marks
+    assert grade(_model(table), asked, secret=MARKING, rig=rig).marks == 0
+
+
+def _model(table: Mapping[str, str]) -> Submission:
+    packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
+    return Submission("s", None, Source("responder.py", TRAINS.replace("{table!r}", repr(packed))))
+
+
+# What a child may know
+
+
+SHOWS = """
+import os, random, uuid
+print("PY::", random.random(), os.urandom(4).hex(), uuid.getnode())
+print("NUMBER", os.getpid())
+"""
+ECHO = "import random\ndef responder(text): return str(random.random())\n"
+
+
+def _said(graded: Grade) -> list[Any]:
+    return [[message.text for message in trial.recording.messages] for trial in graded.trials]
+
+
+def _numbers(graded: Grade) -> list[int]:
+    """The trials in the order in which their processes were started."""
+    numbers = [
+        next(int(line.text.split()[1]) for line in trial.recording.printed if line.text.startswith("NUMBER"))
+        for trial in graded.trials
+    ]
+    return sorted(range(len(numbers)), key=numbers.__getitem__)
+
+
+@pytest.fixture(scope="module")
+def noisy() -> Assignment:
+    asked = find_assignment("shape-at-random")
+    return replace(asked, criteria=asked.criteria[:1])
+
+
+def submission(comment: str) -> Submission:
+    return Submission("s", Source("robot.py", f"# {comment}{SHOWS}"), Source("responder.py", ECHO))
+
+
+def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignment) -> None:
+    with Rig() as rig:
+        one, other = (grade(submission(text), noisy, secret=MARKING, rig=rig) for text in ("one", "other"))
+    assert [trial.seed for trial in one.trials] == [trial.seed for trial in other.trials]
+    assert _numbers(one) != _numbers(other)
+    assert sorted(_numbers(one)) == list(range(len(one.trials))) != _numbers(one)
+    spoken = {text for graded in (one, other) for texts in _said(graded) for text in texts}
+    assert len(spoken) == 2 * len(_said(one)) * len(_said(one)[0])
+
+
+def test_the_same_submission_and_secret_give_the_same_recordings(rig: Rig, noisy: Assignment) -> None:
+    asked = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
+    quiet = Submission(
+        "s", Source("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), Source("responder.py", ECHO)
+    )
+    chains = [
+        [trial.recording.sha256 for trial in grade(replace(quiet, student=who), asked, secret=secret, rig=rig).trials]
+        for who, secret in (("ada", MARKING), ("bob", MARKING), ("ada", HOMES[1]))
+    ]
+    assert chains[0] == chains[1] != chains[2]
+
+
+def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(rig: Rig) -> None:
+    """The start place that judging goes by is the one that was driven from, whatever the secret."""
+    asked = find_assignment("black-or-grey")
+    shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
+    program = (examples("black-or-grey") / "reference" / "robot.py").read_text()
+    reference = Submission("s", Source("robot.py", program))
+    orders = set()
+    for secret in (PUBLIC, MARKING, *HOMES[1:]):
+        graded = grade(reference, shuffled, secret=secret, rig=rig)
+        assert graded.marks == Decimal(8)
+        orders.add(tuple(trial.place for trial in graded.trials))
+    assert len(orders) == 3
