@@ -37,7 +37,8 @@ from responders.sandbox import manager
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import NONE, Role, Sandboxes, Walls
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
+from sim.recording import Verdict
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
@@ -270,7 +271,7 @@ def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
-    if stop is not None and "SIGKILL" in stop.message:
+    if stop is not None and stop.verdict is Verdict.HOST_ERROR:
         return f"LEAK it died as if somebody else had killed it ({stop.message})"
     if stop is not None and any(words in stop.message for words in ("not JSON", "without its number")):
         return f"LEAK another program wrote on the wire ({stop.message})"
@@ -341,6 +342,8 @@ def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str
                 return said + ([json.dumps(frame["error"])] if frame["error"] else []), None
     except ChildStopped as stop:
         return said, stop
+    except KilledFromOutside:
+        return said, ChildStopped(Verdict.HOST_ERROR, "SIGKILL")
 
 
 @contextlib.contextmanager

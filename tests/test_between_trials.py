@@ -116,7 +116,7 @@ def test_how_it_is_mounted_decides(option: str, said: str, tmp_path: Path) -> No
 
 
 def test_this_machine_forgets(tmp_path: Path) -> None:
-    listed = Path(grants.listable()[0])
+    listed = Path(grants.listable([])[0])
     os.utime(listed, (0, listed.stat().st_mtime))
     with Sandboxes(Walls(bubblewrap=False)) as sandboxes:
         assert sandboxes.remembers() is None
