@@ -10,8 +10,9 @@ from sqlalchemy import update
 
 import report_builders
 from builders import comparable, echo, hand_in
+from service.commands.batch_tables import remarks
 from service.grading.grade import Grade
-from service.store import artifacts, batches, canaries, grades, jobs
+from service.store import artifacts, batches, canaries, figures, grades, jobs
 from service.store.engine import Store
 from service.store.installation import secret_of
 from service.store.intake import Accepted, HandIn, accept, accept_batch
@@ -82,6 +83,18 @@ def test_what_waits_is_copied_when_its_turn_comes(store: Store) -> None:
     assert (_job(store, claim.job_id).copied_from, _job(store, claim.job_id).plots) == (first, PlotState.DUE)
     with pytest.raises(jobs.Fenced):
         jobs.finish_with_copy(store, claim)
+
+
+def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None:
+    criteria = (replace(GRADE.criteria[0], unjudged="it took more than 11 s of computing"), *GRADE.criteria[1:])
+    _accept(store, "ada")
+    first = _grade_next(store, replace(GRADE, criteria=criteria))
+    with store.reading() as session:
+        assert grades.load(session, first).criteria[0].unjudged == criteria[0].unjudged
+        line = batches.job_line(session, first)
+        assert figures.look(session).unjudged == 1
+    assert "1 criteria not judged" in remarks(line)
+    assert _accept(store, "bob").copied_from is None
 
 
 def test_what_is_asked_for_anew_is_run(store: Store) -> None:

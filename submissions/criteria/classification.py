@@ -33,11 +33,12 @@ class Recognition(CriterionBase):
     never marked. ``late = "wrong"`` counts an answer as wrong that the robot had not got when it sent its
     next picture, or at its end.
 
-    ``pictures`` says which of a trial's pictures count. With ``each_pattern`` all pictures of one pattern count
-    as one: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"`` of the answers; a trial
+    ``pictures`` says which of a trial's pictures count; those of the same thing from the same place under the
+    sensor are one, by the majority of the answers. With ``each_pattern`` all pictures of one pattern count as one,
+    wherever the robot stood: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"``; a trial
     that has pictures of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
-    ``near_start`` only pictures count that were taken at most so many mm from where the robot started, so that it
-    cannot drive to one that is easier. A trial without a picture that counts is one wrong answer, so that staying
+    ``near_start`` only pictures count whose sensor was at most so many mm from where it was at the start, so that
+    the robot cannot drive or turn to one that is easier. A trial without a picture that counts is one wrong answer, so that staying
     silent never helps.
     """
 

@@ -23,7 +23,8 @@ class Datalog(CriterionBase):
     ``plateau_samples`` samples in a row, within ``tolerance``, in this order; others may lie between.
     ``between`` is [least, most] for every sample; ``covers`` is a range that the series must reach both ends
     of. With ``measured`` only samples count that this instrument read (in any unit of the brick's) at most half a
-    second before they were printed: a program may print any number. ``dips_below`` names a series whose lowest
+    second before they were printed, one for each 10 ms that a reading takes: a program may print any number, and any
+    number of times. ``dips_below`` names a series whose lowest
     sample must lie above this one's. ``timed`` asks for the time in every sample, as in
     ``print("Light_left: 42 " + str(get_clock()))``.
     """
@@ -59,7 +60,8 @@ class ImageLog(CriterionBase):
 
     ``left`` and ``right`` are how many there must be of each sensor. ``at_start`` asks that each shows what
     the sensor sees from the pose that the scenario starts at; ``pairs`` that left and right take turns,
-    left first; ``uniform`` names the sensor whose images must be of one colour, as a label patch is.
+    left first; ``uniform`` names the sensor whose images must be of one colour, as a label patch is, and show one
+    where the floor has them.
     """
 
     check: Literal["image_log"]

@@ -123,7 +123,7 @@ class Excursions(CriterionBase):
 class Encounters(CriterionBase):
     """What the robot does each time a light sensor sees something dark.
 
-    An encounter is when the reading of ``light`` falls below ``below`` (reflected light, percent). It is
+    An encounter is when the reading of ``light`` falls below ``below`` (reflected light, percent) on the floor. It is
     answered when what ``then`` lists follows in that order within ``seconds``: ``reverse`` (5 mm backwards),
     ``turn`` (by 15 degrees), ``stop`` (standing still for 0.1 s). ``at_least`` of them must be answered.
     """

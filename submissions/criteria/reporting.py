@@ -22,7 +22,8 @@ class Reports(CriterionBase):
     or a text, must come in this order somewhere in what the program prints and says (``source`` narrows it
     down; ``reply`` looks at the responder's answers). Numbers are met within ``tolerance``, texts as whole
     words without regard to case. ``among`` lists the words to choose from: any of them that is not expected
-    is wrong, so that saying all of them does not help. ``only`` asks that no other number is reported.
+    is wrong, so that saying all of them does not help; so is a report that has the entries of half of the other
+    poses, or more, as well. ``only`` asks that no other number is reported.
     ``expected = "label"`` is what the floor has under the left light sensor at the start.
     """
 
@@ -113,7 +114,8 @@ class Events(CriterionBase):
     """Each text is said or printed, in this order, while the sensor is where it belongs.
 
     ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``; a text is found anywhere in
-    what is said, as whole words, number words counting as numbers. The sensor (``middle`` is the middle of
+    what is said, as whole words, number words counting as numbers. One that is said in the zone of another text
+    does not count. The sensor (``middle`` is the middle of
     the axle) may be up to ``margin`` mm outside of the zone.
     """
 

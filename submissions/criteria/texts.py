@@ -19,7 +19,7 @@ class _TextConditions(CriterionBase):
     equals: Texts = ()  # the text is one of these
     starts_with: Texts = ()  # begins with one of these
     contains: Texts = ()  # has all of these in it
-    matches: str | None = None  # a regular expression, found anywhere in the text
+    matches: str | None = None  # a regular expression that RE2 takes, found anywhere in the text
     ignore_case: bool = False
 
     @field_validator("equals", "starts_with", "contains", mode="before")
@@ -136,7 +136,7 @@ class Replies(_TextConditions):
 
     ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.
     Otherwise every message of the robot's that reached the responder must have an answer that meets the
-    conditions, and there must be ``at_least`` of them (1); ``to`` and ``to_starts_with`` narrow down which
+    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down which
     messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the
     conditions, ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the
     whole answer.
