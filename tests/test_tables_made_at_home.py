@@ -237,7 +237,10 @@ def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignme
         one, other = (grade(submission(text), noisy, secret=MARKING, rig=rig) for text in ("one", "other"))
     assert [trial.seed for trial in one.trials] == [trial.seed for trial in other.trials]
     assert _numbers(one) != _numbers(other)
-    assert sorted(_numbers(one)) == list(range(len(one.trials))) != _numbers(one)
+    shown = len([trial for trial in one.trials if trial.visibility == "visible"])
+    for order in (_numbers(one), _numbers(other)):
+        assert sorted(order[:shown]) == list(range(shown)) != order[:shown]
+        assert sorted(order[shown:]) == list(range(shown, len(one.trials))) != order[shown:]
     spoken = {text for graded in (one, other) for texts in _said(graded) for text in texts}
     assert len(spoken) == 2 * len(_said(one)) * len(_said(one)[0])
 

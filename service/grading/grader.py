@@ -100,8 +100,7 @@ def grade(
         rig.check_forgetting()
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.pulse)
-    # In an order of each submission's own: what counts processes or looks at a clock does not tell a trial again.
-    for number in sorted(range(len(trials)), key=Stream(own_seed, "order of trials").integer):
+    for number in _run_order(trials, own_seed):
         trial = trials[number]
         order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed), submission)
         run[number] = TrialResult(
@@ -135,6 +134,19 @@ def grade(
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results), *_unjudged_notes(criteria)),
         secret_sha256=secret.sha256,
+    )
+
+
+def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
+    """The numbers of the trials as they are run: visible ones first, and else in an order of each submission's own.
+
+    So what counts processes or looks at a clock does not tell a trial again, and what is shown was there before the
+    first hidden trial was.
+    """
+    chance = Stream(own_seed, "order of trials")
+    return sorted(
+        range(len(trials)),
+        key=lambda number: (trials[number].scenario.visibility != "visible", chance.integer(number)),
     )
 
 

@@ -1,0 +1,233 @@
+"""Hidden trials reach a student by their marks alone: whatever a hand-in does in them, it reads the same report.
+
+Each attack lets what its robot sees in a hidden trial decide on something that could be told: a count, a text, a
+time, a place. It is graded in two hidden worlds that differ; the visible ones and the marks do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import pytest
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.reports.audience import student_view
+from service.reports.csv_output import moodle_csv
+from service.reports.gradescope import gradescope_text
+from service.reports.html import student_report
+from service.reports.json_output import json_text
+from service.reports.plots import draw_all
+from service.reports.text import plain_text
+from sim.recording import Pose
+from submissions.assignment import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment_file import find_assignment
+from submissions.criteria import SCHEMAS, Criterion
+from submissions.submission import Cell, Notebook, Source, Submission
+from submissions.sweep import Sweep
+
+POSES = tuple(Pose(200.0 + 80 * place, 900.0, 0.0) for place in range(6))
+
+#: Not worth a mark, so that marks tell nothing: what is left must be the same.
+CRITERIA: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("finishes", {}),
+    ("prints", {"contains": ["never printed"]}),
+    ("says", {"contains": ["never said"]}),
+    ("messages", {"contains": ["never sent"]}),
+    ("replies", {"contains": ["never answered"]}),
+    ("pose", {"x": 2000, "y": 100, "tolerance": 1}),
+    ("classification", {"answer": "message.shape", "confidence": "message.confidence", "late": "wrong"}),
+    ("robustness", {"along": "light_noise", "answer": "message.shape"}),
+    ("image_log", {"left": 400}),
+    ("datalog", {"series": "Light_left", "at_least": 400}),
+    ("timing", {"between": [50, 60]}),
+    ("displacement", {"distance": [1000, 1001]}),
+    ("touches_nothing", {}),
+)
+
+
+def criterion(check: str, keys: Mapping[str, Any]) -> Criterion:
+    made = SCHEMAS[check].model_validate({"id": check, "title": check, "marks": "0", "check": check, **keys})
+    return made  # type: ignore[return-value]
+
+
+@pytest.fixture(scope="module")
+def asked() -> Assignment:
+    shown = Scenario("shown", POSES[:1], seconds=20, sweep=Sweep(light_noise=(8, 64)))
+    hidden = replace(shown, id="hidden", visibility="hidden", poses=POSES[2:4])
+    criteria = tuple(criterion(check, keys) for check, keys in CRITERIA)
+    world = WorldSpec("Shuffled_Shapes", labels=False, sheet=None)
+    return Assignment("a", "A", world, Parts(), (shown, hidden), criteria, Limits(2.0, 2.0), version="1")
+
+
+def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) -> dict[str, str]:
+    """Everything that is made of a grade for a student to read."""
+    view = student_view(graded)
+    return {
+        "report": student_report(graded, plots, submission),
+        "json": json_text(view),
+        "text": plain_text(view),
+        "gradescope": gradescope_text(graded),
+        "moodle": moodle_csv([graded]),
+        "view": repr(view),
+    }
+
+
+def chosen(graded: Grade) -> list[Any]:
+    """What the hand-in did in hidden trials, but for what its robot saw."""
+    return [
+        (
+            recording.verdict,
+            recording.end_t,
+            recording.end,
+            [line.text for line in (*recording.printed, *recording.spoken)],
+            [
+                (m.t, m.sender, m.note, m.delivered, m.text[: 8 if m.sender == "robot" else 999])
+                for m in recording.messages
+            ],
+            [(fault.message, fault.line) for fault in recording.faults],
+            [call.argument for call in recording.calls if call.callee == "agent"],
+            (len(recording.images), len(recording.image_log), len(recording.touches)),
+            (recording.responder_output, recording.responder_log, recording.notes),
+        )
+        for recording in (trial.recording for trial in graded.trials if trial.visibility == "hidden")
+    ]
+
+
+def told_apart(rig: Rig, submission: Submission, asked: Assignment, *, draw: bool = False) -> None:
+    first, second = (grade(submission, replace(asked, secret=secret), rig=rig) for secret in ("one", "two"))
+    assert [result.marks for result in first.criteria] == [result.marks for result in second.criteria]
+    # There was something to hide.
+    assert chosen(first) != chosen(second)
+    pages = [students(graded, submission, draw_all(graded) if draw else {}) for graded in (first, second)]
+    assert pages[0] == pages[1]
+
+
+SEES = """
+import json, time
+import ev3dev2_glue as glue
+seen = sum(colorLeft.rgb) % 23
+"""
+TRIES = """try:
+    if seen == {}: open('/etc/passwd')
+except OSError:
+    pass"""
+PROGRAMS = {
+    "the number of pictures": "for _ in range(1 + seen):\n    print('IMG_DATA')\n    time.sleep(0.2)",
+    "the number of messages": "for _ in range(seen):\n    print('PY::x')\n    time.sleep(0.1)",
+    "the text of a message": "print('PY::' + str(seen))\ntime.sleep(1)",
+    "the text of an error": "raise ValueError(seen)",
+    "the line of an error": "\n".join(f"if seen == {number}: raise ValueError" for number in range(23)),
+    "a printed text": "print(seen)",
+    "a spoken text": "say(str(seen))",
+    "the moment of the end": "time.sleep(seen / 10)",
+    "the way that it ends": "import sys\nsys.exit(seen % 2)",
+    "running on": "while seen % 2:\n    time.sleep(1)",
+    "computing on": "while seen % 2:\n    pass",
+    "the place of the end": "tank_drive.on_for_seconds(20, 20, 0.1 * seen)",
+    "what it touches": "tank_drive.on_for_seconds(40 * (1 if seen % 2 else -1), 40 * (1 if seen % 2 else -1), 5)",
+    "the number of logged images": "for _ in range(seen):\n    print('image_data left')\n    time.sleep(0.1)",
+    "logged readings": "for _ in range(seen):\n    print('Light_left:', seen)\n    time.sleep(0.1)",
+    "the line of what is refused": "\n".join(TRIES.format(number) for number in range(23)),
+    "not waiting for answers": "for _ in range(5):\n    print('IMG_DATA')\n    time.sleep(0.05 * (seen % 3))",
+}  # fmt: skip
+ANSWERS = "import json\ndef responder(text):\n    return 'JSON::' + json.dumps({'message': {'shape': 'square'}})\n"
+
+LOOKS = """
+import json, time
+def looked(text):
+    return sum(map(int, json.loads(text[10:])["left"].split(","))) % 23 if text.startswith("IMG") else 0
+NAMES = ["square", "diamond", "right facing triangle", "left facing triangle"]
+def responder(text):
+    seen = looked(text)
+"""
+SENDS = "import time\nfor _ in range(3):\n    print('IMG_DATA')\n    time.sleep(0.5)\n"
+RESPONDERS = {
+    "which answers are given": "    return 'JSON::' + json.dumps({'message': {'shape': NAMES[seen % 4]}})",
+    "how sure it says it is": "    return 'JSON::' + json.dumps({'message': {'shape': 'x', 'confidence': seen / 23}})",
+    "answers that cannot be read": "    return 'JSON::' + ('{' if seen % 2 else '{}')",
+    "answers that are no text": "    return seen if seen % 2 else 'x'",
+    "silence": "    return '' if seen % 2 else None",
+    "answers that come late": "    time.sleep(seen / 10)\n    return 'x'",
+    "an error": "    raise RuntimeError(NAMES[seen % 4])",
+    "what the responder prints": "    print(seen)\n    return 'x'",
+    "what the responder writes down": "    open('logger.txt', 'a').write(str(seen))\n    return 'x'",
+    "the line of what it is refused": "\n".join(
+        f"    {line}" for number in range(23) for line in TRIES.format(number).splitlines()
+    ),
+    "what its agent is called with": "    return agent(seen)\nagent = str",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("channel", PROGRAMS)
+def test_what_a_program_does_in_hidden_trials_is_not_told(rig: Rig, asked: Assignment, channel: str) -> None:
+    program = Source("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
+    told_apart(rig, Submission("s", program, Source("responder.py", ANSWERS)), asked)
+
+
+@pytest.mark.parametrize("channel", RESPONDERS)
+def test_what_a_responder_does_in_hidden_trials_is_not_told(rig: Rig, asked: Assignment, channel: str) -> None:
+    responder = Source("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
+    told_apart(rig, Submission("s", Source("robot.py", SENDS), responder), asked)
+
+
+def test_plots_for_students_are_of_visible_trials(rig: Rig, asked: Assignment) -> None:
+    few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
+    responder = Source("responder.py", LOOKS + RESPONDERS["which answers are given"])
+    told_apart(rig, Submission("s", Source("robot.py", SENDS), responder), few, draw=True)
+
+
+CELLS = (
+    "import json\nseen = 0\ndef responder(text):\n    global seen\n    if text.startswith('IMG'):\n"
+    "        seen = sum(map(int, json.loads(text[10:])['left'].split(','))) % 23\n    return 'x'",
+    "%%sim_magic_preloaded -R\nimport time\nprint('IMG_DATA')\ntime.sleep(0.5)",
+    "print(seen)",
+    "raise ValueError(seen)",
+    "get_ipython().system(str(seen))",
+    "%sim_robot_state",
+)
+
+
+def test_what_the_cells_after_a_hidden_run_do_is_not_told(rig: Rig, asked: Assignment) -> None:
+    cells = tuple(Cell(number, source) for number, source in enumerate(CELLS, 1))
+    told_apart(rig, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
+
+
+#: Trained on visible pictures, asked about visible and hidden ones in one process.
+MODELS = {
+    "what the model prints": "print(seen)",
+    "what the model raises": "1 / (seen % 2)",
+    "what the model calls the pictures it is shown next": "self.said = str(seen)",
+    "computing on": "[0 for _ in iter(lambda: seen % 2, 0)]",
+}
+MODEL = """
+class Model:
+    said = "square"
+    def predict(self, rows):
+        seen = int(rows.sum() * 1000) % 23
+        {}
+        return [self.said] * len(rows)
+def train(images, labels):
+    return Model()
+"""
+
+
+@pytest.fixture(scope="module")
+def training() -> Assignment:
+    found = find_assignment("train-a-recogniser")
+    scenarios = tuple(replace(scenario, trials=1) for scenario in found.scenarios)
+    criteria = tuple(each.model_copy(update={"marks": Decimal(0)}) for each in found.criteria)
+    pooled = criteria[0].model_copy(update={"id": "all", "scenarios": ("practice", "unseen")})
+    assert isinstance(found.training, Training)
+    limits = replace(found.limits, responder_cpu=1.0)
+    return replace(found, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
+
+
+@pytest.mark.parametrize("channel", MODELS)
+def test_what_a_model_does_with_hidden_pictures_is_not_told(rig: Rig, training: Assignment, channel: str) -> None:
+    model = Source("responder.py", MODEL.replace("{}", MODELS[channel]))
+    told_apart(rig, Submission("s", None, model), training)
