@@ -37,9 +37,9 @@ class Recognition(CriterionBase):
     sensor are one, by the majority of the answers. With ``each_pattern`` all pictures of one pattern count as one,
     wherever the robot stood: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"``; a trial
     that has pictures of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
-    ``near_start`` only pictures count whose sensor was at most so many mm from where it was at the start, so that
-    the robot cannot drive or turn to one that is easier. A trial without a picture that counts is one wrong answer, so that staying
-    silent never helps.
+    ``near_start`` only pictures count whose sensor was at most so many mm from where it was at the start, so that the
+    robot cannot drive or turn to one that is easier. A trial without a picture that counts is one wrong answer, so
+    that staying silent never helps.
     """
 
     truth: Literal["label", "grey", "places"] | tuple[str, ...] = "label"

@@ -22,9 +22,9 @@ class Collects(CriterionBase):
 
     ``each`` is how many different usable pairs there must be of every class in ``classes`` (without it, of
     every label that the floor has). ``balance`` asks that the rarest class has at least that share of the
-    pairs of the commonest. ``most_duplicates`` and ``most_unusable`` are the largest shares of pairs that may
-    repeat an earlier left image, in its pixels or in the window of the floor, and that may be of no use. The score is the part of the images asked
-    for that is there, lowered by what else is missing.
+    pairs of the commonest. ``most_duplicates`` and ``most_unusable`` are the largest shares of pairs that may repeat
+    an earlier left image, in its pixels or in the window of the floor, and that may be of no use. The score is the
+    part of the images asked for that is there, lowered by what else is missing.
     """
 
     check: Literal["collects"]

@@ -136,10 +136,9 @@ class Replies(_TextConditions):
 
     ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.
     Otherwise every message of the robot's that reached the responder must have an answer that meets the
-    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down which
-    messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the
-    conditions, ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the
-    whole answer.
+    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down
+    which messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the conditions,
+    ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the whole answer.
     """
 
     check: Literal["replies"]

@@ -26,7 +26,7 @@ from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
 
 #: A picture taken so near to an earlier one, mm, shows the same again.
-_SAME_PLACE = 5.0
+_SAME_PLACE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
