@@ -10,7 +10,8 @@ import os
 import re
 import subprocess
 import sys
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ import pytest
 
 from builders import settings_in
 from memory_group import MemoryGroup, memory_group
-from processes import children, until
+from processes import PATIENCE, alive, descendants, until
 from responders.sandbox import control_group
 from responders.sandbox.control_group import ControlGroup
 from service.queue.broker import EmbeddedBroker
@@ -238,7 +239,7 @@ print(json.dumps([walls, len(inside), os.getpid() in inside, limits, slot.exists
 HOGS = {
     "bytes": "held = [bytearray(1 << 20) for _ in range(480)]",
     "one text": "held = 'x' * (480 << 20)",
-    "objects": "held = [[0] * 100 for _ in range(500_000)]",
+    "objects": "held = [[0] * 1000 for _ in range(60_000)]",
     "arrays": "import numpy\nheld = [numpy.ones(1 << 17) for _ in range(480)]",
     "shared memory": "import mmap\nheld = mmap.mmap(-1, 480 << 20)\nfor at in range(0, len(held), 4096): held[at] = 1",
     "files without a name": """
@@ -281,7 +282,7 @@ with rig() as made:
     faults = run_program(made, BUSY, responder={HOGS["bytes"]!r}).faults
 print(json.dumps([[fault.verdict, fault.message] for fault in faults]))
 """,
-        memory_bytes=700 << 20,
+        memory_bytes=450 << 20,
     )
     ((verdict, message),) = said
     assert verdict == "memory_limit"
@@ -290,40 +291,48 @@ print(json.dumps([[fault.verdict, fault.message] for fault in faults]))
 
 
 def test_a_worker_divides_its_group_and_leaves_nothing_that_grows(tmp_path: Path) -> None:
-    settings = settings_in(tmp_path)
+    settings = settings_in(tmp_path, concurrency=1)
     with open_store(settings) as store, EmbeddedBroker(settings) as broker, memory_group(3 << 30) as made:
         group = _of_version_2(made)
-        service = MemoryGroup(group.folder / "robomark-service", group.limit, group.most, group.events)
 
-        def slots() -> set[str]:
-            return {each.name for each in group.folder.glob("robomark-slot-*")}
+        def slots() -> set[Path]:
+            """Those with a zygote in them."""
+            return {file.parent for file in group.folder.glob("robomark-slot-*/cgroup.procs") if file.read_text()}
 
         def walls() -> list[str]:
             with store.reading() as session:
                 return [seen.worker.walls for seen in presence.workers(session)]
 
-        worker = _worker(broker.settings, group)
-        try:
+        with _worker(broker.settings, group.folder) as worker:
             assert "control group" in until(walls)[0]
-            first = until(slots)
-            busy = until(lambda: [pid for each in children(worker.pid) for pid in children(each)])
+            (killed,) = until(
+                lambda: slots() & {group.folder / f"robomark-slot-{pid}" for pid in descendants(worker.pid)}
+            )
+            below = descendants(worker.pid)
             worker.kill()
-            worker.wait()
-            until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in busy))
-            worker = _worker(broker.settings, service)
-            until(lambda: slots() - first)
-            until(lambda: not slots() & first)
-        finally:
-            end_processes([worker], 30)
-        assert slots() == set()
+        until(lambda: not any(alive(pid) for pid in below))
+        assert killed.exists()
+        with _worker(broker.settings, group.folder / "robomark-service") as worker:
+            until(lambda: not killed.exists())
+            until(lambda: len(walls()) > 1)
+            until(slots)
+            end_processes([worker], PATIENCE)
+        assert list(group.folder.glob("robomark-slot-*")) == []
 
 
-def _worker(settings: Settings, group: MemoryGroup) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "service.queue.worker"],
-        env=os.environ | settings.environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=(settings.home / "worker.log").open("ab"),
-        preexec_fn=group.enter,
-    )
+@contextmanager
+def _worker(settings: Settings, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    with (settings.home / "worker.log").open("ab") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "service.queue.worker"],
+            env=os.environ | settings.environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            preexec_fn=lambda: (folder / "cgroup.procs").write_text("0"),
+        )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
