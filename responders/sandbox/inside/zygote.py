@@ -35,7 +35,7 @@ def main(role_name: str, folders: str, roots: list[str]) -> None:
     control = socket.socket(fileno=3)
     readable = grants.readable(roots)
     allowed = lockdown.Grants(readable, grants.listable(), open_to_others=grants.open_to_others(readable))
-    door, keeper = doorkeeper.start(allowed, control.fileno())
+    door = doorkeeper.start(allowed, control.fileno())
     if role_name == "robot":
         from . import robot_role as role
     else:
@@ -52,8 +52,6 @@ def main(role_name: str, folders: str, roots: list[str]) -> None:
     while True:
         order, descriptors = _receive(control)
         if order is None:
-            door.close()
-            os.waitpid(keeper, 0)
             os._exit(0)
         if order["do"] == "spawn":
             pid = os.fork()
