@@ -45,17 +45,17 @@ def test_bubblewrap_is_used_where_it_works_and_done_without_where_not(monkeypatc
     with Sandboxes() as sandboxes:
         works = sandboxes.why_no_bubblewrap() is None
         assert ("bubblewrap" in sandboxes.check()) == works
-        assert (_number_of_the_zygote(sandboxes) == 1) == works
+        assert (_number_of_the_zygote(sandboxes) == 2) == works
     for program, reason in ((None, "not installed"), ("/bin/false", "status 1"), ("/bin/true", "cannot be seen")):
         monkeypatch.setattr(bubblewrap, "_PROGRAM", program)
         with Sandboxes() as sandboxes:
             assert reason in str(sandboxes.why_no_bubblewrap())
             assert "bubblewrap" not in sandboxes.check()
-            assert _number_of_the_zygote(sandboxes) != 1
+            assert _number_of_the_zygote(sandboxes) != 2
 
 
 def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
-    """As its child sees it: the first process in name spaces of its own."""
+    """As its child sees it: in name spaces of its own the second process, after the doorkeeper."""
     with sandboxes.private_folder() as folder:
         said, stop = run_text(sandboxes, "robot", "import os; print(os.getppid())", folder)
     assert stop is None

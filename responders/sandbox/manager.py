@@ -167,7 +167,7 @@ class Zygote:
             self._control.close()
             self._control = None
         if self._process is not None:
-            # It ends by itself then, and its doorkeeper before it, unless it is stuck.
+            # It ends by itself then, and its doorkeeper after it, unless it is stuck.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(_END_SECONDS)
             self._process.kill()

@@ -101,7 +101,7 @@ class Base(DeclarativeBase):
 
 
 class Installation(Base):
-    """This installation itself: one row, made with the tables."""
+    """One row, made with the tables."""
 
     __tablename__ = "installation"
 

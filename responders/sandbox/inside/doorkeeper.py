@@ -1,4 +1,4 @@
-"""A process beside the zygote that children have to ask about every path they name: only what they may read has one.
+"""A process above the zygote that children have to ask about every path they name: only what they may read has one.
 
 It opens nothing for them and protects no content, which is Landlock's: it keeps names, dates and numbers of files and
 processes from them, in which one trial could leave something for another. Nothing is ever forked from it, as what it
@@ -44,23 +44,25 @@ class _Guest:
     made: int = 0
 
 
-def start(grants: lockdown.Grants, control: int) -> tuple[socket.socket, int]:
-    """Fork it; the socket through which children make themselves known, and its pid. ``control`` is not for it."""
+def start(grants: lockdown.Grants, control: int) -> socket.socket:
+    """Stay behind as the doorkeeper, and go on in a fork: through the socket its children make themselves known.
+
+    Whichever of the two ends takes the other along. ``control`` is the fork's alone.
+    """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    zygote = os.getpid()
-    pid = os.fork()
-    if pid == 0:
+    keeper = os.getpid()
+    if os.fork() != 0:
         try:
             ours.close()
             os.close(control)
-            prctl = ctypes.CDLL(None).prctl
-            prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-            if os.getppid() == zygote:
-                _serve(theirs, _Known(grants))
+            _serve(theirs, _Known(grants))
         finally:
             os._exit(0)
     theirs.close()
-    return ours, pid
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != keeper:
+        os._exit(0)
+    return ours
 
 
 def make_known(door: socket.socket, questions: int, memory: int) -> None:
@@ -106,7 +108,8 @@ def _serve(door: socket.socket, known: _Known) -> None:
     """Answer until the zygote and its children are gone."""
     lockdown.forbid_new_privileges()
     with contextlib.suppress(lockdown.WallMissing):
-        lockdown.restrict_files(lockdown.Grants(()))
+        # Not from the version that keeps signals in: that of its death has to reach the zygote.
+        lockdown.restrict_files(lockdown.Grants(()), 5)
     guests: dict[int, _Guest] = {}
     poll = select.epoll()
     poll.register(door.fileno(), select.EPOLLIN)
@@ -128,6 +131,7 @@ def _serve(door: socket.socket, known: _Known) -> None:
 def _new_guest(door: socket.socket) -> _Guest:
     folder, ancillary, _, _ = door.recvmsg(_LONGEST, socket.CMSG_SPACE(2 * 4))
     if not folder:
+        os.wait()
         os._exit(0)
     descriptors = array.array("i")
     for _, _, payload in ancillary:

@@ -46,7 +46,7 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     closed = withheld.keep_out(tuple(without))
     readable = grants.readable(roots, closed)
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
-    door, keeper = doorkeeper.start(allowed, control.fileno())
+    door = doorkeeper.start(allowed, control.fileno())
     role.preload(without)
     plays = {"role": role.run, "battery": battery.run}
     zygote = os.getpid()
@@ -59,8 +59,6 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     while True:
         order, descriptors = _receive(control)
         if order is None:
-            door.close()
-            os.waitpid(keeper, 0)
             os._exit(0)
         if order["do"] == "spawn":
             pid = os.fork()

@@ -1,0 +1,239 @@
+"""The secret of an installation: made once, kept with the database, and shown to nobody, student code least of all."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import re
+import shutil
+import sqlite3
+from multiprocessing.queues import Queue
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import update
+
+from battery import scrambled
+from command import robomark
+from first_release import lay_first_release
+from service import home_secret
+from service.grading.grader import grade
+from service.grading.rig import Rig
+from service.home_secret import secret_here
+from service.settings import Settings, load_settings
+from service.store.engine import open_store
+from service.store.installation import secret_of
+from service.store.models import Installation, Job
+from sim.errors import HostError, UsageError
+from submissions.assignment_file import find_assignment
+from submissions.example_folder import examples
+from submissions.seeds import Secret
+from submissions.submission import Source, Submission
+
+SECRET = "a-secret-of-32-characters-9c41e7"
+ECHO = examples("echo-responder") / "reference"
+
+
+def _put_secret(settings: Settings, found: Queue[str]) -> None:
+    with open_store(settings) as store:
+        found.put(secret_of(store).text)
+
+
+def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
+    spawned = multiprocessing.get_context("spawn")
+    found: Queue[str] = spawned.Queue()
+    processes = [spawned.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
+    for process in processes:
+        process.start()
+    secrets = {found.get(timeout=120) for _ in processes}
+    for process in processes:
+        process.join()
+    (secret,) = secrets
+    assert re.fullmatch(r"[0-9a-f]{64}", secret)
+    _put_secret(service_settings, again := spawned.Queue())
+    assert again.get(timeout=60) == secret
+
+
+def test_another_database_has_another_secret(tmp_path: Path) -> None:
+    one, other = (secret_here(Settings(home=tmp_path / name)) for name in ("one", "other"))
+    assert one.text != other.text
+
+
+def test_a_database_of_the_first_release_gets_one(service_settings: Settings, tmp_path: Path) -> None:
+    lay_first_release(service_settings.database, tmp_path).dispose()
+    with open_store(service_settings) as store:
+        assert len(secret_of(store).text) == 64
+        with store.transaction() as session:
+            assert set(session.scalars(update(Job).values(error="x").returning(Job.secret_sha256))) == {None}
+
+
+def test_a_database_that_lost_it_is_not_graded_with(service_settings: Settings) -> None:
+    with open_store(service_settings) as store:
+        with store.transaction() as session:
+            session.delete(session.get_one(Installation, 1))
+        with pytest.raises(HostError, match="the secret that it was made with is gone; restore a backup"):
+            secret_of(store)
+
+
+def test_the_environments_wins(service_settings: Settings) -> None:
+    settings = service_settings.model_copy(update={"secret": Settings(secret=SECRET).secret})
+    with open_store(settings) as store:
+        assert secret_of(store) == secret_here(settings) == Secret(SECRET)
+    with open_store(service_settings) as store:
+        assert secret_of(store) == secret_here(service_settings) != Secret(SECRET)
+
+
+def test_a_home_is_opened_once_for_its_secret(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = Settings(home=tmp_path)
+    first = secret_here(settings)
+    monkeypatch.setattr(home_secret, "_opened", lambda _: pytest.fail("opened again"))
+    assert secret_here(settings) == first
+    assert secret_here(Settings(database_url=f"sqlite:///{tmp_path}/robomark.db")) == first
+
+
+def test_a_home_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(HostError, match=r"secret that trials depend on cannot be kept: .* or ROBOMARK_SECRET\.$"):
+        secret_here(Settings(home=tmp_path / "file" / "home"))
+
+
+@pytest.mark.parametrize("text", ["short", "   fifteen chars   ", "x" * 15])
+def test_one_that_is_too_short_is_refused_without_being_told(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv("ROBOMARK_SECRET", text)
+    with pytest.raises(UsageError) as caught:
+        load_settings()
+    assert str(caught.value) == ("ROBOMARK_SECRET is not usable: expected at least 16 characters that nobody can guess")
+
+
+def test_settings_do_not_tell_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("ROBOMARK_SECRET", f"  {SECRET}\n")
+    settings = load_settings(home=tmp_path)
+    assert settings.own_secret == Secret(SECRET)
+    for told in (repr(settings), str(settings), settings.environment(), repr(settings.own_secret), vars(settings)):
+        assert SECRET not in str(told)
+    monkeypatch.setenv("ROBOMARK_SECRET", " ")
+    assert load_settings().own_secret is None
+
+
+#: Looks for it in everything that student code can reach; it holds it scrambled, or it would find itself.
+SEARCH = """
+import gc, os, sys
+def search():
+    yield str(dict(os.environ))
+    for path in ("/proc/self/environ", f"/proc/{{os.getppid()}}/environ", "/proc/self/maps", "{database}"):
+        try:
+            with open(path, encoding="latin-1") as file:
+                yield file.read()
+        except OSError:
+            pass
+    for found in gc.get_objects():
+        if isinstance(found, (dict, list, tuple)):
+            for each in list(found.values() if isinstance(found, dict) else found):
+                if isinstance(each, (str, bytes, int)):
+                    yield str(each)
+def told():
+    texts = list(search())
+    found = []
+    for number, code in enumerate({codes!r}):
+        secret = "".join(chr(byte ^ 0x5A) for byte in bytes.fromhex(code))
+        found += [number for text in texts if secret in text]
+    return found
+"""
+
+
+def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Nor by the seed of its world, from which that could be built at home."""
+    monkeypatch.setenv("ROBOMARK_SECRET", SECRET)
+    asked = find_assignment("echo-responder")
+    asked = type(asked)("a", "A", asked.world, asked.parts, asked.scenarios[:1], asked.criteria[:1])
+    (seed,) = (trial.seed for trial in asked.trials(Secret(SECRET)))
+    search = SEARCH.format(database=tmp_path / "robomark.db", codes=scrambled(SECRET, str(seed)))
+    program = Source("robot.py", f"{search}\nprint('PY::', told())\n")
+    responder = Source("responder.py", f"{search}\ndef responder(text): return str(told())\n")
+    with Rig() as rig:
+        (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), rig=rig).trials
+    assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]
+    # The search finds what is there.
+    kept = {"it": SECRET}
+    here: dict[str, Any] = {}
+    exec(search, here)
+    assert 0 in here["told"](), kept
+
+
+# Commands
+
+
+def _seeds(home: Path, **environment: str) -> list[int]:
+    ended = robomark("grade", ECHO, "-a", "echo-responder", "--format", "json", ROBOMARK_HOME=str(home), **environment)
+    assert ended.returncode == 0, ended.stderr
+    return [trial["seed"] for trial in json.loads(ended.stdout)["trials"]]
+
+
+def test_every_home_has_its_own_worlds(tmp_path: Path) -> None:
+    one, other = tmp_path / "one", tmp_path / "other"
+    assert _seeds(one) == _seeds(one) != _seeds(other)
+    # An autograder's home is new each time.
+    assert _seeds(tmp_path / "new", ROBOMARK_SECRET=SECRET) == _seeds(tmp_path / "newer", ROBOMARK_SECRET=SECRET)
+    assert not (tmp_path / "new").exists()
+
+
+def test_only_its_hash_is_told(tmp_path: Path) -> None:
+    home, batch = tmp_path / "home", tmp_path / "class"
+    shutil.copytree(ECHO, batch / "ada")
+    environment = {"ROBOMARK_HOME": str(home), "ROBOMARK_SECRET": SECRET, "ROBOMARK_LOG_LEVEL": "DEBUG"}
+    done = [
+        robomark(
+            "batch", "submit", batch, "-a", "echo-responder", "--wait", "--report", tmp_path / "out", **environment
+        )
+    ]
+    found = re.search(r"^ada .* (\w+) *$", done[0].stdout, re.MULTILINE)
+    assert found is not None, done[0]
+    for words in (("doctor",), ("verify", found[1]), ("show", found[1]), ("batch", "list"), ("db", "upgrade")):
+        done.append(robomark(*words, **environment))
+        assert done[-1].returncode == 0, done[-1]
+    told = "".join(each.stdout + each.stderr for each in done)
+    name = Secret(SECRET).name
+    assert f"that of ROBOMARK_SECRET, called {name} by its hash" in told
+    assert f"secret: {name}" in told
+    assert SECRET not in told
+    files = [path for folder in (home, tmp_path / "out") for path in folder.rglob("*") if path.is_file()]
+    assert any(path.suffix == ".log" for path in files)
+    assert not any(SECRET.encode() in path.read_bytes() for path in files)
+    own = secret_here(Settings(home=home)).text
+    assert own not in told
+    assert [path.name for path in files if own.encode() in path.read_bytes()] == ["robomark.db"]
+
+    # With another secret the worlds are others, and that is what is said.
+    environment.pop("ROBOMARK_SECRET")
+    other = robomark("verify", found[1], **environment)
+    assert other.returncode == 3
+    assert f"cannot be verified with this secret: its worlds are of {name}" in other.stderr
+    assert "set ROBOMARK_SECRET to the one that it was graded with" in other.stderr
+    wrong = robomark("doctor", **environment)
+    assert wrong.returncode == 3
+    assert f"the newest grade has {name}: every machine needs the same" in " ".join(wrong.stdout.split())
+
+
+def test_a_backup_has_it(tmp_path: Path) -> None:
+    settings = Settings(home=tmp_path / "home")
+    own = secret_here(settings)
+    copy = tmp_path / "copy.db"
+    assert robomark("db", "backup", copy, ROBOMARK_HOME=str(settings.home)).returncode == 0
+    assert sqlite3.connect(copy).execute("SELECT secret FROM installation").fetchall() == [(own.text,)]
+
+
+def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> None:
+    home, batch = tmp_path / "home", tmp_path / "class"
+    shutil.copytree(examples("dead-reckoning-with-noise") / "reference", batch / "ada")
+    environment = {"ROBOMARK_HOME": str(home)}
+    done = robomark("batch", "submit", batch, "-a", "dead-reckoning-with-noise", "--wait", **environment)
+    found = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)
+    assert found is not None, done
+    assert robomark("verify", found[1], **environment).returncode == 0
+    with open_store(Settings(home=home)) as store, store.transaction() as session:
+        session.execute(update(Job).values(secret_sha256=None))
+    then = robomark("verify", found[1], **environment)
+    assert "graded before this installation had a secret" in then.stdout
+    # This one was not: its worlds are others than those of then.
+    assert then.returncode == 3
