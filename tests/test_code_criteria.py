@@ -307,7 +307,9 @@ def test_same_functions_give_the_same_values(rig: Rig) -> None:
 
 def test_what_the_module_prints_counts_against_its_output(rig: Rig) -> None:
     text = "def f():\n    for _ in range(100): print('x' * 100)\n    return 1\n"
-    called = call_functions(Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, rig._sandboxes, 1)
+    called = call_functions(
+        Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, rig._sandboxes, 1, JobMeter()
+    )
     fault = called.returned[0].fault
     assert fault is not None
     assert fault.verdict is Verdict.OUTPUT_LIMIT

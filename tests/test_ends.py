@@ -72,7 +72,8 @@ class _Killer:
         self._killed: set[int] = set()
 
     def __call__(self) -> None:
-        for child in (child for zygote in children(os.getpid()) for child in children(zygote)):
+        zygotes = (zygote for doorkeeper in children(os.getpid()) for zygote in children(doorkeeper))
+        for child in (child for zygote in zygotes for child in children(zygote)):
             if self.left and child not in self._killed:
                 self._killed.add(child)
                 self.left -= 1

@@ -121,7 +121,8 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         with store.reading() as session:
             left = [session.get_one(Job, each.job_id) for each in spinning.jobs]
             assert {(job.state, job.attempt) for job in left} <= {(JobState.QUEUED, 0), (JobState.DONE, 1)}
-    assert {path.name for path in (settings.home / "run").iterdir()} <= {"broker.lock", "up.lock", "worker.lock"}
+    locks = {"broker.lock", "up.lock", "worker.lock", "gate.lock", "slots.lock"}
+    assert {path.name for path in (settings.home / "run").iterdir()} <= locks
 
 
 def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) -> None:
