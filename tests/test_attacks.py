@@ -208,8 +208,13 @@ def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
     ],
 )
 def test_without_its_wall_a_trial_leaves_something(attack: Attack, setting: str, tree: Path) -> None:
-    outcome = _remembered(attack, SETTINGS[setting], tree)
-    assert outcome.startswith("LEAK"), outcome
+    # Whatever else the machine reads and forgets may drown a bit; one clear reading shows that the way is open.
+    outcomes = []
+    for _ in range(5):
+        outcomes.append(_remembered(attack, SETTINGS[setting], tree))
+        if outcomes[-1].startswith("LEAK"):
+            return
+    raise AssertionError(outcomes)
 
 
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a file system that numbers files on and on")

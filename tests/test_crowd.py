@@ -135,5 +135,5 @@ def test_a_hundred_and_fifty_among_ten_floods_of_every_kind(
     service_settings: Settings, store: Store, tmp_path: Path
 ) -> None:
     floods = _floods(10, [*FLOODS, *OTHERS])
-    batch = _run(service_settings, store, [*map(_honest, range(150)), *floods], 1500)
+    batch = _run(service_settings, store, [*map(_honest, range(150)), *floods], 2700)
     _check(store, batch, 150)
