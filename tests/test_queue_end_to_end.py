@@ -16,7 +16,7 @@ from sqlalchemy import func, select
 
 from builders import comparable, hand_in, settings_in
 from databases import fresh_database
-from processes import command_line, descendants, until
+from processes import children, command_line, descendants, until
 from service.commands.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.rig import Rig
@@ -220,9 +220,10 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
 
 
 def _has_student(pool_child: int) -> bool:
-    """Whether a student's process runs below this pool child: some zygote, in bubblewrap or not, has a child."""
+    """Whether a student's process runs below this pool child: a doorkeeper's zygote, in bubblewrap or not, has a child."""
     below = [(pid, command_line(pid)) for pid in descendants(pool_child)]
-    return any(descendants(pid) for pid, command in below if "inside.zygote" in command and "bwrap" not in command)
+    doorkeepers = [pid for pid, command in below if "inside.zygote" in command and "bwrap" not in command]
+    return any(children(zygote) for doorkeeper in doorkeepers for zygote in children(doorkeeper))
 
 
 def test_a_cancelled_job_stops(service: Service) -> None:
