@@ -89,6 +89,7 @@ def test_a_file_for_each_hand_in(graded: tuple[Path, Path, Ended], tmp_path: Pat
     assert (refused.status, "--out" in refused.err) == (2, True)
 
 
+@pytest.mark.long
 def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path: Path) -> None:
     _, roster, _ = graded
     home = tmp_path / "home"

@@ -20,6 +20,7 @@ def _assert_whole(tally: Tally, hand_ins: int) -> None:
     assert (tally.doubled, tally.differing) == (0, 0)
 
 
+@pytest.mark.long
 def test_on_sqlite(tmp_path: Path) -> None:
     settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0)
     quiet = quiet_hashes()

@@ -122,6 +122,7 @@ def _check(store: Store, batch: str, honest: int) -> None:
     assert Verdict.HOST_ERROR.value not in {job.verdict for job in floods}
 
 
+@pytest.mark.long
 def test_a_few_of_every_sort(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     kinds = [each for each in [*FLOODS, *OTHERS] if each.name in {"utterances", "calls", *(o.name for o in OTHERS)}]

@@ -53,7 +53,14 @@ def commands(document: Path) -> Iterator[list[str]]:
                 yield words[1:]
 
 
-@pytest.mark.parametrize("document", [each for each in DOCUMENTS if list(commands(each))], ids=lambda path: path.stem)
+_SHOWING = [
+    pytest.param(document, marks=[pytest.mark.long] * (document.stem == "instructors"), id=document.stem)
+    for document in DOCUMENTS
+    if list(commands(document))
+]
+
+
+@pytest.mark.parametrize("document", _SHOWING)
 def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")
     shutil.copytree(EXAMPLE, tmp_path / "hand-ins" / "ada")

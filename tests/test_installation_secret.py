@@ -178,6 +178,7 @@ def test_every_home_has_its_own_worlds(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.long
 def test_only_its_hash_is_told(tmp_path: Path) -> None:
     home, batch = tmp_path / "home", tmp_path / "class"
     shutil.copytree(ECHO, batch / "ada")
@@ -223,6 +224,7 @@ def test_a_backup_has_it(tmp_path: Path) -> None:
     assert sqlite3.connect(copy).execute("SELECT secret FROM installation").fetchall() == [(own.text,)]
 
 
+@pytest.mark.long
 def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> None:
     home, batch = tmp_path / "home", tmp_path / "class"
     shutil.copytree(examples("dead-reckoning-with-noise") / "reference", batch / "ada")

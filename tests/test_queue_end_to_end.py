@@ -220,7 +220,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
 
 
 def _has_student(pool_child: int) -> bool:
-    """Whether a student's process runs below this pool child: a doorkeeper's zygote, in bubblewrap or not, has a child."""
+    """Whether a student runs below this pool child: the zygote of a doorkeeper, in bubblewrap or not, has a child."""
     below = [(pid, command_line(pid)) for pid in descendants(pool_child)]
     doorkeepers = [pid for pid, command in below if "inside.zygote" in command and "bwrap" not in command]
     return any(children(zygote) for doorkeeper in doorkeepers for zygote in children(doorkeeper))

@@ -94,6 +94,7 @@ def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> Non
         assert run_program(rig, "print(1)").sha256 == honest.sha256
 
 
+@pytest.mark.long
 def test_five_hundred_children_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Measured after the first fifty, by when everything that is loaded late has been."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

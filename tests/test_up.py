@@ -125,6 +125,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
     assert {path.name for path in (settings.home / "run").iterdir()} <= locks
 
 
+@pytest.mark.long
 def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) -> None:
     settings = settings_in(tmp_path, concurrency=1, lease_seconds=300)
     run = settings.home / "run"
