@@ -10,7 +10,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import chaos, hand_in, queue, simulator, walls
+from benchmarks import chaos, queue, sandbox, simulator, submission
 from benchmarks.measurement import Measurement
 
 
@@ -21,7 +21,7 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] == ["queue"]:
         _print(queue.measure())
     else:
-        _print([*simulator.measure(), *hand_in.measure(), *walls.measure(), *queue.measure()])
+        _print([*simulator.measure(), *submission.measure(), *sandbox.measure(), *queue.measure()])
     return 0
 
 

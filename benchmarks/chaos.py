@@ -1,4 +1,4 @@
-"""A thousand hand-ins through a service to which everything happens, on SQLite and on PostgreSQL.
+"""A thousand submissions through a service to which everything happens, on SQLite and on PostgreSQL.
 
 Not part of the table: ``python -m benchmarks chaos [HAND-INS]`` runs it and takes some minutes.
 """
@@ -14,12 +14,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from builders import settings_in
 from databases import fresh_database
-from havoc import Campaign, Havoc, quiet_hashes, small_disk
+from fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
 from postgresql_server import PostgresqlServer
 from service.store.engine import open_store
 from service.store.models import JobState
 
-_HAND_INS = 1000
+_SUBMISSIONS = 1000
 _WORKERS = 2
 _LEASE_SECONDS = 5.0
 _PAUSE = (2.0, 8.0)
@@ -28,16 +28,19 @@ _DISK_MEGABYTES = 2000
 
 def main(arguments: list[str]) -> int:
     """Both databases, one after the other; 1 if anything was lost, doubled or other than on a quiet day."""
-    hand_ins = int(arguments[0]) if arguments else _HAND_INS
+    grading_requests = int(arguments[0]) if arguments else _SUBMISSIONS
     campaign = Campaign(
-        hand_ins, _PAUSE, patience_seconds=60 + 5.0 * hand_ins, tell=lambda line: print(line, flush=True)
+        grading_requests,
+        _PAUSE,
+        patience_seconds=60 + 5.0 * grading_requests,
+        tell=lambda line: print(line, flush=True),
     )
     quiet = quiet_hashes()
     return max(_run("SQLite", campaign, quiet), _run("PostgreSQL", campaign, quiet))
 
 
 def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int:
-    print(f"{database} and Valkey, {_WORKERS} workers, {campaign.hand_ins} hand-ins", flush=True)
+    print(f"{database} and Valkey, {_WORKERS} workers, {campaign.grading_requests} submissions", flush=True)
     folder = Path(tempfile.mkdtemp(prefix="robomark-chaos-"))
     with small_disk(folder, _DISK_MEGABYTES) as disk, tempfile.TemporaryDirectory() as elsewhere:
         server = None if database == "SQLite" else PostgresqlServer(folder)
@@ -46,15 +49,15 @@ def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int
         settings = settings_in(home, concurrency=1, lease_seconds=_LEASE_SECONDS, database_url=url)
         try:
             with open_store(settings) as store:
-                havoc = Havoc(settings, store, server, _WORKERS, campaign.seed, disk)
+                injector = FaultInjector(settings, store, server, _WORKERS, campaign.seed, disk)
                 try:
-                    tally = campaign.run(havoc, quiet)
+                    tally = campaign.run(injector, quiet)
                 finally:
-                    havoc.stop()
+                    injector.stop()
         finally:
             if server is not None:
                 server.close()
-    whole = tally.states == {JobState.DONE: campaign.hand_ins} and (tally.doubled, tally.differing) == (0, 0)
+    whole = tally.states == {JobState.DONE: campaign.grading_requests} and (tally.doubled, tally.differing) == (0, 0)
     print(f"{database}: {'whole' if whole else 'BROKEN'}: {tally.sentence()}", flush=True)
     for error in tally.errors:
         print(f"  {error}")

@@ -1,4 +1,4 @@
-"""The rate of a batch and the latency of a single hand-in, with two workers against PostgreSQL.
+"""The rate of a batch and the latency of a single submission, with two workers against PostgreSQL.
 
 Real time, so a busy machine shows: run it alone. ``python -m benchmarks queue`` runs it by itself.
 """
@@ -18,14 +18,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from benchmarks.measurement import Measurement
 from postgresql_server import PostgresqlServer
 from service.queue.celery_app import make_celery
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.report_files import write_reports
 from service.settings import load_settings
 from service.store import batches, intake
 from service.store.engine import Store, open_store
-from service.store.figures import quantile
+from service.store.metrics import quantile
 from service.store.models import Job, JobState, Lane
-from service.whole_service import WholeService
+from service.supervisor import Supervisor
 from submissions.assignment_file import find_assignment
 from submissions.submission import Source, Submission
 
@@ -45,18 +45,18 @@ for turn in range(3):
 
 @dataclass(frozen=True, slots=True)
 class _Bench:
-    """The service under test, and who hands in."""
+    """The service under test, and who submits."""
 
     store: Store
-    nudger: Nudger
+    notifier: Notifier
     folder: Path
 
     def batch(self, name: str, count: int) -> str:
-        """Queue that many hand-ins, none of them a copy of another."""
+        """Queue that many submissions, none of them a copy of another."""
         accepted = intake.accept_batch(
-            self.store, name, [_hand_in(f"{name}-{number}") for number in range(count)], [], max_attempts=3
+            self.store, name, [_request(f"{name}-{number}") for number in range(count)], [], max_attempts=3
         )
-        self.nudger.grade(Lane.BATCH, count)
+        self.notifier.grade(Lane.BATCH, count)
         return accepted.id
 
     def ended(self, batch: str) -> int:
@@ -64,10 +64,10 @@ class _Bench:
             return batches.progress(session, batch).ended
 
     def single(self, student: str) -> float:
-        """Seconds from a hand-in to its report on the disk, with marks and without plots."""
+        """Seconds from a submission to its report on the disk, with marks and without plots."""
         begun = time.perf_counter()
-        job = intake.accept(self.store, _hand_in(student), max_attempts=3).job_id
-        self.nudger.grade(Lane.INTERACTIVE)
+        job = intake.accept(self.store, _request(student), max_attempts=3).job_id
+        self.notifier.grade(Lane.INTERACTIVE)
         self.until(lambda: self._graded(job))
         write_reports(self.store, [job], self.folder)
         return time.perf_counter() - begun
@@ -85,17 +85,17 @@ class _Bench:
 
 
 def measure() -> list[Measurement]:
-    """The rate first, then single hand-ins with nothing else to do, then with a long batch before them."""
+    """The rate first, then single submissions with nothing else to do, then with a long batch before them."""
     server = PostgresqlServer()
     url = server.url.replace("postgresql://", "postgresql+psycopg://", 1)
     try:
         with tempfile.TemporaryDirectory() as folder:
             settings = load_settings(home=Path(folder), database_url=url, concurrency=1)
             with open_store(settings) as store:
-                service = WholeService(settings, store, workers=2, listening=None)
+                service = Supervisor(settings, store, workers=2, listening=None)
                 with service:
-                    nudger = Nudger(make_celery(service.settings), store, service.settings)
-                    bench = _Bench(store, nudger, Path(folder))
+                    notifier = Notifier(make_celery(service.settings), store, service.settings)
+                    bench = _Bench(store, notifier, Path(folder))
                     service.ensure()
                     bench.until(lambda: service.ready)
                     return _measure(bench)
@@ -117,18 +117,20 @@ def _measure(bench: _Bench) -> list[Measurement]:
     left = _DEEP - bench.ended(deep)
     return [
         Measurement(
-            f"batch of {_BATCH} short hand-ins, 2 workers, PostgreSQL, to marks",
+            f"batch of {_BATCH} short submissions, 2 workers, PostgreSQL, to marks",
             f"{rate:.0f} a minute",
             "300 a minute",
             "600 a minute",
         ),
-        Measurement("hand-in to report, nothing else to do: p50, p95, p99", _seconds(idle), "1 s"),
-        Measurement(f"hand-in to report, {_DEEP} of a batch waiting ({left} still at the end)", _seconds(loaded), "-"),
+        Measurement("submission to report, nothing else to do: p50, p95, p99", _seconds(idle), "1 s"),
+        Measurement(
+            f"submission to report, {_DEEP} of a batch waiting ({left} still at the end)", _seconds(loaded), "-"
+        ),
     ]
 
 
 def _plots_drawn(bench: _Bench) -> bool:
-    from service.store.sweep import due_plots
+    from service.store.lease_reaper import due_plots
 
     return due_plots(bench.store) == 0
 
@@ -137,8 +139,8 @@ def _seconds(values: Sequence[float]) -> str:
     return ", ".join(f"{quantile(values, share):.2f}" for share in (0.5, 0.95, 0.99)) + " s"
 
 
-def _hand_in(student: str) -> intake.HandIn:
+def _request(student: str) -> intake.GradingRequest:
     # A text of its own, or it would be a copy of the one before, which is not run again.
     program = Source("robot.py", f"# {student}\n{_PROGRAM}")
     submission = Submission(student, program, Source("responder.py", _RESPONDER))
-    return intake.HandIn(submission, find_assignment("echo-responder"), f"{student}.zip")
+    return intake.GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")

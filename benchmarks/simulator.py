@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 
 from benchmarks.measurement import Measurement, cpu_seconds, median_of
-from responders.bridge import ProgramOrder, TrialOrder
+from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderOrder
+from responders.conversation import Code, ResponderSpec
 from responders.sandbox.running_child import ChildLimits
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.backgrounds import floor
 from sim.camera import BulletCamera, CachedCamera, LightCamera
@@ -41,9 +41,9 @@ def measure() -> list[Measurement]:
         camera.close()
         cached.close()
         arena.close()
-    with Rig() as rig:
-        both = median_of(5, lambda: _through_processes(rig))
-        ready = median_of(20, lambda: _until_ready(rig))
+    with TrialRunner() as runner:
+        both = median_of(5, lambda: _through_processes(runner))
+        ready = median_of(20, lambda: _until_ready(runner))
     return [
         Measurement("simulator alone, 60 s line follower, sensor table", _times(table), "400x", "800x"),
         Measurement("the same, a PyBullet camera image each tick", _times(shots), "60x"),
@@ -69,10 +69,10 @@ def _follow(arena: Arena, camera: LightCamera) -> None:
         world.tick()
 
 
-def _order(program: str) -> TrialOrder:
-    return TrialOrder(
-        ProgramOrder(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
-        ResponderOrder(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
+def _spec(program: str) -> TrialSpec:
+    return TrialSpec(
+        ProgramSpec(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
+        ResponderSpec(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
         True,
         floor(_FLOOR),
         robot("Default_Robot"),
@@ -85,14 +85,14 @@ def _order(program: str) -> TrialOrder:
     )
 
 
-def _through_processes(rig: Rig) -> float:
+def _through_processes(runner: TrialRunner) -> float:
     """CPU seconds of the worker and of both students' processes together."""
-    before = rig.children_cpu_seconds
-    own = cpu_seconds(lambda: rig.run(_order(_FOLLOWER)))
-    return own + rig.children_cpu_seconds - before
+    before = runner.children_cpu_seconds
+    own = cpu_seconds(lambda: runner.run(_spec(_FOLLOWER)))
+    return own + runner.children_cpu_seconds - before
 
 
-def _until_ready(rig: Rig) -> float:
+def _until_ready(runner: TrialRunner) -> float:
     start = time.perf_counter()
-    rig.run(_order("pass"))
+    runner.run(_spec("pass"))
     return time.perf_counter() - start

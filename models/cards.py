@@ -56,7 +56,7 @@ class Measured:
     curves: tuple[Curve, ...]
 
     @classmethod
-    def from_plain(cls, data: Mapping[str, Any]) -> Measured:
+    def from_json(cls, data: Mapping[str, Any]) -> Measured:
         """From what ``asdict`` and JSON have made of one."""
         curves = tuple(
             Curve(
@@ -97,7 +97,7 @@ class Card:
     def from_json(cls, text: str) -> Card:
         data = json.loads(text)
         data["classes"] = tuple(data["classes"])
-        data["measured"] = Measured.from_plain(data["measured"])
+        data["measured"] = Measured.from_json(data["measured"])
         return cls(**data)
 
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, Responder, ResponderOrder
+from responders.conversation import Code, Collected, Conversation, Responder, ResponderSpec
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
@@ -36,7 +36,7 @@ _MOST_NOTES = 200
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramOrder:
+class ProgramSpec:
     """A robot program and what it may use."""
 
     code: Code
@@ -46,11 +46,11 @@ class ProgramOrder:
 
 
 @dataclass(frozen=True, slots=True)
-class TrialOrder:
+class TrialSpec:
     """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
 
-    program: ProgramOrder
-    responder: ResponderOrder | None
+    program: ProgramSpec
+    responder: ResponderSpec | None
     collaborative: bool
     floor: Floor
     robot: Robot
@@ -77,26 +77,26 @@ class Bridge:
 
     def __init__(
         self,
-        order: TrialOrder,
+        spec: TrialSpec,
         arena: Arena,
         camera: LightCamera,
         child: Child,
         responder: Responder | None,
         meter: JobMeter,
     ) -> None:
-        self._order = order
+        self._spec = spec
         self._child = child
         self._meter = meter
         self.now = 0
         self.chain = Chain()
-        self.world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, self.chain, order.physics)
-        self.conversation = Conversation(order.channel, order.seed, self.chain, responder, meter)
+        self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
+        self.conversation = Conversation(spec.channel, spec.seed, self.chain, responder, meter)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
         self.image_log: list[tuple[str, str, int]] = []
         self.notes: list[str] = []
-        self._limit = round(order.seconds * SECOND)
+        self._limit = round(spec.seconds * SECOND)
         self._said_until = 0
         self._arrived: list[str] = []
         self._free_acts = 0
@@ -106,7 +106,7 @@ class Bridge:
         self._told_lines = self._told_images = 0
         if responder is not None:
             responder.collected = self.collected
-        self._output_left = order.program.output_bytes
+        self._output_left = spec.program.output_bytes
 
     def run(self) -> Fault | None:
         """Serve the program until it ends. What cut it short or went wrong, if anything."""
@@ -120,13 +120,13 @@ class Bridge:
             return self._stopped(surprise(error))
 
     def _run(self) -> Fault | None:
-        order = self._order
+        spec = self._spec
         self._child.send(
             {
-                "name": order.program.code.name,
-                "text": order.program.code.text,
-                "preamble": order.program.preamble,
-                "seed": Stream(order.child_seed, "program").integer(0),
+                "name": spec.program.code.name,
+                "text": spec.program.code.text,
+                "preamble": spec.program.preamble,
+                "seed": Stream(spec.child_seed, "program").integer(0),
             }
         )
         while True:
@@ -157,9 +157,9 @@ class Bridge:
             "angle": math.radians(world.pose.heading),
             "ultrasonic": world.ultrasonic,
             "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
-            "penDown": self._order.pen_down,
-            "_sensorNoise": self._order.noise.light,
-            "_wheelNoise": self._order.noise.motor,
+            "penDown": self._spec.pen_down,
+            "_sensorNoise": self._spec.noise.light,
+            "_wheelNoise": self._spec.noise.motor,
         }
         sums = (world.left_sums, world.right_sums)
         for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
@@ -214,10 +214,10 @@ class Bridge:
             self.world.tick()
             due += TICK
             if self.world.clock % 3000 == 0:
-                self._meter.pulse()
+                self._meter.heartbeat()
         if end > self._limit:
             self.now = self._limit
-            sentence = f"the program was still running after {self._order.seconds:g} seconds of simulated time"
+            sentence = f"the program was still running after {self._spec.seconds:g} seconds of simulated time"
             raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
         self.now = end
 
@@ -302,9 +302,9 @@ class Bridge:
             self._log_image(text)
             return
         self.printed.append(Line(self.now / SECOND, text))
-        if self._order.collaborative and kind == "py":
+        if self._spec.collaborative and kind == "py":
             self.conversation.send(text, self.now)
-        elif self._order.collaborative and kind == "image":
+        elif self._spec.collaborative and kind == "image":
             self._send_image()
 
     def _send_image(self) -> None:
@@ -322,8 +322,8 @@ class Bridge:
                 left,
                 right,
                 number,
-                self._order.floor.label_at(where.x, where.y),
-                self._order.robot.left_light.diameter,
+                self._spec.floor.label_at(where.x, where.y),
+                self._spec.robot.left_light.diameter,
             )
         )
 
@@ -352,7 +352,7 @@ class Bridge:
         """Count what the program says, before it is kept; beyond its limit the trial ends."""
         self._output_left -= size
         if self._output_left < 0:
-            sentence = f"the program {did} more than {self._order.program.output_bytes} bytes"
+            sentence = f"the program {did} more than {self._spec.program.output_bytes} bytes"
             raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
 
     def _free_act(self) -> None:

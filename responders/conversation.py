@@ -34,7 +34,7 @@ class Code:
 
 
 @dataclass(frozen=True, slots=True)
-class ResponderOrder:
+class ResponderSpec:
     """What answers the robot: code and the files in its folder."""
 
     code: Code
@@ -64,19 +64,19 @@ class Responder:
 
     _schema = wire.RESPONDER
 
-    def __init__(self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
-        self._order = order
+    def __init__(self, spec: ResponderSpec, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
+        self._spec = spec
         self._folder = folder
         self.output: list[str] = []
-        self._output_left = order.output_bytes
+        self._output_left = spec.output_bytes
         self.calls: list[Call] = []
         self.notes: list[str] = []
         #: What the robot has logged since it was last asked; set by the bridge that serves the robot.
         self.collected: Callable[[], Collected] = _nothing_collected
-        for name, data in order.files.items():
+        for name, data in spec.files.items():
             (folder / name).write_bytes(data)
-        self._child: Child | None = sandboxes.spawn("responder", order.limits, folder, meter)
-        self.walls = self._child.walls
+        self._child: Child | None = sandboxes.spawn("responder", spec.limits, folder, meter)
+        self.sandbox = self._child.sandbox
         self._seed = seed
 
     def load(self) -> Fault | None:
@@ -85,10 +85,10 @@ class Responder:
         try:
             self._child.send(
                 {
-                    "name": self._order.code.name,
-                    "text": self._order.code.text,
+                    "name": self._spec.code.name,
+                    "text": self._spec.code.text,
                     "seed": Stream(self._seed, "responder").integer(0),
-                    "function": self._order.function,
+                    "function": self._spec.function,
                 }
             )
             frame = self._until("ready", -1, [])
@@ -173,7 +173,7 @@ class Responder:
     def _spend(self, text: str, did: str) -> None:
         self._output_left -= len(text.encode("utf-8", "replace")) + 1
         if self._output_left < 0:
-            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the responder {did} more than {self._order.output_bytes} bytes")
+            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the responder {did} more than {self._spec.output_bytes} bytes")
 
     def _stopped(self, stop: ChildStopped, t: int) -> Fault:
         self.close()

@@ -64,7 +64,7 @@ def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
 
 
 def refusal(who: str, frame: wire.Frame) -> str:
-    """What the walls refused, as a sentence for the report."""
+    """What the sandbox refused, as a sentence for the report."""
     where = f"line {frame['line']} of the {who}" if frame["line"] is not None else f"the {who}"
     return f"{where}: {frame['what'][:200]}"
 

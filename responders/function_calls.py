@@ -1,4 +1,4 @@
-"""Calls functions of a responder, or of an instructor's check, inside the walls and without a robot.
+"""Calls functions of a responder, or of an instructor's check, inside the sandbox and without a robot.
 
 The module is loaded once in a fresh child and its functions are called one after the other; what the values are worth
 is judged elsewhere.
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderOrder
+from responders.conversation import Code, Responder, ResponderSpec
 from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -54,7 +54,7 @@ class Called:
 
     returned: tuple[Returned, ...]
     fault: Fault | None
-    walls: str
+    sandbox: str
     printed: tuple[tuple[str, ...], ...] = ()
 
 
@@ -75,17 +75,17 @@ def call_functions(
     Raises HostError when the machine, not the module, fails.
     """
     with sandboxes.private_folder() as folder:
-        order = ResponderOrder(code, files, limits, output_bytes, _NO_RESPONDER)
-        caller = _Caller(order, sandboxes, folder, seed, meter)
+        spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER)
+        caller = _Caller(spec, sandboxes, folder, seed, meter)
         try:
-            walls = caller.walls
+            sandbox = caller.sandbox
             fault = caller.load()
             printed = [caller.taken()]
             gave = []
             for call in calls if fault is None else ():
                 gave.append(caller.call(call))
                 printed.append(caller.taken())
-            return Called(tuple(gave), fault, walls, tuple(printed))
+            return Called(tuple(gave), fault, sandbox, tuple(printed))
         finally:
             caller.close()
 
@@ -95,10 +95,10 @@ class _Caller(Responder):
 
     _schema = wire.CALLS
 
-    def __init__(self, order: ResponderOrder, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
-        super().__init__(order, sandboxes, folder, seed, meter)
+    def __init__(self, spec: ResponderSpec, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
+        super().__init__(spec, sandboxes, folder, seed, meter)
         assert self._child is not None
-        self.walls = self._child.walls
+        self.sandbox = self._child.sandbox
         self._ended: Fault | None = None
 
     def taken(self) -> tuple[str, ...]:

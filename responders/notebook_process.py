@@ -1,4 +1,4 @@
-"""The process of a notebook: its cells are played in it, and it answers the robots that they start.
+"""The process of a notebook: its cells are executed in it, and it answers the robots that they start.
 
 It keeps what the cells print and what becomes of them; the robots are ``notebook_play.py``'s.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderOrder
+from responders.conversation import Code, Responder, ResponderSpec
 from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -25,7 +25,7 @@ _MOST_MAGICS = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class NotebookOrder:
+class NotebookSpec:
     """A notebook's cells from the top, and the files in its folder."""
 
     name: str
@@ -37,16 +37,16 @@ class NotebookOrder:
 
 
 class NotebookProcess(Responder):
-    """A notebook's process during one play. Cells and their lines are counted from 1."""
+    """A notebook's process during one execution. Cells and their lines are counted from 1."""
 
     _schema = wire.NOTEBOOK
 
-    def __init__(self, order: NotebookOrder, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
-        parts = ResponderOrder(Code(order.name, ""), order.files, order.limits, order.output_bytes)
-        super().__init__(parts, sandboxes, folder, order.seed, meter)
-        self._notebook = order
+    def __init__(self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
+        parts = ResponderSpec(Code(spec.name, ""), spec.files, spec.limits, spec.output_bytes)
+        super().__init__(parts, sandboxes, folder, spec.seed, meter)
+        self._notebook = spec
         self._first_lines = [1]
-        for source in order.cells:
+        for source in spec.cells:
             self._first_lines.append(self._first_lines[-1] + source.count("\n") + 1)
         self._cell = 1
         self._printed_in = 0
@@ -57,7 +57,7 @@ class NotebookProcess(Responder):
         self.raised: list[Fault] = []
         self.stopped: Fault | None = None
 
-    def play(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
+    def execute(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
         """Play all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
         assert self._child is not None
         try:
@@ -71,7 +71,7 @@ class NotebookProcess(Responder):
             )
             while True:
                 frame = self._child.receive(self._schema)
-                if frame["do"] == "played":
+                if frame["do"] == "executed":
                     self.missing = frame["missing"]
                     return
                 self._take_cell(frame, perform)
@@ -90,7 +90,7 @@ class NotebookProcess(Responder):
         return replace(fault, cell=cell, line=line)
 
     def place(self, line: int | None) -> tuple[int, int | None]:
-        """The cell, and the line in it, of a line of the whole notebook; the cell being played if there is none."""
+        """The cell, and the line in it, of a line of the whole notebook; the cell being executed if there is none."""
         if line is None or not 1 <= line < self._first_lines[-1]:
             return self._cell, None
         cell = bisect.bisect_right(self._first_lines, line)

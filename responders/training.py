@@ -1,4 +1,4 @@
-"""Trains a student's model inside the walls, and asks it to name images that it has not seen.
+"""Trains a student's model inside the sandbox, and asks it to name images that it has not seen.
 
 The labels of those images never come here; whether the names are right is judged elsewhere.
 """
@@ -29,8 +29,8 @@ Images = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class TrainingOrder:
-    """A hand-in with ``function(images, labels)``; images are grey levels, (n, side, side).
+class TrainingSpec:
+    """A submission with ``function(images, labels)``; images are grey levels, (n, side, side).
 
     The groups of ``unseen`` are named one after the other, so what is told of the first knows nothing of the next.
     """
@@ -58,30 +58,30 @@ class Named:
     output: str
 
 
-def train_and_name(order: TrainingOrder, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
+def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
     """One child: the student's module is loaded, trained, and asked. The limits are for all of it together.
 
     Raises HostError when the machine, not the student, fails.
     """
-    groups = [_chunks(images) for images in order.unseen]
+    groups = [_chunks(images) for images in spec.unseen]
     calls = [
-        FunctionCall("robomark_train", (order.function,)),
+        FunctionCall("robomark_train", (spec.function,)),
         *(FunctionCall("robomark_predict", (_encoded(chunk), chunk.shape[1])) for group in groups for chunk in group),
     ]
     called = call_functions(
-        replace(order.code, text=f"{order.code.text}\n\n\n{_harness()}"),
-        {**order.files, "train.npz": _packed(order.images, order.labels)},
+        replace(spec.code, text=f"{spec.code.text}\n\n\n{_harness()}"),
+        {**spec.files, "train.npz": _packed(spec.images, spec.labels)},
         calls,
-        order.limits,
-        order.output_bytes,
+        spec.limits,
+        spec.output_bytes,
         sandboxes,
-        order.seed,
+        spec.seed,
         meter,
     )
-    return tuple(_named(called, groups, order))
+    return tuple(_named(called, groups, spec))
 
 
-def _named(called: Called, groups: Sequence[Sequence[Images]], order: TrainingOrder) -> Iterator[Named]:
+def _named(called: Called, groups: Sequence[Sequence[Images]], spec: TrainingSpec) -> Iterator[Named]:
     """The names, each checked: what comes from a student's process may be anything."""
     fault = called.fault or (called.returned[0].fault if called.returned else None)
     trained, end = fault is None, 1
@@ -95,7 +95,7 @@ def _named(called: Called, groups: Sequence[Sequence[Images]], order: TrainingOr
         end += len(group)
         missing = sum(map(len, group)) - len(names)
         output = "\n".join(itertools.chain.from_iterable(called.printed[: end + 1]))
-        yield Named((*names, *[None] * missing), _in_their_file(fault, order), output)
+        yield Named((*names, *[None] * missing), _in_their_file(fault, spec), output)
 
 
 def _names(returned: Returned, count: int) -> list[str | None] | None:
@@ -111,9 +111,9 @@ def _bad_answer() -> Fault:
     )
 
 
-def _in_their_file(fault: Fault | None, order: TrainingOrder) -> Fault | None:
+def _in_their_file(fault: Fault | None, spec: TrainingSpec) -> Fault | None:
     """Without a line number that points below the end of the student's own text."""
-    if fault is None or fault.line is None or fault.line <= order.code.text.count("\n") + 1:
+    if fault is None or fault.line is None or fault.line <= spec.code.text.count("\n") + 1:
         return fault
     return replace(fault, line=None)
 

@@ -1,4 +1,4 @@
-"""Inside the walls, below a student's own code: trains a model on images from a file, and asks it about others.
+"""Inside the sandbox, below a student's own code: trains a model on images from a file, and asks it about others.
 
 Its text is joined to the student's, so that their functions are at hand; it holds no label that a model is marked by.
 """

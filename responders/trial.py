@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from responders import messages
-from responders.bridge import Bridge, TrialOrder
+from responders.bridge import Bridge, TrialSpec
 from responders.conversation import Responder
 from responders.faults import stopped
 from responders.sandbox.manager import Sandboxes
@@ -26,7 +26,7 @@ MOST_NOTES = 40
 
 
 def run_trial(
-    order: TrialOrder,
+    spec: TrialSpec,
     arena: Arena,
     camera: LightCamera,
     sandboxes: Sandboxes,
@@ -38,13 +38,13 @@ def run_trial(
     """
     with sandboxes.private_folder() as folder:
         responder = None
-        if order.responder is not None:
-            responder = Responder(order.responder, sandboxes, folder, order.child_seed, meter)
+        if spec.responder is not None:
+            responder = Responder(spec.responder, sandboxes, folder, spec.child_seed, meter)
         try:
-            program = sandboxes.spawn("robot", order.program.limits, meter=meter)
+            program = sandboxes.spawn("robot", spec.program.limits, meter=meter)
             try:
                 unloadable = responder.load() if responder is not None else None
-                bridge = Bridge(order, arena, camera, program, responder, meter)
+                bridge = Bridge(spec, arena, camera, program, responder, meter)
                 fault = bridge.run()
             finally:
                 program.close()
@@ -55,7 +55,7 @@ def run_trial(
     bridge.conversation.finish()
     faults = [each for each in (unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
     faults.sort(key=lambda each: each.t)
-    recording = recording_of(order, bridge, tuple(faults), program.walls)
+    recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
     if responder is None:
         return recording
     return replace(
@@ -67,13 +67,13 @@ def run_trial(
     )
 
 
-def recording_of(order: TrialOrder, bridge: Bridge, faults: tuple[Fault, ...], walls: str) -> Recording:
+def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
     """What a bridge that has served its program has seen, but for what the responder's process told of itself."""
     world = bridge.world
     data = (messages.datum(line.text, line.t) for line in bridge.printed)
     return Recording(
-        background=order.floor.name,
-        start=order.pose,
+        background=spec.floor.name,
+        start=spec.pose,
         end=world.pose,
         end_t=bridge.now / SECOND,
         ticks=world.ticks(),
@@ -88,11 +88,11 @@ def recording_of(order: TrialOrder, bridge: Bridge, faults: tuple[Fault, ...], w
         touches=tuple(world.touches),
         faults=faults,
         obstacles=world.obstacles,
-        patches=order.floor.patches,
-        sheet=order.floor.sheet,
-        robot=order.robot.name,
-        pen=((0, True),) if order.pen_down else (),
-        walls=walls,
+        patches=spec.floor.patches,
+        sheet=spec.floor.sheet,
+        robot=spec.robot.name,
+        pen=((0, True),) if spec.pen_down else (),
+        sandbox=sandbox,
         notes=tuple(bridge.notes)[:MOST_NOTES],
     )
 

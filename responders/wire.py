@@ -68,10 +68,10 @@ _units = _whole(0, 10**15)
 
 Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 
-#: The first frame of every child, before any student code: which walls stand round it.
-WALLS: Schema = MappingProxyType(
+#: The first frame of every child, before any student code: which layers stand round it.
+SANDBOX: Schema = MappingProxyType(
     {
-        "walls": (
+        "sandbox": (
             {
                 "landlock": _whole(0, 99),
                 "seccomp": _flag,
@@ -173,7 +173,7 @@ NOTEBOOK: Schema = MappingProxyType(
             },
             {},
         ),
-        "played": ({"missing": _or_none(_text)}, {}),
+        "executed": ({"missing": _or_none(_text)}, {}),
     }
 )
 

@@ -21,16 +21,16 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.home import open_home
-from service.queue import canaries as known_answers
+from service.queue import self_test as known_answers
 from service.queue.broker import broker_answers, broker_client, socket_path
 from service.queue.worker import worker_lives
 from service.settings import Settings
-from service.store import canaries, presence
+from service.store import self_tests, workers
 from service.store.engine import Store, now, open_engine
-from service.store.figures import look
 from service.store.installation import secret_of
+from service.store.metrics import collect
 from service.store.migrate import current_revision, newest_revision
 from service.store.models import Job, JobState
 from sim.errors import RobomarkError
@@ -56,7 +56,7 @@ def examine(settings: Settings) -> list[Finding]:
     checks: list[tuple[str, Callable[[Settings], tuple[bool, str]]]] = [
         ("Python", _python),
         ("simulator", _simulator),
-        ("walls", _walls),
+        ("sandbox", _sandbox),
         ("control groups", _control_groups),
         ("between trials", _between_trials),
         ("home", _home),
@@ -93,7 +93,7 @@ def _simulator(_settings: Settings) -> tuple[bool, str]:
     return client >= 0, f"PyBullet {metadata.version('pybullet')}"
 
 
-def _walls(_settings: Settings) -> tuple[bool, str]:
+def _sandbox(_settings: Settings) -> tuple[bool, str]:
     with Sandboxes() as sandboxes:
         return True, f"student code runs behind: {sandboxes.check()}"
 
@@ -106,10 +106,10 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
         if store is None:
             return True, told
         with store.reading() as session:
-            lately = [seen.worker for seen in presence.workers(session) if seen.lately]
+            lately = [seen.worker for seen in workers.known_workers(session) if seen.lately]
     if not lately:
         return True, told
-    have = sum("control group" in worker.walls for worker in lately)
+    have = sum("control group" in worker.sandbox for worker in lately)
     return True, f"{told}; of {len(lately)} heard of lately {have} have"
 
 
@@ -185,8 +185,8 @@ def _broker(settings: Settings) -> tuple[bool, str]:
 
 def _known_answer(settings: Settings) -> tuple[bool, str]:
     """Whether this machine grades the known answer rightly, and every worker did lately."""
-    with Rig() as rig:
-        actual = known_answers.ask(rig)
+    with TrialRunner() as runner:
+        actual = known_answers.ask(runner)
     wrong = "" if actual is None else known_answers.difference(known_answers.known(), actual)
     if wrong:
         return False, f"this machine grades wrongly: {wrong}"
@@ -196,7 +196,7 @@ def _known_answer(settings: Settings) -> tuple[bool, str]:
             return True, here
         with store.reading() as session:
             lately = now(session) - timedelta(days=1)
-            shut_out = [found for found in canaries.in_quarantine(session) if found.since > lately]
+            shut_out = [found for found in self_tests.in_quarantine(session) if found.since > lately]
     if not shut_out:
         return True, here
     told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)
@@ -221,7 +221,7 @@ def _workers(settings: Settings) -> tuple[bool, str]:
         if store is None:
             return True, here
         with store.reading() as session:
-            lately = [seen.worker for seen in presence.workers(session) if seen.lately]
+            lately = [seen.worker for seen in workers.known_workers(session) if seen.lately]
     if not lately:
         return True, here
     slots = sum(worker.concurrency for worker in lately)
@@ -234,13 +234,13 @@ def _queue(settings: Settings) -> tuple[bool, str]:
         if store is None:
             return True, "empty"
         with store.reading() as session:
-            figures = look(session)
-    waiting = sum(figures.claimable.values())
-    oldest = max(figures.oldest_seconds.values(), default=0.0)
-    dead = sum(count for (_, state), count in figures.jobs.items() if state is JobState.DEAD)
+            metrics = collect(session)
+    waiting = sum(metrics.claimable.values())
+    oldest = max(metrics.oldest_seconds.values(), default=0.0)
+    dead = sum(count for (_, state), count in metrics.jobs.items() if state is JobState.DEAD)
     told = f"{waiting} waiting" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
     told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
-    if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in figures.workers):
+    if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was heard of lately"
     return True, told
 

@@ -1,4 +1,4 @@
-"""The home is ours alone: made so, mended where it is not, refused where it cannot be; and what is made by default.
+"""The home is ours alone: made so, repaired where it is not, refused where it cannot be; and what is made by default.
 
 What lies in the home is the business of whoever puts it there; reports and exports lie elsewhere.
 """
@@ -56,14 +56,14 @@ def open_home(home: Path) -> None:
     try:
         _check_way(home)
         home.mkdir(mode=0o700, parents=True, exist_ok=True)
-        mended = _mend(home)
+        repaired = _repair(home)
     except FileExistsError:
         raise UsageError(f"the home {home} is no folder, expected one for Robomark alone in ROBOMARK_HOME") from None
     except OSError as error:
         raise HostError(f"the home {error.filename or home} cannot be used: {error.strerror}") from None
-    if mended:
+    if repaired:
         _log.warning("robomark: the home %s was open to other users (%d of its files and folders); "
-                     "now it is this user's alone", home, mended)  # fmt: skip
+                     "now it is this user's alone", home, repaired)  # fmt: skip
 
 
 def _folders_of_all() -> tuple[Path, ...]:
@@ -106,17 +106,17 @@ def _called(user: int) -> str:
         return f"user {user}"
 
 
-def _mend(home: Path) -> int:
+def _repair(home: Path) -> int:
     """How much of it was open to others. It is closed from the top, so that nobody comes in between."""
-    mended: int = _close(home, home.resolve())
+    repaired: int = _close(home, home.resolve())
     for path in sorted(found for name in _OURS for found in home.glob(name)):
-        mended += _close(home, path)
+        repaired += _close(home, path)
         if path.is_symlink():
             _check_owner(home, path, path.stat())
             continue
         for folder, folders, files in os.walk(path):
-            mended += sum(_close(home, Path(folder, name)) for name in (*folders, *files))
-    return mended
+            repaired += sum(_close(home, Path(folder, name)) for name in (*folders, *files))
+    return repaired
 
 
 def _close(home: Path, path: Path) -> bool:

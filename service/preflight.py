@@ -1,4 +1,4 @@
-"""Reads a folder, zip or roster of hand-ins before anything is queued: what can be graded, and what not.
+"""Reads a folder, zip or roster of submissions before anything is queued: what can be graded, and what not.
 
 Every bad row is named and stops no other. Nothing is stored here.
 """
@@ -17,7 +17,7 @@ from functools import cache, partial
 from pathlib import Path, PurePosixPath
 
 from service.roster import RosterRow, file_inside, read_roster
-from service.store.intake import HandIn
+from service.store.intake import GradingRequest
 from sim.errors import UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import catalogue, find_assignment, find_in_catalogue, read_assignment
@@ -36,7 +36,7 @@ _CHUNK = 1 << 20
 class Preflight:
     """What a batch would take in, and the rows it would not: name, sentence."""
 
-    hand_ins: tuple[HandIn, ...]
+    grading_requests: tuple[GradingRequest, ...]
     problems: tuple[tuple[str, str], ...]
 
 
@@ -46,13 +46,13 @@ class _Row:
 
     name: str
     student: str
-    read: Callable[[], HandIn]
+    read: Callable[[], GradingRequest]
 
 
 def preflight(path: Path, assignment: str | None) -> Preflight:
-    """Read every hand-in of a folder, zip or CSV roster.
+    """Read every submission of a folder, zip or CSV roster.
 
-    In a folder or zip a subfolder, a .py or a .zip is one student's, and without ``assignment`` each hand-in names
+    In a folder or zip a subfolder, a .py or a .zip is one student's, and without ``assignment`` each submission names
     its own. A roster names student and file; ``assignment`` is for the rows that name none. Raises UsageError when
     ``path`` or ``assignment`` itself cannot be used.
     """
@@ -63,14 +63,14 @@ def preflight(path: Path, assignment: str | None) -> Preflight:
             _Row(
                 shown(f"line {row.line}: {row.student}" if row.student else f"line {row.line}"),
                 row.student,
-                partial(_roster_hand_in, path.parent, row, asked, find),
+                partial(_roster_request, path.parent, row, asked, find),
             )
             for row in read_roster(path)
         )
     with _opened(path) as folder:
         find_own = cache(find_in_catalogue)
         return _read(
-            _Row(shown(entry.name), named_by(entry), partial(_hand_in, entry, asked, find_own))
+            _Row(shown(entry.name), named_by(entry), partial(_request, entry, asked, find_own))
             for entry in _entries(folder)
         )
 
@@ -78,7 +78,7 @@ def preflight(path: Path, assignment: str | None) -> Preflight:
 def _read(rows: Iterable[_Row]) -> Preflight:
     rows = list(rows)
     near = alike(row.student for row in rows if row.student)
-    found: list[HandIn | str] = []
+    found: list[GradingRequest | str] = []
     for row in rows:
         try:
             if row.student in near:
@@ -88,22 +88,24 @@ def _read(rows: Iterable[_Row]) -> Preflight:
             found.append(" ".join(str(error).split()))
     found = _one_each(rows, found)
     return Preflight(
-        tuple(each for each in found if isinstance(each, HandIn)),
+        tuple(each for each in found if isinstance(each, GradingRequest)),
         tuple((row.name, each) for row, each in zip(rows, found, strict=True) if isinstance(each, str)),
     )
 
 
-def _one_each(rows: Sequence[_Row], found: Sequence[HandIn | str]) -> list[HandIn | str]:
-    """One hand-in of a student for an assignment; of several that differ nobody here knows which is meant."""
-    places: dict[tuple[str, str], dict[int, HandIn]] = {}
+def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> list[GradingRequest | str]:
+    """One submission of a student for an assignment; of several that differ nobody here knows which is meant."""
+    places: dict[tuple[str, str], dict[int, GradingRequest]] = {}
     for place, each in enumerate(found):
-        if isinstance(each, HandIn):
+        if isinstance(each, GradingRequest):
             places.setdefault((each.submission.student, each.assignment.id), {})[place] = each
     left = list(found)
     for (_, assignment), same in places.items():
         first, *others = same
         if len({each.submission.sha256 for each in same.values()}) == 1:
-            sentence = f"{rows[first].name} is already this student's hand-in for {assignment}; this one is left out."
+            sentence = (
+                f"{rows[first].name} is already this student's submission for {assignment}; this one is left out."
+            )
             for place in others:
                 left[place] = sentence
             continue
@@ -115,22 +117,24 @@ def _one_each(rows: Sequence[_Row], found: Sequence[HandIn | str]) -> list[HandI
     return left
 
 
-def _hand_in(entry: Path, asked: Assignment | None, find: Callable[[str], Assignment]) -> HandIn:
+def _request(entry: Path, asked: Assignment | None, find: Callable[[str], Assignment]) -> GradingRequest:
     length = len(shown_name(named_by(entry)))
     if not 0 < length <= LONGEST_NAME:
         raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
     if asked is not None:
-        return HandIn(read_submission(entry, asked=asked.parts), asked, shown(entry.name), written=named_by(entry))
+        return GradingRequest(
+            read_submission(entry, asked=asked.parts), asked, shown(entry.name), written=named_by(entry)
+        )
     submission = read_submission(entry)
     if submission.assignment is None:
         raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
     own = find(submission.assignment)
-    return HandIn(fit_parts(submission, own.parts), own, shown(entry.name), written=named_by(entry))
+    return GradingRequest(fit_parts(submission, own.parts), own, shown(entry.name), written=named_by(entry))
 
 
-def _roster_hand_in(
+def _roster_request(
     folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment]
-) -> HandIn:
+) -> GradingRequest:
     if row.problem:
         raise UsageError(row.problem)
     if not row.assignment and asked is None:
@@ -138,7 +142,7 @@ def _roster_hand_in(
     path = file_inside(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
     submission = read_submission(path, student=row.student, asked=assignment.parts)
-    return HandIn(submission, assignment, shown(row.file), row.handed_in)
+    return GradingRequest(submission, assignment, shown(row.file), row.submitted_at)
 
 
 def _roster_assignment(folder: Path, name: str) -> Assignment:
@@ -156,8 +160,8 @@ def _entries(folder: Path) -> list[Path]:
     parts = [entry.name for entry in entries if entry.name.lower() in _PARTS]
     if parts:
         raise UsageError(
-            f"{folder.name}: has {parts[0]} in it, so it looks like one hand-in; a batch is a folder with a "
-            "subfolder, .py or .zip for each student (one hand-in is graded with robomark grade)."
+            f"{folder.name}: has {parts[0]} in it, so it looks like one submission; a batch is a folder with a "
+            "subfolder, .py or .zip for each student (one submission is graded with robomark grade)."
         )
     if not entries:
         raise UsageError(f"{folder.name}: is empty, expected a subfolder, .py or .zip for each student.")
@@ -176,15 +180,15 @@ def _opened(path: Path) -> Iterator[Path]:
             _unzip(path, folder)
             yield _stepped_into(folder)
     elif not path.exists():
-        raise UsageError(f"{path}: does not exist, expected a folder or a .zip of hand-ins, or a .csv roster.")
+        raise UsageError(f"{path}: does not exist, expected a folder or a .zip of submissions, or a .csv roster.")
     else:
         raise UsageError(
-            f"{path}: is neither a folder nor a .zip nor a .csv, expected one with a hand-in for each student."
+            f"{path}: is neither a folder nor a .zip nor a .csv, expected one with a submission for each student."
         )
 
 
 def _stepped_into(folder: Path) -> Path:
-    """The only folder inside, where archives have one around the hand-ins; but not a lone student's."""
+    """The only folder inside, where archives have one around the submissions; but not a lone student's."""
     inside = [entry for entry in folder.iterdir() if entry.name not in _IGNORED]
     if len(inside) != 1 or not inside[0].is_dir():
         return folder

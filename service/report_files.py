@@ -65,8 +65,8 @@ def write_batch(
         for line in lines
     ]
     rows += [BatchRow(name, note=f"not taken in: {sentence}") for name, sentence in problems]
-    walls = ", ".join(sorted({line.walls for line in lines if line.walls}))
-    return write_page(folder, _INDEX, batch_index(rows, title, walls))
+    sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
+    return write_page(folder, _INDEX, batch_index(rows, title, sandbox))
 
 
 def _remark(line: JobLine) -> str:
@@ -78,13 +78,13 @@ def _remark(line: JobLine) -> str:
 def _page(store: Store, job_id: str) -> str:
     with store.reading() as session:
         grade = grades.load(session, job_id)
-        hand_in = intake.load_hand_in(session, job_id)
+        grading_request = intake.load_grading_request(session, job_id)
         job = session.get_one(Job, job_id)
         released = policies.released(session, job_id)
         staff_only = session.get_one(Submission, job.submission_id).staff_only
         kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
-    files = kept if job.plots is PlotState.DONE else draw(grade, hand_in.assignment)
+    files = kept if job.plots is PlotState.DONE else draw(grade, grading_request.assignment)
     plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
     if staff_only is not None:
-        return staff_report(grade, plots, hand_in.submission)
-    return student_report(grade, plots, hand_in.submission, released)
+        return staff_report(grade, plots, grading_request.submission)
+    return student_report(grade, plots, grading_request.submission, released)

@@ -1,6 +1,6 @@
-"""Reads a CSV roster: which student handed in which file, for which assignment. Every bad row is named by its line.
+"""Reads a CSV roster: which student submitted which file, for which assignment. Every bad row is named by its line.
 
-Says where a file would lie, never outside the roster's folder; reading the hand-ins is ``preflight.py``'s.
+Says where a file would lie, never outside the roster's folder; reading the submissions is ``preflight.py``'s.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sim.errors import UsageError
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.raw_files import shown
 
-COLUMNS = ("student", "file", "assignment", "handed_in")
+COLUMNS = ("student", "file", "assignment", "submitted_at")
 _MOST_BYTES = 10_000_000
 _SEPARATORS = (",", ";", "\t")
 
@@ -30,11 +30,11 @@ class RosterRow:
     file: str = ""
     assignment: str = ""
     problem: str = ""
-    handed_in: datetime | None = None
+    submitted_at: datetime | None = None
 
 
 def read_roster(path: Path) -> list[RosterRow]:
-    """The rows of a roster with the columns student, file and, if it has them, assignment and handed_in.
+    """The rows of a roster with the columns student, file and, if it has them, assignment and submitted_at.
 
     Other columns are passed over.
 
@@ -147,11 +147,13 @@ def _row(record: _Record, places: Mapping[str, int], columns: int) -> RosterRow:
     student = shown_name(found["student"])
     problem = _problem(student, found["file"])
     try:
-        handed_in = moment(found["handed_in"]) if found.get("handed_in") else None
+        submitted_at = moment(found["submitted_at"]) if found.get("submitted_at") else None
     except ValueError:
-        handed_in = None
-        problem = problem or f"has {shown(found['handed_in'])} for handed_in, expected a moment like 2026-11-30 17:00."
-    return RosterRow(record.line, student, found["file"], found.get("assignment", ""), problem, handed_in)
+        submitted_at = None
+        problem = (
+            problem or f"has {shown(found['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
+        )
+    return RosterRow(record.line, student, found["file"], found.get("assignment", ""), problem, submitted_at)
 
 
 def moment(text: str, *, end_of_day: bool = False) -> datetime:

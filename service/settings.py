@@ -51,9 +51,9 @@ class Settings(BaseSettings):
     #: How long one whole job may take in real time: the backstop behind all other limits.
     job_seconds: float = Field(default=900.0, ge=1, le=86_400)
     #: How often each process of a worker grades the known answer.
-    canary_seconds: float = Field(default=300.0, ge=1, le=86_400)
-    #: A queued job whose nudge is older than this may be nudged again.
-    nudge_seconds: float = Field(default=10.0, ge=0.1, le=3600)
+    self_test_seconds: float = Field(default=300.0, ge=1, le=86_400)
+    #: A queued job whose notice is older than this may be notified again.
+    notify_seconds: float = Field(default=10.0, ge=0.1, le=3600)
     #: What the processes of one grading may take together, where a worker has control groups; more where the
     #: assignment allows them more.
     slot_memory_mb: int = Field(default=1536, ge=256, le=1_000_000)

@@ -1,7 +1,7 @@
 """The tree of errors; each carries one sentence that a user can act on.
 
 RobomarkError
-├── UsageError          the caller's mistake: a wrong flag, a missing file, an unreadable hand-in (exit status 2)
+├── UsageError          the caller's mistake: a wrong flag, a missing file, an unreadable submission (exit status 2)
 │   └── AssignmentError the instructor's mistake: an assignment that cannot be used
 ├── HostError           ours: a machine, a process or a service that failed (exit status 3)
 └── Cancelled           somebody asked the grading to stop

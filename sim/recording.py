@@ -207,5 +207,5 @@ class Recording:
     pen: tuple[tuple[int, bool], ...] = ()  # (tick, down) whenever the pen changes
     responder_output: str = ""
     responder_log: str = ""  # what the responder wrote to logger.txt
-    walls: str = "process limits only"
+    sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())

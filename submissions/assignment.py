@@ -1,6 +1,6 @@
 """An assignment: the world, the scenarios, what is marked and by how much; and the trials it asks for.
 
-Plain data. Reading one from its folder, with every mistake named by file and line, is ``assignment_file.py``.
+Json data. Reading one from its folder, with every mistake named by file and line, is ``assignment_file.py``.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """The hand-in trains a model: on the pictures of ``scenarios``, to name those of all others.
+    """The submission trains a model: on the pictures of ``scenarios``, to name those of all others.
 
     ``function`` is the student's ``train(images, labels)``; ``image`` says what of a picture it is given.
     """

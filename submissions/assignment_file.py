@@ -64,7 +64,7 @@ def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
 
 
 def find_in_catalogue(name: str) -> Assignment:
-    """The assignment of the catalogue with this id, which a hand-in names; never a folder, which it could bring along.
+    """The assignment of the catalogue with this id, which a submission names; never a folder that it could bring.
 
     Raises UsageError if there is none.
     """

@@ -1,4 +1,4 @@
-"""From what a student handed in (a .py file, a notebook, a folder, a .zip) to one ``Submission``, and to bytes kept.
+"""From what a student submitted (a .py file, a notebook, a folder, a .zip) to one ``Submission``, and to bytes kept.
 
 Reading files safely is ``raw_files.py``; what a submission is marked against is the assignment's business.
 """
@@ -49,13 +49,13 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 
 
 def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
-    """What one student handed in at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
+    """What one student submitted at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
     ``student`` says whose it is, else the name of the file or folder; what its own submission.toml says is noted.
     With ``asked`` a lone .py is the part that the assignment asks for, and a missing part is refused;
     without it what a lone .py is follows from its name or its text.
 
-    Raises UsageError, one sentence, for whatever cannot be read as a hand-in.
+    Raises UsageError, one sentence, for whatever cannot be read as a submission.
     """
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
     where = shown(path.name)
@@ -100,11 +100,11 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     wanted = [part for part, who in givers.items() if who == "student"]
-    handed_in = [part for part, source in parts.items() if source is not None]
-    if len(wanted) == 1 and len(handed_in) == 1 and wanted != handed_in:
-        lone = parts[handed_in[0]]
+    submitted = [part for part, source in parts.items() if source is not None]
+    if len(wanted) == 1 and len(submitted) == 1 and wanted != submitted:
+        lone = parts[submitted[0]]
         if lone is not None and lone.name.lower() not in _NAMES:
-            parts = {handed_in[0]: None, wanted[0]: lone}
+            parts = {submitted[0]: None, wanted[0]: lone}
             notes = [note for note in notes if not note.startswith(f"{shown(lone.name)} was taken for")]
             notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
     missing = [part for part in wanted if parts.get(part) is None]
@@ -148,7 +148,7 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
 
 
 def pack_submission(submission: Submission) -> bytes:
-    """A zip archive, the same byte for byte for the same submission; it can be handed in again as it is.
+    """A zip archive, the same byte for byte for the same submission; it can be submitted again as it is.
 
     The parts are called robot.py and responder.py; submission.toml keeps who, what for, the notes, and what
     the parts were called.
@@ -179,8 +179,8 @@ def pack_submission(submission: Submission) -> bytes:
 
 def unpack_submission(data: bytes) -> Submission:
     """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
-    files = unzip(data, "the kept hand-in").files
-    meta = _read_meta(files.pop(_META, b""), "the kept hand-in")
+    files = unzip(data, "the kept submission").files
+    meta = _read_meta(files.pop(_META, b""), "the kept submission")
     sources: dict[Part, Source | None] = {}
     for part, canonical in _CANONICAL.items():
         name = meta.get(part)

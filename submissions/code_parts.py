@@ -1,4 +1,4 @@
-"""What has to fit together in criteria about code: files that are there, parts that are handed in, runs to judge.
+"""What has to fit together in criteria about code: files that are there, parts that are submitted, runs to judge.
 
 What a single criterion may hold is its schema's.
 """

@@ -1,6 +1,6 @@
-"""The example hand-ins beside an assignment, and what each is expected to get: ``examples/`` and ``expected.toml``.
+"""The example submissions beside an assignment, and what each is expected to get: ``examples/`` and ``expected.toml``.
 
-They are hand-ins like any other: nothing here reads or grades them.
+They are submissions like any other: nothing here reads or grades them.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Expected(_Table):
 
 
 def examples(assignment: str) -> Path:
-    """The folder with the example hand-ins of an assignment. Raises UsageError if there are none."""
+    """The folder with the example submissions of an assignment. Raises UsageError if there are none."""
     folder = assignment_folder(assignment) / EXAMPLES
     if not folder.is_dir():
         raise UsageError(f"There are no examples for {assignment!r}, expected the folder {folder}.")

@@ -1,4 +1,4 @@
-"""Jupyter notebooks as hand-ins: the code cells of an .ipynb, or of the .py file that nbconvert makes of one.
+"""Jupyter notebooks as submissions: the code cells of an .ipynb, or of the .py file that nbconvert makes of one.
 
 Only read here, never run; which cell is marked is decided in ``marked_cell.py``.
 """

@@ -1,4 +1,4 @@
-"""The files of a hand-in, from a folder or a zip archive, by flat name: nothing trusted, everything capped.
+"""The files of a submission, from a folder or a zip archive, by flat name: nothing trusted, everything capped.
 
 What the files mean is decided in ``bundle.py``; nothing here is unpacked to disk, followed or run.
 """
@@ -28,7 +28,7 @@ MAX_FILES = 256
 _MAX_NAME_BYTES = 200
 _CHUNK = 64 * 1024
 
-#: Leftovers of tools and systems; they are no part of a hand-in, in whatever folder they lie.
+#: Leftovers of tools and systems; they are no part of a submission, in whatever folder they lie.
 _IGNORED_NAMES = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini", "Icon\r"}
 _EXPECTED_FLAT = "expected robot.py, responder.py and the files they use side by side"
 
@@ -60,7 +60,7 @@ class RawFiles:
 
 @dataclass(slots=True)
 class _Budget:
-    """What is left of the caps while a hand-in is read."""
+    """What is left of the caps while a submission is read."""
 
     where: str
     total: int = 0
@@ -108,7 +108,7 @@ def read_single_file(path: Path) -> bytes:
 def read_folder(path: Path) -> RawFiles:
     """The files that lie in a folder, or in the only folder in it. Links and devices are never opened.
 
-    Raises UsageError for nested folders, and for more or larger files than a hand-in may have.
+    Raises UsageError for nested folders, and for more or larger files than a submission may have.
     """
     where = shown(path.name)
     notes: list[str] = []

@@ -1,6 +1,6 @@
-"""What one student handed in, after reading: sources, model files, and where they came from.
+"""What one student submitted, after reading: sources, model files, and where they came from.
 
-Plain data; reading archives and folders is ``bundle.py``, deciding what to do with it is the service's.
+Json data; reading archives and folders is ``bundle.py``, deciding what to do with it is the service's.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A Python file of the student's: the name it was handed in under, and its text."""
+    """A Python file of the student's: the name it was submitted under, and its text."""
 
     name: str
     text: str
@@ -30,7 +30,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Notebook:
-    """A notebook of the student's: the name it was handed in under, and its code cells from the top."""
+    """A notebook of the student's: the name it was submitted under, and its code cells from the top."""
 
     name: str
     cells: tuple[Cell, ...]
@@ -38,19 +38,19 @@ class Notebook:
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """One hand-in. ``files`` are what lies beside the sources, by flat name; a notebook stands for both sources."""
+    """One submission. ``files`` are what lies beside the sources, by flat name; a notebook stands for both sources."""
 
     student: str
     program: Source | None = None
     responder: Source | None = None
     files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))
-    assignment: str | None = None  # named by the hand-in's submission.toml or its parent folder
+    assignment: str | None = None  # named by the submission's submission.toml or its parent folder
     notes: tuple[str, ...] = ()  # what was ignored, stepped into or renamed while reading
     notebook: Notebook | None = None
 
     @property
     def sha256(self) -> str:
-        """Hash of what was handed in, whoever handed it in and however it was packed."""
+        """Hash of what was submitted, whoever submitted it and however it was packed."""
         digest = hashlib.sha256()
         for piece in self.hashed():
             digest.update(piece)

@@ -1,6 +1,6 @@
-"""Runs attacks inside a child, against canaries made for each: files, a process and servers that nobody needs.
+"""Runs attacks inside a child, against self_test made for each: files, a process and servers that nobody needs.
 
-What an attack says of itself is one half of the evidence; the canaries, looked at afterwards from outside, the other.
+What an attack says of itself is one half of the evidence; the self_test, looked at afterwards from outside, the other.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from filter_machine import listed
 from responders import wire
 from responders.sandbox import manager
 from responders.sandbox.inside import lockdown
-from responders.sandbox.manager import NONE, Role, Sandboxes, Walls
+from responders.sandbox.manager import NONE, Isolation, Role, Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from sim.recording import Verdict
@@ -55,14 +55,14 @@ GETS_THROUGH = {
     tools.NOWHERE: frozenset(),
 }
 SETTINGS = {
-    "full": Walls(bubblewrap=False),
-    "full-1": Walls(landlock=1, bubblewrap=False),
-    "bubblewrap": Walls(),
+    "full": Isolation(bubblewrap=False),
+    "full-1": Isolation(landlock=1, bubblewrap=False),
+    "bubblewrap": Isolation(),
     "none": NONE,
-    "landlock": Walls(seccomp=False, doorkeeper=False, bubblewrap=False),
-    "landlock-1": Walls(landlock=1, seccomp=False, doorkeeper=False, bubblewrap=False),
-    "seccomp": Walls(landlock=0, doorkeeper=False, bubblewrap=False),
-    "no-doorkeeper": Walls(doorkeeper=False, bubblewrap=False),
+    "landlock": Isolation(seccomp=False, doorkeeper=False, bubblewrap=False),
+    "landlock-1": Isolation(landlock=1, seccomp=False, doorkeeper=False, bubblewrap=False),
+    "seccomp": Isolation(landlock=0, doorkeeper=False, bubblewrap=False),
+    "no-doorkeeper": Isolation(doorkeeper=False, bubblewrap=False),
 }
 #: An interpreter that every user can read, where the machine has one.
 SYSTEM_PYTHON = "/usr/bin/python3.11"
@@ -347,7 +347,7 @@ def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str
 
 
 @contextlib.contextmanager
-def canaries(home: Path, victim: Victim) -> Iterator[Canaries]:
+def self_test(home: Path, victim: Victim) -> Iterator[Canaries]:
     made = Canaries(home, victim)
     try:
         yield made
@@ -356,7 +356,7 @@ def canaries(home: Path, victim: Victim) -> Iterator[Canaries]:
 
 
 def _without_powers() -> None:
-    """As weak as the child, so that only the walls keep the one from the other."""
+    """As weak as the child, so that only the sandbox keeps the one from the other."""
     lockdown.forbid_new_privileges()
     lockdown.drop_capabilities()
 

@@ -1,4 +1,4 @@
-"""What tests of the store and the queue start from: a database of their own, hand-ins, and what makes grades alike."""
+"""What tests of the store and the queue start from: a database of their own, submissions, grades made alike."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from service.grading.grade import Grade
 from service.settings import Settings
 from service.store import recordings
 from service.store.engine import Store, open_store
-from service.store.intake import Accepted, HandIn, accept
+from service.store.intake import Accepted, GradingRequest, accept
 from service.store.models import Lane
 from sim.recording import Recording
 from submissions.assignment import Assignment
@@ -24,7 +24,7 @@ PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
 def settings_in(folder: Path, **changes: Any) -> Settings:
     """Settings with their home in ``folder``, and waits short enough for a test."""
-    values = {"home": folder, "lease_seconds": 5.0, "backoff_seconds": 0.2, "nudge_seconds": 1.0, "concurrency": 2}
+    values = {"home": folder, "lease_seconds": 5.0, "backoff_seconds": 0.2, "notify_seconds": 1.0, "concurrency": 2}
     return Settings(**(values | changes))
 
 
@@ -38,15 +38,17 @@ def echo() -> Assignment:
     return find_assignment("echo-responder")
 
 
-def hand_in(student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None) -> HandIn:
-    """A small hand-in for the echo assignment."""
+def grading_request(
+    student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None
+) -> GradingRequest:
+    """A small submission for the echo assignment."""
     responder = Source("responder.py", "def responder(msg):\n    return msg\n")
     submission = Submission(student, Source("robot.py", program), responder)
-    return HandIn(submission, assignment or echo(), f"{student}.zip")
+    return GradingRequest(submission, assignment or echo(), f"{student}.zip")
 
 
 def accept_one(store: Store, student: str = "ada", *, lane: Lane = Lane.INTERACTIVE, max_attempts: int = 3) -> Accepted:
-    return accept(store, hand_in(student), lane=lane, max_attempts=max_attempts)
+    return accept(store, grading_request(student), lane=lane, max_attempts=max_attempts)
 
 
 def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:

@@ -1,4 +1,4 @@
-"""What every test may use: one warm rig and one home a test process."""
+"""What every test may use: one warm runner and one home a test process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, settings
 
 from builders import settings_in
 from databases import fresh_database, postgresql_server
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from service.store.engine import Store, open_store
 
@@ -28,8 +28,8 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def rig() -> Iterator[Rig]:
-    with Rig() as warm:
+def runner() -> Iterator[TrialRunner]:
+    with TrialRunner() as warm:
         yield warm
 
 

@@ -22,8 +22,8 @@ from service.grading.grade import (
     Evidence,
     Grade,
     Level,
+    Prediction,
     Shown,
-    Sight,
     TrialResult,
 )
 from sim.backgrounds import floor
@@ -134,13 +134,13 @@ def line_follower_grade(count: int = 300, **changes: object) -> Grade:
 def shape_grade(wrong: int = 4, **changes: object) -> Grade:
     """Six trials, one a shape; the shape at index ``wrong`` is answered as a diamond."""
     trials = tuple(_shape_trial(index, wrong) for index in range(6))
-    sights = tuple(
-        Sight(trial.recording.images[0], SHAPES[index], "diamond" if index == wrong else SHAPES[index],
+    predictions = tuple(
+        Prediction(trial.recording.images[0], SHAPES[index], "diamond" if index == wrong else SHAPES[index],
               trial.scenario, index)
         for index, trial in enumerate(trials)
     )  # fmt: skip
-    confusion = tuple((sight.truth, sight.answer, 1) for sight in sights)
-    right = sum(sight.truth == sight.answer for sight in sights)
+    confusion = tuple((prediction.truth, prediction.answer, 1) for prediction in predictions)
+    right = sum(prediction.truth == prediction.answer for prediction in predictions)
     accuracy = Accuracy(right / 6, 0.4365, 0.9699, 6, SHAPES, confusion)
     return _grade(
         assignment="shape-recognition",
@@ -151,7 +151,7 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
                 "names-the-right-shape", "Names the right shape", Decimal(right), Decimal(6),
                 f"{right} of 6 pictures were named rightly; the {SHAPES[wrong]} was taken for a diamond.",
                 evidence=tuple(Evidence(index, index != wrong, "") for index in range(6)),
-                accuracy=accuracy, sights=sights,
+                accuracy=accuracy, predictions=predictions,
             ),
             CriterionResult(
                 "asks-aloud", "Asks “Is that a …” aloud", Decimal(2), Decimal(2), "It asked every time.",
@@ -259,11 +259,11 @@ def hostile_grade() -> Grade:
     )
     trials = (replace(grade.trials[0], recording=poisoned), *grade.trials[1:])
     criteria = tuple(replace(result, title=HOSTILE, message=HOSTILE) for result in grade.criteria)
-    sights = tuple(replace(sight, answer=HOSTILE) for sight in grade.criteria[0].sights)
+    predictions = tuple(replace(prediction, answer=HOSTILE) for prediction in grade.criteria[0].predictions)
     accuracy = grade.accuracy
     assert accuracy is not None
     confusion = tuple((truth, HOSTILE, count) for truth, _, count in accuracy.confusion)
-    first = replace(criteria[0], sights=sights, accuracy=replace(accuracy, confusion=confusion))
+    first = replace(criteria[0], predictions=predictions, accuracy=replace(accuracy, confusion=confusion))
     return replace(
         grade, student=HOSTILE, assignment_title=HOSTILE, notes=(HOSTILE,), trials=trials,
         criteria=(first, *criteria[1:]),
@@ -344,7 +344,7 @@ def _grade(**fields: object) -> Grade:
         "assignment_version": _hash("assignment"),
         "submission": _hash("submission"),
         "student": "s1234567",
-        "walls": "process limits only",
+        "sandbox": "process limits only",
         "grader_version": "0.1.0",
     }
     return Grade(**{**defaults, **fields})  # type: ignore[arg-type]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from responders.bridge import Preamble, ProgramOrder, TrialOrder
+from responders.bridge import Preamble, ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderOrder
+from responders.conversation import Code, ResponderSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.backgrounds import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
 from sim.recording import Pose, Recording
@@ -21,7 +21,7 @@ RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
 
 
 def run_program(
-    rig: Rig,
+    runner: TrialRunner,
     program: str,
     start: Pose | None = None,
     *,
@@ -41,11 +41,11 @@ def run_program(
 ) -> Recording:
     """One trial; the start is the background's own unless given."""
     ground = floor(background)
-    order = TrialOrder(
-        program=ProgramOrder(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
+    spec = TrialSpec(
+        program=ProgramSpec(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
         responder=None
         if responder is None
-        else ResponderOrder(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
+        else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
         collaborative=responder is not None,
         floor=ground,
         robot=robot(robot_name),
@@ -57,4 +57,4 @@ def run_program(
         child_seed=seed,
         physics=physics,
     )
-    return rig.run(order, obstacles, meter)
+    return runner.run(spec, obstacles, meter)

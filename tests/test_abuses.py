@@ -12,7 +12,7 @@ import running
 from responders.sandbox import running_child
 from responders.sandbox.running_child import ChildLimits
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Verdict
 
 HONEST_PROGRAM = 'from time import sleep\nprint("PY::hello")\nsleep(0.5)\ntank_drive.on_for_seconds(20, 20, 1)\n'
@@ -162,7 +162,7 @@ ABUSES = [
         + 'line._write(b\'\'); os.write(3, b\'{"do":"print","text":"x"}\\n\'); import time; time.sleep(1)',
         a_number_of_the_past=_FIND_WIRE + "print('x'); line._sent -= 1; print('x')",
         a_number_of_the_future=_FIND_WIRE + "line._sent += 1; print('x')",
-        walls_of_its_own=_frame('{"do":"walls","landlock":99,"seccomp":true,"own_user":true,"missing":null}'),
+        sandbox_of_its_own=_frame('{"do":"sandbox","landlock":99,"seccomp":true,"own_user":true,"missing":null}'),
         a_responders_frame=_frame('{"do":"answer","kind":"text","text":"JSON::1"}'),
         the_same_key_twice=_frame('{"do":"print","text":"a","text":"b"}'),
         not_a_number=_frame('{"do":"motor","port":"outB","speed_sp":NaN}'),
@@ -188,9 +188,9 @@ ABUSES = [
 
 
 @pytest.fixture(scope="module")
-def abused() -> Iterator[Rig]:
-    with Rig() as rig:
-        yield rig
+def abused() -> Iterator[TrialRunner]:
+    with TrialRunner() as runner:
+        yield runner
 
 
 @pytest.fixture(autouse=True)
@@ -201,12 +201,12 @@ def _small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running_child, "_STALLED_SECONDS", 1.0)
 
 
-def _honest(rig: Rig) -> Recording:
-    return run_program(rig, HONEST_PROGRAM, responder=HONEST_RESPONDER)
+def _honest(runner: TrialRunner) -> Recording:
+    return run_program(runner, HONEST_PROGRAM, responder=HONEST_RESPONDER)
 
 
 @pytest.mark.parametrize("abuse", ABUSES, ids=lambda abuse: f"{abuse.role}: {abuse.name}")
-def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: Rig) -> None:
+def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: TrialRunner) -> None:
     before = _honest(abused)
     program = abuse.text if abuse.role == "program" else HONEST_PROGRAM
     responder = abuse.text if abuse.role == "responder" else HONEST_RESPONDER
@@ -218,7 +218,7 @@ def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: Rig) 
     assert [message.text for message in after.messages] == ["PY::hello", "PY::HELLO"]
 
 
-def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: Rig) -> None:
+def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: TrialRunner) -> None:
     forged = _forged('{"do":"answer","kind":"text","text":"JSON::1"}')
     responder = f"{_FIND_WIRE}def responder(text):\n    {forged}\n    return text\n"
     recording = run_program(abused, 'print("PY::one")\nprint("PY::two")', responder=responder)
@@ -237,7 +237,9 @@ def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: Rig) -> None
     ],
     ids=lambda value: value[:20],
 )
-def test_frames_without_end_are_paid_for(frame: str, role: str, abused: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_without_end_are_paid_for(
+    frame: str, role: str, abused: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Written thousands at a time they cost the child nothing, and the worker much; none of them grows it."""
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
     flood = f"""{_FIND_WIRE}
@@ -256,7 +258,7 @@ def flood():
     assert sum(len(call.argument) for call in recording.calls) <= 10_000 * 200
 
 
-def test_answers_count_as_output(abused: Rig) -> None:
+def test_answers_count_as_output(abused: TrialRunner) -> None:
     program = "for _ in range(100): print('PY::x')"
     recording = run_program(abused, program, responder="def responder(text): return 'x' * 5000", output_bytes=100_000)
     assert recording.verdict is Verdict.OUTPUT_LIMIT

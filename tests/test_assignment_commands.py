@@ -9,16 +9,16 @@ import pytest
 
 from command import robomark
 from service.grading.example_check import Figure, check_examples
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment_file import AssignmentProblems, catalogue, find_assignment, read_assignment
 from submissions.assignment_folder import export_for_students, export_whole, write_new
 from submissions.example_folder import OriginalFigure, expected
 
 
-def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, rig: Rig) -> None:
+def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, runner: TrialRunner) -> None:
     write_new(tmp_path / "my-task")
-    checked = check_examples(str(tmp_path / "my-task"), rig=rig)
+    checked = check_examples(str(tmp_path / "my-task"), runner=runner)
     assert checked.assignment.id == "my-task"
     assert [(example.name, example.problems) for example in checked.examples] == [
         ("reference", ()),
@@ -27,11 +27,11 @@ def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path
     assert checked.examples[0].marks == checked.assignment.max_marks
 
 
-def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, rig: Rig) -> None:
+def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: TrialRunner) -> None:
     write_new(tmp_path / "my-echo", "echo-responder")
     mine, theirs = read_assignment(tmp_path / "my-echo"), find_assignment("echo-responder")
     assert (mine.id, mine.criteria) == ("my-echo", theirs.criteria)
-    assert check_examples(str(tmp_path / "my-echo"), rig=rig).problems == ()
+    assert check_examples(str(tmp_path / "my-echo"), runner=runner).problems == ()
 
 
 @pytest.mark.parametrize(
@@ -53,10 +53,10 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, rig: Rig) -
         ),
     ],
 )
-def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Path, rig: Rig) -> None:
+def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Path, runner: TrialRunner) -> None:
     write_new(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(change)
-    assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), rig=rig).problems)
+    assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), runner=runner).problems)
 
 
 @pytest.mark.parametrize("text", ["[reference", '[reference]\nmark = "6"\n', '[reference]\nmarks = "many"\n'])
@@ -80,10 +80,10 @@ def test_all_mistakes_in_expectations_are_named_with_their_lines(tmp_path: Path)
         assert problem.startswith(f"task/expected.toml:{begin}")
 
 
-def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, rig: Rig) -> None:
+def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runner: TrialRunner) -> None:
     write_new(tmp_path / "task")
     (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("tank_drvie.off()\n")
-    problems = check_examples(str(tmp_path / "task"), rig=rig).problems
+    problems = check_examples(str(tmp_path / "task"), runner=runner).problems
     assert any("NameError: name 'tank_drvie' is not defined (line 1)" in problem for problem in problems)
 
 

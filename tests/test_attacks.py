@@ -1,4 +1,4 @@
-"""What students may try against the walls: each attack is stopped, and would get through if its wall were not there.
+"""What students may try against the sandbox: each attack is stopped, and would get through if its layer were not there.
 
 What the attacks are is in ``attacks/``; this says what must come of them.
 """
@@ -23,19 +23,19 @@ from battery import (
     Attack,
     Victim,
     attacks,
-    canaries,
     memories,
     readable_tree,
     remembered,
     run,
+    self_test,
     unread,
 )
 from responders.sandbox import manager, private_folders
-from responders.sandbox.manager import Role, Sandboxes, Walls
+from responders.sandbox.manager import Isolation, Role, Sandboxes
 
 ATTACKS = attacks()
 MEMORIES = memories()
-WALLED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
+ENCLOSED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
 
 #: The machine's name is one that bubblewrap makes up.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
@@ -55,8 +55,8 @@ REMAINS_INSIDE_BUBBLEWRAP = frozenset(
 @pytest.fixture(scope="module")
 def sandboxes() -> Iterator[dict[str, Sandboxes]]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROBOMARK_CANARY", SECRET)
-        made = {name: Sandboxes(walls) for name, walls in SETTINGS.items()}
+        patch.setenv("ROBOMARK_SELF_TEST", SECRET)
+        made = {name: Sandboxes(sandbox) for name, sandbox in SETTINGS.items()}
         yield made
         for each in made.values():
             each.close()
@@ -83,19 +83,19 @@ def own_user() -> Iterator[Sandboxes]:
     """As root, with an interpreter that others can read: each child is a user who owns nothing."""
     with Sandboxes(SETTINGS["full"]) as made:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("ROBOMARK_CANARY", SECRET)
+            patch.setenv("ROBOMARK_SELF_TEST", SECRET)
             patch.setattr(sys, "executable", SYSTEM_PYTHON)
             assert "own user" in made.check()
         yield made
 
 
-@pytest.mark.parametrize(("setting", "role"), WALLED, ids=lambda value: value)
+@pytest.mark.parametrize(("setting", "role"), ENCLOSED, ids=lambda value: value)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
-def test_the_walls_hold(
+def test_the_sandbox_holds(
     attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     """With a folder to write in, which is more than a robot program gets."""
-    with canaries(tmp_path, victim) as targets:
+    with self_test(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], role, attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
         assert targets.harm() == []
@@ -108,9 +108,11 @@ def test_the_walls_hold(
         for attack in ATTACKS
     ],
 )
-def test_the_walls_hold_inside_bubblewrap(attack: Attack, wrapped: Sandboxes, tmp_path: Path, victim: Victim) -> None:
+def test_the_sandbox_holds_inside_bubblewrap(
+    attack: Attack, wrapped: Sandboxes, tmp_path: Path, victim: Victim
+) -> None:
     """Most of what remains otherwise, names of files above all, does not remain in there."""
-    with canaries(tmp_path, victim) as targets:
+    with self_test(tmp_path, victim) as targets:
         outcome = run(wrapped, "robot", attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.name in REMAINS_INSIDE_BUBBLEWRAP), outcome
         assert targets.harm() == []
@@ -119,11 +121,11 @@ def test_the_walls_hold_inside_bubblewrap(attack: Attack, wrapped: Sandboxes, tm
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
 @pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
-def test_the_walls_hold_round_a_user_of_its_own(
+def test_the_sandbox_holds_round_a_user_of_its_own(
     attack: Attack, own_user: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
     """Some of what remains otherwise does not remain for a user who may not even enter the folders."""
-    with canaries(tmp_path, victim) as targets:
+    with self_test(tmp_path, victim) as targets:
         outcome = run(own_user, "robot", attack, targets.targets())
         assert attack.stopped_by == tools.REMAINS or not outcome.startswith("LEAK"), outcome
         assert targets.harm() == []
@@ -138,13 +140,13 @@ def test_the_walls_hold_round_a_user_of_its_own(
         if setting not in ("full", "full-1") and setting in GETS_THROUGH[attack.stopped_by]
     ],
 )
-def test_without_its_wall_it_gets_through(
+def test_without_its_layer_it_gets_through(
     attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
-    with canaries(tmp_path, victim) as targets:
+    with self_test(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], "robot", attack, targets.targets())
     if not outcome.startswith("LEAK"):
-        with canaries(tmp_path, victim) as targets:
+        with self_test(tmp_path, victim) as targets:
             bare = run(sandboxes["none"], "robot", attack, targets.targets())
         if not bare.startswith("LEAK"):
             pytest.skip(f"this machine refuses it to everybody: {bare}")
@@ -160,18 +162,18 @@ def tree(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield folder
 
 
-def _remembered(attack: Attack, walls: Walls, tree: Path, role: Role = "robot") -> str:
-    with Sandboxes(walls) as sandboxes:
+def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "robot") -> str:
+    with Sandboxes(sandbox) as sandboxes:
         sandboxes.check(role)
         unread(tree)
-        assert (sandboxes.remembers() is None) == walls.doorkeeper
+        assert (sandboxes.remembers() is None) == sandbox.doorkeeper
         more = tree / ("sim/brick" if role == "robot" else "responders/kit") / "more"
         return remembered(sandboxes, role, attack, {"readable": str(more), "links": str(tree / "links")})
 
 
 @pytest.mark.parametrize(
     ("setting", "role"),
-    [WALLED[0], *(pytest.param(*each, marks=pytest.mark.long) for each in WALLED[1:])],
+    [ENCLOSED[0], *(pytest.param(*each, marks=pytest.mark.long) for each in ENCLOSED[1:])],
     ids=lambda value: value,
 )
 @pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
@@ -207,7 +209,7 @@ def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
         for setting in sorted(GETS_THROUGH[attack.stopped_by])
     ],
 )
-def test_without_its_wall_a_trial_leaves_something(attack: Attack, setting: str, tree: Path) -> None:
+def test_without_its_layer_a_trial_leaves_something(attack: Attack, setting: str, tree: Path) -> None:
     # Whatever else the machine reads and forgets may drown a bit; one clear reading shows that the way is open.
     outcomes = []
     for _ in range(5):
@@ -222,7 +224,7 @@ def test_without_its_wall_a_trial_leaves_something(attack: Attack, setting: str,
 def test_numbers_are_left_out_where_they_go_on(
     skipped: int, outcome: str, tree: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The walls stop nobody from making a few files; only that the next number is anybody's guess helps."""
+    """The sandbox stops nobody from making a few files; only that the next number is anybody's guess helps."""
     attack = next(attack for attack in MEMORIES if attack.name == "number_of_own_files")
     monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
     monkeypatch.setattr(private_folders, "_SKIPPED", skipped)

@@ -43,7 +43,7 @@ def robomark(home: Path, *arguments: str | Path, **environment: str) -> Ended:
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]:
-    """A home after a batch of two good hand-ins and a bad row; what the command said, and the reports' folder."""
+    """A home after a batch of two good submissions and a bad row; what the command said, and the reports' folder."""
     folder = tmp_path_factory.mktemp("batch") / "class"
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
@@ -63,7 +63,7 @@ def _batch_id(ended: Ended) -> str:
 def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, Path]) -> None:
     home, ended, reports = graded
     assert ended.status == 2
-    assert "1 of the hand-ins could not be taken in" in ended.err
+    assert "1 of the submissions could not be taken in" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
     assert re.search(r"^reference +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
     assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "index.html", "reference.html"]

@@ -14,11 +14,11 @@ import pytest
 from rich.console import Console
 from sqlalchemy import select, update
 
-from builders import hand_in, settings_in
+from builders import grading_request, settings_in
 from service.commands.waiting import Waiting
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.reports.written import file_stem
 from service.store import batch_control
 from service.store.engine import Store, open_store
@@ -56,7 +56,7 @@ def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Pat
     assert ended.status == 2
     for row in (
         r"line 4: eve +nowhere\.zip: does not exist",
-        r"line 5: bob +line 3: bob is already this student's hand-in",
+        r"line 5: bob +line 3: bob is already this student's submission",
         r"line 6: mia +broken\.zip: ",
         r"line 7: kim +.*no-such-thing",
         r"=1/2 🤖 +echo-responder +10 / 10",
@@ -65,14 +65,14 @@ def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Pat
     marked = re.search(r"^bob +echo-responder .* (\w{12})$", ended.out, re.MULTILINE)
     assert marked is not None, ended
     again = robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
-    assert f"already handed in as {marked[1]}" in again.out
+    assert f"already submitted as {marked[1]}" in again.out
     assert "nothing new" in again.out
     assert marked[0] in again.out
     assert len(robomark(home, "batch", "list").out.strip().splitlines()) == 2
 
 
 @pytest.mark.parametrize(("form", "suffix"), [("gradescope", ".json"), ("junit", ".xml")])
-def test_a_file_for_each_hand_in(graded: tuple[Path, Path, Ended], tmp_path: Path, form: str, suffix: str) -> None:
+def test_a_file_for_each_submission(graded: tuple[Path, Path, Ended], tmp_path: Path, form: str, suffix: str) -> None:
     home, _, ended = graded
     out = tmp_path / "out" / form
     exported = robomark(home, "batch", "export", _batch(ended), "--format", form, "--out", out)
@@ -99,12 +99,12 @@ def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path:
         (("pause", batch[:6]), 0, f"batch {batch} was paused already"),
         (("status", batch), 0, "roster.csv: paused: 2 queued"),
         (("resume", batch), 0, f"batch {batch} goes on: 2 waiting, 0 being graded"),
-        (("retry", batch), 0, f"batch {batch}: nothing changed, no hand-in is dead"),
+        (("retry", batch), 0, f"batch {batch}: nothing changed, no submission is dead"),
         (("retry", "--all"), 0, "all batches: nothing changed"),
         (("cancel", batch), 0, f"batch {batch} is cancelled: 2 not begun, 0 stopped"),
         (("cancel", batch), 0, "nothing changed"),
         (("list",), 0, "cancelled: 2 cancelled"),
-        (("resume", batch), 2, "was cancelled; hand it in again"),
+        (("resume", batch), 2, "was cancelled; submit it again"),
         (("retry",), 2, "name one batch, or --all"),
         (("pause", "nosuchbatch"), 2, "there is no batch"),
     ]:
@@ -115,29 +115,31 @@ def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path:
 def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
     settings = settings_in(tmp_path, concurrency=1)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
-        nudger = Nudger(make_celery(services.settings), store, services.settings)
+        notifier = Notifier(make_celery(services.settings), store, services.settings)
 
         def grade(batch: str, count: int) -> None:
-            nudger.grade(Lane.BATCH, count)
-            Waiting(store, nudger, batch, Console(quiet=True), services.ensure).for_marks()
+            notifier.grade(Lane.BATCH, count)
+            Waiting(store, notifier, batch, Console(quiet=True), services.ensure).for_marks()
 
-        paused = accept_batch(store, "paused", [hand_in("ada")], [], max_attempts=2).id
+        paused = accept_batch(store, "paused", [grading_request("ada")], [], max_attempts=2).id
         batch_control.pause(store, paused)
-        other = accept_batch(store, "other", [hand_in("bob")], [], max_attempts=2).id
+        other = accept_batch(store, "other", [grading_request("bob")], [], max_attempts=2).id
         grade(other, 2)
         assert _states(store, paused) == [JobState.QUEUED]
         batch_control.resume(store, paused)
         grade(paused, 0)
         assert _states(store, paused) == [JobState.DONE]
 
-        spinning = accept_batch(store, "spinning", [hand_in(name, SPIN) for name in "xyz"], [], max_attempts=2).id
-        nudger.grade(Lane.BATCH, 3)
+        spinning = accept_batch(
+            store, "spinning", [grading_request(name, SPIN) for name in "xyz"], [], max_attempts=2
+        ).id
+        notifier.grade(Lane.BATCH, 3)
         until = time.monotonic() + 60
         while JobState.RUNNING not in _states(store, spinning):
             assert time.monotonic() < until
             time.sleep(0.05)
         assert batch_control.cancel(store, spinning) == batch_control.Controlled(True, 2, 1)
-        after = accept_batch(store, "after", [hand_in("eve")], [], max_attempts=2).id
+        after = accept_batch(store, "after", [grading_request("eve")], [], max_attempts=2).id
         grade(after, 1)
         assert _states(store, spinning) == [JobState.CANCELLED] * 3
 
@@ -191,6 +193,6 @@ def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:
     assert re.search(r"^all others +2026-11-30 23:59 +1 +2", set_.out, re.MULTILINE)
     assert robomark(tmp_path, "course", "policy").out == set_.out
     extended = robomark(tmp_path, "course", "extend", "ada", "-a", "json-queue", "--due", "2026-12-02T12:00")
-    assert extended.out == "ada: json-queue may be handed in until 2026-12-02 12:00\n"
+    assert extended.out == "ada: json-queue may be submitted until 2026-12-02 12:00\n"
     for words in (("policy", "--due", "soon"), ("extend", "ada"), ("policy", "--attempts", "0")):
         assert robomark(tmp_path, "course", *words).status == 2

@@ -16,7 +16,7 @@ RESPONDER = "def responder(msg):\n    return msg\n"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A roster's folder with good hand-ins a, b and sub/c, a broken zip, and one outside it."""
+    """A roster's folder with good submissions a, b and sub/c, a broken zip, and one outside it."""
     own = tmp_path / "class"
     for name in ("class/a", "class/b", "class/sub/c", "outside"):
         (tmp_path / name).mkdir(parents=True)
@@ -60,7 +60,10 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
         "ada,b,json-queue",
     ]
     checked = preflight(_roster(folder, "\n".join(rows)), None)
-    taken = [(hand_in.submission.student, hand_in.assignment.id) for hand_in in checked.hand_ins]
+    taken = [
+        (grading_request.submission.student, grading_request.assignment.id)
+        for grading_request in checked.grading_requests
+    ]
     assert taken == [
         ("ada", "echo-responder"),
         ("Zoë 👩‍🚀", "json-queue"),
@@ -70,7 +73,7 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
     ]
     expected = {
         3: "does not exist",
-        4: "already this student's hand-in",
+        4: "already this student's submission",
         5: "broken.zip",
         6: "no-such-thing",
         10: "names no student",
@@ -102,18 +105,18 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
 )
 def test_rosters_of_many_makes_say_the_same(folder: Path, text: str | bytes) -> None:
     checked = preflight(_roster(folder, text), "echo-responder")
-    assert [(row.submission.student, row.source) for row in checked.hand_ins] == [("ada", "a")]
+    assert [(row.submission.student, row.source) for row in checked.grading_requests] == [("ada", "a")]
 
 
 def test_a_row_with_an_assignment_of_its_own_keeps_it(folder: Path) -> None:
     checked = preflight(_roster(folder, "student,file,assignment\nada,a,json-queue\nbob,b,\n"), "echo-responder")
-    assert [row.assignment.id for row in checked.hand_ins] == ["json-queue", "echo-responder"]
+    assert [row.assignment.id for row in checked.grading_requests] == ["json-queue", "echo-responder"]
 
 
 def test_an_open_quotation_mark_costs_one_row(folder: Path) -> None:
     text = 'student,file\nada,a\n"bob,b\neve,b\nmia,"d, e.zip"\n'
     checked = preflight(_roster(folder, text), "echo-responder")
-    assert [row.submission.student for row in checked.hand_ins] == ["ada", "eve", "mia"]
+    assert [row.submission.student for row in checked.grading_requests] == ["ada", "eve", "mia"]
     assert [name for name, _ in checked.problems] == ["line 3"]
 
 

@@ -17,10 +17,10 @@ import pytest
 from builders import echo
 from responders.sandbox import traces
 from responders.sandbox.inside import grants
-from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.manager import Isolation, Sandboxes
 from service.doctor import examine
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from sim.errors import HostError
 from submissions.submission import Source, Submission
@@ -118,7 +118,7 @@ def test_how_it_is_mounted_decides(option: str, said: str, tmp_path: Path) -> No
 def test_this_machine_forgets(tmp_path: Path) -> None:
     listed = Path(grants.listable([])[0])
     os.utime(listed, (0, listed.stat().st_mtime))
-    with Sandboxes(Walls(bubblewrap=False)) as sandboxes:
+    with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
         assert sandboxes.remembers() is None
     assert listed.stat().st_atime > listed.stat().st_ctime
     found = {finding.what: finding for finding in examine(Settings(home=tmp_path))}
@@ -128,27 +128,27 @@ def test_this_machine_forgets(tmp_path: Path) -> None:
     )
 
 
-def test_without_a_doorkeeper_the_walls_stand_and_the_reason_is_told() -> None:
-    with Sandboxes(Walls(doorkeeper=False, bubblewrap=False)) as sandboxes:
+def test_without_a_doorkeeper_the_sandbox_stands_and_the_reason_is_told() -> None:
+    with Sandboxes(Isolation(doorkeeper=False, bubblewrap=False)) as sandboxes:
         assert "doorkeeper" not in sandboxes.check()
         assert "not asked for" in str(sandboxes.remembers())
     ran = subprocess.run([sys.executable, "-c", _NOBODY_ANSWERS + _CHECK], capture_output=True, text=True, check=True)
-    walls, reason = ran.stdout.splitlines()
-    assert "seccomp" in walls
-    assert "doorkeeper" not in walls
+    sandbox, reason = ran.stdout.splitlines()
+    assert "seccomp" in sandbox
+    assert "doorkeeper" not in sandbox
     assert "Device or resource busy" in reason
 
 
 def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
     hidden = replace(echo(), scenarios=tuple(replace(each, visibility="hidden") for each in echo().scenarios))
-    with Rig(Walls(doorkeeper=False)) as rig:
-        assert grade(_SUBMISSION, echo(), rig=rig).trials
+    with TrialRunner(Isolation(doorkeeper=False)) as runner:
+        assert grade(_SUBMISSION, echo(), runner=runner).trials
         with pytest.raises(
             HostError, match=r"^a trial could leave something for the next, so nothing hidden is graded"
         ):
-            grade(_SUBMISSION, hidden, rig=rig)
-    with Rig() as rig:
-        assert grade(_SUBMISSION, hidden, rig=rig).trials
+            grade(_SUBMISSION, hidden, runner=runner)
+    with TrialRunner() as runner:
+        assert grade(_SUBMISSION, hidden, runner=runner).trials
 
 
 def test_what_is_read_is_read_again_after_half_a_day(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,7 +156,7 @@ def test_what_is_read_is_read_again_after_half_a_day(monkeypatch: pytest.MonkeyP
     clock = [time.time()]
     monkeypatch.setattr(traces, "read_beforehand", lambda *_: read.append(clock[0]))
     monkeypatch.setattr("responders.sandbox.manager.time.time", lambda: clock[0])
-    with Sandboxes(Walls(bubblewrap=False)) as sandboxes:
+    with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
         for hours in (0, 1, 10, 2, 20, -100):
             clock[0] += 3600 * hours
             assert sandboxes.remembers() is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
 
 #: An expression, and what printing it shows, for a robot at (520, 900) over Simple_Shapes unless noted.
@@ -40,9 +40,9 @@ VALUES = [
 ]
 
 
-def test_values(rig: Rig) -> None:
+def test_values(runner: TrialRunner) -> None:
     program = "".join(f"print({expression})\n" for expression, _ in VALUES)
-    recording = run_program(rig, program, Pose(520, 900, 0), background="Simple_Shapes")
+    recording = run_program(runner, program, Pose(520, 900, 0), background="Simple_Shapes")
     assert recording.faults == ()
     assert dict(zip((each for each, _ in VALUES), (line.text for line in recording.printed), strict=True)) == dict(
         VALUES
@@ -64,8 +64,8 @@ REFUSALS = [
 
 
 @pytest.mark.parametrize(("statement", "words"), REFUSALS)
-def test_a_mistake_is_named_with_the_students_own_line(rig: Rig, statement: str, words: str) -> None:
-    recording = run_program(rig, f"\n\n{statement}\n")
+def test_a_mistake_is_named_with_the_students_own_line(runner: TrialRunner, statement: str, words: str) -> None:
+    recording = run_program(runner, f"\n\n{statement}\n")
     assert recording.verdict is Verdict.PROGRAM_ERROR
     assert recording.faults[0].message.startswith(words)
     assert recording.faults[0].line == 3
@@ -88,55 +88,55 @@ TIMES = [
 
 
 @pytest.mark.parametrize(("expression", "seconds"), TIMES)
-def test_what_a_call_costs(rig: Rig, expression: str, seconds: float) -> None:
-    assert run_program(rig, expression).end_t == pytest.approx(seconds, abs=0.0101 if "True" in expression else 1e-9)
+def test_what_a_call_costs(runner: TrialRunner, expression: str, seconds: float) -> None:
+    assert run_program(runner, expression).end_t == pytest.approx(seconds, abs=0.0101 if "True" in expression else 1e-9)
 
 
 @pytest.mark.parametrize(
     ("preamble", "name", "known"),
     [("none", "say", False), ("imports", "MoveTank", True), ("imports", "say", False), ("preloaded", "say", True)],
 )
-def test_a_preamble_brings_its_names(rig: Rig, preamble: str, name: str, known: bool) -> None:
-    recording = run_program(rig, f"{name}\n", preamble=preamble)  # type: ignore[arg-type]
+def test_a_preamble_brings_its_names(runner: TrialRunner, preamble: str, name: str, known: bool) -> None:
+    recording = run_program(runner, f"{name}\n", preamble=preamble)  # type: ignore[arg-type]
     assert (recording.verdict is Verdict.FINISHED) is known
 
 
-def test_a_motor_left_on_at_the_end_moves_nothing(rig: Rig) -> None:
-    recording = run_program(rig, "tank_drive.on(50, 50)")
+def test_a_motor_left_on_at_the_end_moves_nothing(runner: TrialRunner) -> None:
+    recording = run_program(runner, "tank_drive.on(50, 50)")
     assert (recording.end, len(recording.ticks)) == (recording.start, 0)
 
 
-def test_simulated_time_begins_in_2020_and_moves_with_the_world(rig: Rig) -> None:
+def test_simulated_time_begins_in_2020_and_moves_with_the_world(runner: TrialRunner) -> None:
     program = (
         "import time, datetime\nprint(time.time())\ntime.sleep(1.5)\n"
         "print(time.time(), time.monotonic(), datetime.datetime.now())"
     )
-    first, second = (line.text for line in run_program(rig, program).printed)
+    first, second = (line.text for line in run_program(runner, program).printed)
     assert first == "1577836800.0"
     assert second == "1577836801.5 1.5 2020-01-01 00:00:01.500000"
 
 
-def test_chance_comes_from_the_seed(rig: Rig) -> None:
+def test_chance_comes_from_the_seed(runner: TrialRunner) -> None:
     program = (
         "import random, uuid, secrets, os\nprint(random.random(), uuid.uuid4(), secrets.token_hex(4), os.urandom(4))"
     )
-    said = [run_program(rig, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
+    said = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
     assert said[0] == said[1] != said[2]
 
 
-def test_nothing_leaks_from_one_run_into_the_next(rig: Rig) -> None:
-    run_program(rig, "import math, builtins\nmath.pi = 3\nbuiltins.left_over = 1\ntank_drive.on(50, 50)\ngyro.angle")
-    recording = run_program(rig, "import math\nprint(math.pi, gyro.angle, 'left_over' in dir(__builtins__))")
+def test_nothing_leaks_from_one_run_into_the_next(runner: TrialRunner) -> None:
+    run_program(runner, "import math, builtins\nmath.pi = 3\nbuiltins.left_over = 1\ntank_drive.on(50, 50)\ngyro.angle")
+    recording = run_program(runner, "import math\nprint(math.pi, gyro.angle, 'left_over' in dir(__builtins__))")
     assert recording.printed[0].text == "3.141592653589793 0 False"
 
 
-def test_the_datalog_is_read_from_what_is_printed(rig: Rig) -> None:
+def test_the_datalog_is_read_from_what_is_printed(runner: TrialRunner) -> None:
     program = (
         "print('Light_left: 42 1.5')\nprint('Gyro: 7')\nprint('Color: 3')\n"
         "print('Light_left:5')\nprint('Ultrasonic: far')\n"
         "print('image_data both')\n"
     )
-    recording = run_program(rig, program, background="Simple_Shapes")
+    recording = run_program(runner, program, background="Simple_Shapes")
     assert [(datum.name, datum.value, datum.simtime) for datum in recording.datalog] == [
         ("Light_left", 42.0, 1.5),
         ("Gyro", 7.0, None),
@@ -148,22 +148,22 @@ def test_the_datalog_is_read_from_what_is_printed(rig: Rig) -> None:
     assert recording.printed[-1].text == "both image data logged..."
 
 
-def test_touching_a_wall_and_an_obstacle_is_recorded_and_stops_nothing(rig: Rig) -> None:
+def test_touching_a_wall_and_an_obstacle_is_recorded_and_stops_nothing(runner: TrialRunner) -> None:
     recording = run_program(
-        rig, "tank_drive.on_for_seconds(100, 100, 6)", Pose(500, 600, 0), obstacles=((900, 500, 200, 200),)
+        runner, "tank_drive.on_for_seconds(100, 100, 6)", Pose(500, 600, 0), obstacles=((900, 500, 200, 200),)
     )
     assert [touch.what for touch in recording.touches] == ["obstacle 1", "right wall"]
     assert recording.end.x > 2362
 
 
-def test_what_the_start_touches_already_is_no_touch(rig: Rig) -> None:
-    recording = run_program(rig, "tank_drive.on_for_seconds(50, 50, 1)", Pose(100, 800, 0))
+def test_what_the_start_touches_already_is_no_touch(runner: TrialRunner) -> None:
+    recording = run_program(runner, "tank_drive.on_for_seconds(50, 50, 1)", Pose(100, 800, 0))
     assert recording.touches == ()
 
 
 @pytest.mark.parametrize(("amplitude", "low", "high"), [(0, 352.1, 352.1), (100, 300, 420)])
-def test_wheel_noise(rig: Rig, amplitude: float, low: float, high: float) -> None:
+def test_wheel_noise(runner: TrialRunner, amplitude: float, low: float, high: float) -> None:
     from sim.world import Noise
 
-    recording = run_program(rig, "tank_drive.on_for_seconds(50, 50, 1)", noise=Noise(motor=amplitude))
+    recording = run_program(runner, "tank_drive.on_for_seconds(50, 50, 1)", noise=Noise(motor=amplitude))
     assert low <= recording.ticks.left_position[-1] <= high

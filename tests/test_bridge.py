@@ -7,19 +7,19 @@ import pytest
 from responders.channel import Channel, Line
 from responders.sandbox.manager import NONE
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import SECOND, Verdict
 
 ECHO = "def responder(text):\n    return 'JSON::{\"heard\": \"' + text[4:] + '\"}'\n"
 LISTEN = "import time, ev3dev2_glue as glue\n"
 
 
-def test_an_answer_joins_the_queue_at_the_first_tick_after_its_delay(rig: Rig) -> None:
+def test_an_answer_joins_the_queue_at_the_first_tick_after_its_delay(runner: TrialRunner) -> None:
     program = (
         LISTEN
         + "print('PY::a')\nfor _ in range(30):\n    time.sleep(0.01)\n    print(len(glue.pyState()['messages']))\n"
     )
-    recording = run_program(rig, program, responder=ECHO)
+    recording = run_program(runner, program, responder=ECHO)
     arrived = next(line.t for line in recording.printed if line.text == "1")
     assert recording.messages[1].delivered == pytest.approx(0.1)
     assert arrived == pytest.approx(0.1)
@@ -39,39 +39,39 @@ def test_an_answer_joins_the_queue_at_the_first_tick_after_its_delay(rig: Rig) -
         ("'PY:', ':b', sep=''", True),
     ],
 )
-def test_only_a_text_that_begins_with_the_prefix_is_a_message(rig: Rig, text: str, passed_on: bool) -> None:
-    recording = run_program(rig, f"import time\nprint({text})\ntime.sleep(0.5)\n", responder=ECHO)
+def test_only_a_text_that_begins_with_the_prefix_is_a_message(runner: TrialRunner, text: str, passed_on: bool) -> None:
+    recording = run_program(runner, f"import time\nprint({text})\ntime.sleep(0.5)\n", responder=ECHO)
     assert bool(recording.messages) is passed_on
 
 
-def test_several_answers_in_one_tick_queue_up_in_order(rig: Rig) -> None:
+def test_several_answers_in_one_tick_queue_up_in_order(runner: TrialRunner) -> None:
     program = (
         LISTEN
         + "for i in range(5): print('PY::' + str(i))\ntime.sleep(1)\n"
         + "print([m['heard'] for m in glue.pyState()['messages']])"
     )
-    recording = run_program(rig, program, responder=ECHO)
+    recording = run_program(runner, program, responder=ECHO)
     assert recording.printed[-1].text == "['0', '1', '2', '3', '4']"
 
 
-def test_the_queue_keeps_what_a_program_took_from_it_and_forgets_nothing(rig: Rig) -> None:
+def test_the_queue_keeps_what_a_program_took_from_it_and_forgets_nothing(runner: TrialRunner) -> None:
     program = LISTEN + (
         "print('PY::a'); time.sleep(0.3)\nold = glue.pyState()\nold['messages'].pop()\n"
         "print(len(glue.pyState()['messages']))\nprint('PY::b'); time.sleep(0.3)\n"
         "print(len(old['messages']), len(glue.pyState()['messages']))\n"
     )
-    recording = run_program(rig, program, responder=ECHO)
+    recording = run_program(runner, program, responder=ECHO)
     assert [line.text for line in recording.printed if line.text[0].isdigit()] == ["0", "0 1"]
 
 
-def test_sleeping_in_the_responder_delays_its_answer(rig: Rig) -> None:
+def test_sleeping_in_the_responder_delays_its_answer(runner: TrialRunner) -> None:
     sleepy = "import time\n" + ECHO.replace("return", "time.sleep(0.5); return")
-    recording = run_program(rig, "import time\nprint('PY::a')\ntime.sleep(2)", responder=sleepy)
+    recording = run_program(runner, "import time\nprint('PY::a')\ntime.sleep(2)", responder=sleepy)
     assert recording.messages[1].delivered == pytest.approx(0.6, abs=0.034)
 
 
-def test_an_answer_after_the_end_is_undelivered_and_still_the_responders(rig: Rig) -> None:
-    recording = run_program(rig, "print('PY::a')", responder=ECHO)
+def test_an_answer_after_the_end_is_undelivered_and_still_the_responders(runner: TrialRunner) -> None:
+    recording = run_program(runner, "print('PY::a')", responder=ECHO)
     assert recording.messages[1].delivered is None
     assert recording.messages[1].note == "undelivered"
     assert recording.verdict is Verdict.FINISHED
@@ -90,9 +90,11 @@ def test_an_answer_after_the_end_is_undelivered_and_still_the_responders(rig: Ri
         ("bytearray(10**10)", Verdict.MEMORY_LIMIT, "more memory"),
     ],
 )
-def test_a_bad_answer_is_a_fault_and_the_robot_goes_on(rig: Rig, answer: str, verdict: Verdict, words: str) -> None:
+def test_a_bad_answer_is_a_fault_and_the_robot_goes_on(
+    runner: TrialRunner, answer: str, verdict: Verdict, words: str
+) -> None:
     recording = run_program(
-        rig,
+        runner,
         LISTEN + "print('PY::a')\ntank_drive.on_for_seconds(50, 50, 1)\nprint('still here')\n",
         responder=f"def responder(text):\n    return {answer}\n",
     )
@@ -102,9 +104,9 @@ def test_a_bad_answer_is_a_fault_and_the_robot_goes_on(rig: Rig, answer: str, ve
     assert recording.end.x > recording.start.x + 100
 
 
-def test_the_line_of_a_responders_error_is_its_own(rig: Rig) -> None:
+def test_the_line_of_a_responders_error_is_its_own(runner: TrialRunner) -> None:
     recording = run_program(
-        rig, "print('PY::a')", responder="def responder(text):\n    x = 1\n    return text.upcase()\n"
+        runner, "print('PY::a')", responder="def responder(text):\n    x = 1\n    return text.upcase()\n"
     )
     assert recording.faults[0].line == 3
     assert recording.faults[0].who == "responder"
@@ -120,24 +122,24 @@ def test_the_line_of_a_responders_error_is_its_own(rig: Rig) -> None:
         ("msg = 'mine'\ndef answer_responder(m): return msg", "mine"),
     ],
 )
-def test_which_function_is_the_responder(rig: Rig, responder: str, answer: str) -> None:
-    recording = run_program(rig, "print('PY::?')", responder=responder)
+def test_which_function_is_the_responder(runner: TrialRunner, responder: str, answer: str) -> None:
+    recording = run_program(runner, "print('PY::?')", responder=responder)
     assert recording.messages[1].text == answer
 
 
-def test_two_candidates_are_a_fault_that_names_them(rig: Rig) -> None:
-    recording = run_program(rig, "print('PY::?')", responder="def a_responder(m): ...\ndef b_responder(m): ...")
+def test_two_candidates_are_a_fault_that_names_them(runner: TrialRunner) -> None:
+    recording = run_program(runner, "print('PY::?')", responder="def a_responder(m): ...\ndef b_responder(m): ...")
     assert recording.verdict is Verdict.RESPONDER_ERROR
     assert "a_responder, b_responder" in recording.faults[0].message
 
 
-def test_names_are_looked_up_when_a_message_comes_and_the_calls_are_noted(rig: Rig) -> None:
+def test_names_are_looked_up_when_a_message_comes_and_the_calls_are_noted(runner: TrialRunner) -> None:
     responder = (
         "def first(m): return 'first ' + m\ndef second(m): return 'second ' + m\n"
         "def agent(m): return parser(m)\nparser = first\n"
         "def responder(m):\n    global parser\n    answer = agent(m)\n    parser = second\n    return answer\n"
     )
-    recording = run_program(rig, "print('PY::1')\nprint('PY::2')", responder=responder)
+    recording = run_program(runner, "print('PY::1')\nprint('PY::2')", responder=responder)
     answers = [message.text for message in recording.messages if message.sender == "responder"]
     assert answers == ["first PY::1", "second PY::2"]
     assert [(call.caller, call.callee) for call in recording.calls if call.message == 0] == [
@@ -161,9 +163,9 @@ def test_reordering_lets_later_answers_overtake() -> None:
     assert sorted(arrivals)[0] >= SECOND // 10
 
 
-def test_lost_texts_are_recorded_as_lost(rig: Rig) -> None:
+def test_lost_texts_are_recorded_as_lost(runner: TrialRunner) -> None:
     program = "import time\nfor i in range(20):\n    print('PY::' + str(i))\n    time.sleep(0.2)\n"
-    recording = run_program(rig, program, responder=ECHO, channel=Channel(loss=0.4))
+    recording = run_program(runner, program, responder=ECHO, channel=Channel(loss=0.4))
     sent = [message for message in recording.messages if message.sender == "robot"]
     lost = [message for message in recording.messages if message.note == "lost"]
     assert len(sent) == 20
@@ -171,16 +173,16 @@ def test_lost_texts_are_recorded_as_lost(rig: Rig) -> None:
     assert all(message.delivered is None for message in lost)
 
 
-def test_the_logfile_is_read_and_nothing_else(rig: Rig) -> None:
+def test_the_logfile_is_read_and_nothing_else(runner: TrialRunner) -> None:
     responder = "def responder(m):\n    open('logger.txt', 'a').write('seen ' + m + '\\n')\n    return 'ok'\n"
-    assert run_program(rig, "print('PY::1')", responder=responder).responder_log == "seen PY::1\n"
+    assert run_program(runner, "print('PY::1')", responder=responder).responder_log == "seen PY::1\n"
 
 
 @pytest.mark.parametrize("trick", ["os.symlink('/etc/passwd', 'logger.txt')", "os.mkfifo('logger.txt')"])
-def test_a_logfile_that_is_no_file_is_not_read_even_without_walls(trick: str) -> None:
-    with Rig(NONE) as unwalled:
+def test_a_logfile_that_is_no_file_is_not_read_even_without_sandbox(trick: str) -> None:
+    with TrialRunner(NONE) as unenclosed:
         recording = run_program(
-            unwalled, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n"
+            unenclosed, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n"
         )
     assert recording.faults == ()
     assert recording.responder_log == ""

@@ -1,4 +1,4 @@
-"""Hand-ins in every form they come in, and archives that were made to do harm."""
+"""Submissions in every form they come in, and archives that were made to do harm."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def refusal(path: Path, asked: Parts | None = None) -> str:
     return sentence
 
 
-def test_folder_and_zip_with_or_without_top_folder_are_the_same_hand_in(tmp_path: Path) -> None:
+def test_folder_and_zip_with_or_without_top_folder_are_the_same_submission(tmp_path: Path) -> None:
     files = {**BOTH, "net.joblib": b"\x80weights"}
     forms = [
         folder(tmp_path / "a", files),
@@ -127,8 +127,8 @@ def test_missing_part_is_named(tmp_path: Path) -> None:
 
 
 def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
-    handed_in = Submission("a", Source("robot.py", PROGRAM), Source("responder.py", RESPONDER))
-    fitted = fit_parts(handed_in, Parts("robot.py", "student"))
+    submitted = Submission("a", Source("robot.py", PROGRAM), Source("responder.py", RESPONDER))
+    fitted = fit_parts(submitted, Parts("robot.py", "student"))
     assert fitted.program is None
     assert fitted.notes == ("robot.py was left out: a robot program is not asked for.",)
 
@@ -193,7 +193,7 @@ def test_nul_and_huge_sources_are_refused(tmp_path: Path) -> None:
     assert "at most 1 MB" in sentence
 
 
-# What is not there, or is no hand-in
+# What is not there, or is no submission
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
@@ -376,7 +376,7 @@ def test_packing_is_exact_and_always_the_same(submission: Submission) -> None:
     assert again.sha256 == submission.sha256
 
 
-def test_packed_hand_in_can_be_handed_in(tmp_path: Path) -> None:
+def test_packed_submission_can_be_submitted(tmp_path: Path) -> None:
     (tmp_path / "kept.zip").write_bytes(
         pack_submission(Submission("Zoë", Source("z.py", PROGRAM), Source("responder.py", RESPONDER), assignment="x"))
     )
@@ -385,5 +385,5 @@ def test_packed_hand_in_can_be_handed_in(tmp_path: Path) -> None:
 
 
 def test_bytes_that_were_not_packed_here_are_refused() -> None:
-    with pytest.raises(UsageError, match="kept hand-in"):
+    with pytest.raises(UsageError, match="kept submission"):
         unpack_submission(b"nonsense")

@@ -1,4 +1,4 @@
-"""A service to which everything happens at once: every hand-in is graded exactly once, as on a quiet day."""
+"""A service to which everything happens at once: every submission is graded exactly once, as on a quiet day."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import pytest
 
 from builders import settings_in
 from databases import fresh_database
-from havoc import Campaign, Havoc, Tally, quiet_hashes, small_disk
+from fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
 from postgresql_server import PostgresqlServer
 from service.store.engine import open_store
 from service.store.models import JobState
 
 
-def _assert_whole(tally: Tally, hand_ins: int) -> None:
-    assert tally.states == {JobState.DONE: hand_ins}, tally.errors
+def _assert_whole(tally: Tally, grading_requests: int) -> None:
+    assert tally.states == {JobState.DONE: grading_requests}, tally.errors
     assert (tally.doubled, tally.differing) == (0, 0)
 
 
@@ -26,13 +26,13 @@ def test_on_sqlite(tmp_path: Path) -> None:
     quiet = quiet_hashes()
     assert len(set(quiet)) == len(quiet)
     with open_store(settings) as store:
-        havoc = Havoc(settings, store, None, workers=2, seed=1, disk=None)
+        injector = FaultInjector(settings, store, None, workers=2, seed=1, disk=None)
         try:
-            tally = Campaign(24, pause=(0.5, 1.5)).run(havoc, quiet)
+            tally = Campaign(24, pause=(0.5, 1.5)).run(injector, quiet)
         finally:
-            havoc.stop()
+            injector.stop()
     _assert_whole(tally, 24)
-    assert sum(tally.plagues.values()) >= 3
+    assert sum(tally.injected.values()) >= 3
 
 
 @pytest.mark.long
@@ -43,12 +43,12 @@ def test_on_postgresql(tmp_path: Path) -> None:
         try:
             settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0, database_url=fresh_database(server.url))
             with open_store(settings) as store:
-                havoc = Havoc(settings, store, server, workers=2, seed=2, disk=disk)
+                injector = FaultInjector(settings, store, server, workers=2, seed=2, disk=disk)
                 try:
-                    tally = Campaign(60, pause=(1.0, 4.0)).run(havoc, quiet_hashes())
+                    tally = Campaign(60, pause=(1.0, 4.0)).run(injector, quiet_hashes())
                 finally:
-                    havoc.stop()
+                    injector.stop()
         finally:
             server.close()
     _assert_whole(tally, 60)
-    assert sum(tally.plagues.values()) >= 5
+    assert sum(tally.injected.values()) >= 5

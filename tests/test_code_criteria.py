@@ -1,4 +1,4 @@
-"""Criteria about code: texts read and functions called inside the walls, and checks of the instructor's in Python."""
+"""Criteria about code: texts read and functions called inside the sandbox, and checks of the instructor's in Python."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from responders.conversation import Code
 from responders.function_calls import FunctionCall, call_functions
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from service.grading.findings import HandedIn, look_at
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.outcome import Outcome
 from service.grading.judging.source_rules import SourceAnswers, judge_source
-from service.grading.rig import Rig
+from service.grading.static_analysis import SubmittedParts, analyse
+from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError
 from sim.recording import Verdict
 from submissions.assignment import Assignment, Limits, Parts, WorldSpec
@@ -38,19 +38,19 @@ def without_robot(*criteria: Criterion) -> Assignment:
     return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), criteria)
 
 
-def answers(text: str, rig: Rig, **rules: Any) -> SourceAnswers:
+def answers(text: str, runner: TrialRunner, **rules: Any) -> SourceAnswers:
     asked = without_robot(criterion("source", **rules))
-    return look_at(HandedIn(program=Source("robot.py", text)), asked, (), rig, JobMeter()).answers["c"]
+    return analyse(SubmittedParts(program=Source("robot.py", text)), asked, (), runner, JobMeter()).answers["c"]
 
 
-def judged(text: str, rig: Rig, **rules: Any) -> Outcome:
+def judged(text: str, runner: TrialRunner, **rules: Any) -> Outcome:
     flags, program = split_program(text)
-    return judge_source(criterion("source", **rules), answers(program, rig, **rules), flags)  # type: ignore[arg-type]
+    return judge_source(criterion("source", **rules), answers(program, runner, **rules), flags)  # type: ignore[arg-type]
 
 
-def graded(text: str, rig: Rig, *criteria: Criterion) -> Grade:
+def graded(text: str, runner: TrialRunner, *criteria: Criterion) -> Grade:
     submission = Submission("ada", responder=Source("responder.py", text))
-    return grade(submission, without_robot(*criteria), rig=rig)
+    return grade(submission, without_robot(*criteria), runner=runner)
 
 
 # what the text has
@@ -94,13 +94,13 @@ while True:
         ({"flags": ["--autorun"]}, True),
     ],
 )
-def test_rules_on_the_text(rules: dict[str, Any], holds: bool, rig: Rig) -> None:
-    outcome = judged(PROGRAM, rig, **rules)
+def test_rules_on_the_text(rules: dict[str, Any], holds: bool, runner: TrialRunner) -> None:
+    outcome = judged(PROGRAM, runner, **rules)
     assert outcome.passed is holds, outcome.message
 
 
-def test_rule_that_is_broken_is_told_with_its_line(rig: Rig) -> None:
-    outcome = judged(PROGRAM, rig, avoids=["while", "say()"], uses=["for"])
+def test_rule_that_is_broken_is_told_with_its_line(runner: TrialRunner) -> None:
+    outcome = judged(PROGRAM, runner, avoids=["while", "say()"], uses=["for"])
     assert outcome.message == (
         "Expected your program to do without a while loop, but line 11 has it. "
         "Expected your program to do without say(), but line 10 has it."
@@ -125,16 +125,16 @@ def test_rule_that_is_broken_is_told_with_its_line(rig: Rig) -> None:
         ("x = '\ud800'", "characters"),
     ],
 )
-def test_hostile_texts_are_read_or_refused_inside_the_walls(text: str, error: str, rig: Rig) -> None:
-    found = answers(text, rig, avoids=["say()", "import time"], uses=["for"])
+def test_hostile_texts_are_read_or_refused_inside_the_sandbox(text: str, error: str, runner: TrialRunner) -> None:
+    found = answers(text, runner, avoids=["say()", "import time"], uses=["for"])
     assert error in found.error
     assert bool(found.error) is bool(error)
 
 
-def test_what_is_avoided_cannot_be_hidden_behind_many_names(rig: Rig) -> None:
+def test_what_is_avoided_cannot_be_hidden_behind_many_names(runner: TrialRunner) -> None:
     many = "\n".join(f"name_{i}({i})" for i in range(9_000))
-    assert judged(many, rig, avoids=["eval()"]).passed
-    assert "line 9001 has it" in judged(f"{many}\neval('1')", rig, avoids=["eval()"]).message
+    assert judged(many, runner, avoids=["eval()"]).passed
+    assert "line 9001 has it" in judged(f"{many}\neval('1')", runner, avoids=["eval()"]).message
 
 
 LONG = "robot_" * 12
@@ -162,14 +162,16 @@ LONG = "robot_" * 12
         ("on_for_*()", "tank_drive.on(3, 3)", None),
     ],
 )
-def test_another_name_does_not_hide_what_is_avoided(rule: str, text: str, line: int | None, rig: Rig) -> None:
-    outcome = judged(text, rig, avoids=[rule])
+def test_another_name_does_not_hide_what_is_avoided(
+    rule: str, text: str, line: int | None, runner: TrialRunner
+) -> None:
+    outcome = judged(text, runner, avoids=[rule])
     assert outcome.passed is (line is None), outcome.message
     assert line is None or f"line {line} has it" in outcome.message
 
 
-def test_what_a_text_cannot_show_is_told_to_staff(rig: Rig) -> None:
-    outcome = judged("x = 1\nexec(''.join(['s', 'ay(1)']))", rig, avoids=["say()"])
+def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
+    outcome = judged("x = 1\nexec(''.join(['s', 'ay(1)']))", runner, avoids=["say()"])
     assert outcome.passed
     assert outcome.message == "The text of your program is as expected."
     assert outcome.for_staff == "Can do more than its text shows: line 2 has exec."
@@ -184,14 +186,14 @@ def test_what_a_text_cannot_show_is_told_to_staff(rig: Rig) -> None:
         ("import math", ""),
     ],
 )
-def test_files_beside_the_responder_are_read_too(helper: str, words: str, rig: Rig) -> None:
+def test_files_beside_the_responder_are_read_too(helper: str, words: str, runner: TrialRunner) -> None:
     rules = criterion("source", part="responder", avoids=["import sklearn"])
     submission = Submission(
         "ada",
         responder=Source("responder.py", "import helper\ndef responder(text): return text"),
         files={"helper.py": helper.encode(), "notes.txt": b"import sklearn"},
     )
-    result = grade(submission, without_robot(rules), rig=rig).criteria[0]
+    result = grade(submission, without_robot(rules), runner=runner).criteria[0]
     assert result.marks == (0 if words else 4), result.message
     assert words in result.message
 
@@ -268,47 +270,47 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
         ({"returns": 1}, "def f():\n    x = []\n    x.append(x)\n    return x", 0),
     ],
 )
-def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, rig: Rig) -> None:
+def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, runner: TrialRunner) -> None:
     asked = criterion("functions", function="f", calls=[keys])
     result = grade(
         Submission("ada", responder=Source("responder.py", text)),
         Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (asked,), limits=Limits(responder_cpu=0.5)),
-        rig=rig,
+        runner=runner,
     )
     assert result.marks == marks, result.criteria[0].message
     assert (result.verdict, result.trials) == (Verdict.FINISHED, ())
 
 
-def test_calls_are_made_one_after_the_other_in_one_process(rig: Rig) -> None:
+def test_calls_are_made_one_after_the_other_in_one_process(runner: TrialRunner) -> None:
     text = "count = 0\ndef responder(text, more=0):\n    global count\n    count += 1\n    return count + more\n"
     calls = [{"arguments": [""], "returns": 1}, {"arguments": [""], "named": {"more": 5}, "returns": 7}]
-    assert graded(text, rig, criterion("functions", calls=calls)).marks == 4
+    assert graded(text, runner, criterion("functions", calls=calls)).marks == 4
 
 
-def test_entries_of_a_list_are_marked_one_by_one(rig: Rig) -> None:
+def test_entries_of_a_list_are_marked_one_by_one(runner: TrialRunner) -> None:
     asked = criterion("functions", function="f", calls=[{"returns": ["a", "b", "c", "d"]}], each=True, at_least=0.75)
-    assert graded("def f(): return ['a', 'b', 'c', 'x']", rig, asked).marks == 4
-    assert graded("def f(): return ['a', 'b', 'x', 'x']", rig, asked).marks == 2
-    assert graded("def f(): return ['a', 'b', 'c', 'd', 'e', 'f', 'g', 'h']", rig, asked).marks == 2
+    assert graded("def f(): return ['a', 'b', 'c', 'x']", runner, asked).marks == 4
+    assert graded("def f(): return ['a', 'b', 'x', 'x']", runner, asked).marks == 2
+    assert graded("def f(): return ['a', 'b', 'c', 'd', 'e', 'f', 'g', 'h']", runner, asked).marks == 2
 
 
-def test_first_wrong_call_is_told(rig: Rig) -> None:
+def test_first_wrong_call_is_told(runner: TrialRunner) -> None:
     calls = [{"arguments": [2], "returns": 4}, {"arguments": [3], "returns": 9}]
-    result = graded("def f(x): return x + x", rig, criterion("functions", function="f", calls=calls))
+    result = graded("def f(x): return x + x", runner, criterion("functions", function="f", calls=calls))
     assert result.criteria[0].message == "Expected f(3) to return 9, but it returned 6 (1 of 2 calls right)."
-    assert result.walls.startswith("Landlock")
+    assert result.sandbox.startswith("Landlock")
 
 
-def test_same_functions_give_the_same_values(rig: Rig) -> None:
+def test_same_functions_give_the_same_values(runner: TrialRunner) -> None:
     text = "import random, time\ndef f(): return [random.random(), time.time()]"
     asked = criterion("functions", function="f", calls=[{"returns": 0}])
-    assert graded(text, rig, asked).criteria == graded(text, rig, asked).criteria
+    assert graded(text, runner, asked).criteria == graded(text, runner, asked).criteria
 
 
-def test_what_the_module_prints_counts_against_its_output(rig: Rig) -> None:
+def test_what_the_module_prints_counts_against_its_output(runner: TrialRunner) -> None:
     text = "def f():\n    for _ in range(100): print('x' * 100)\n    return 1\n"
     called = call_functions(
-        Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, rig._sandboxes, 1, JobMeter()
+        Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, runner._sandboxes, 1, JobMeter()
     )
     fault = called.returned[0].fault
     assert fault is not None
@@ -336,15 +338,15 @@ over = "mean"
 """
 
 
-def checked(folder: Path, check: str, rig: Rig) -> Grade:
+def checked(folder: Path, check: str, runner: TrialRunner) -> Grade:
     folder.mkdir(exist_ok=True)
     (folder / "assignment.toml").write_text(HEAD)
     (folder / "check.py").write_text(check)
     program = Source("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
-    return grade(Submission("ada", program), read_assignment(folder), rig=rig)
+    return grade(Submission("ada", program), read_assignment(folder), runner=runner)
 
 
-def test_a_check_in_python_sees_the_recording_and_says_what_it_found(tmp_path: Path, rig: Rig) -> None:
+def test_a_check_in_python_sees_the_recording_and_says_what_it_found(tmp_path: Path, runner: TrialRunner) -> None:
     text = """
 def check(trial):
     way = trial["end"]["x"] - trial["start"]["x"]
@@ -353,7 +355,7 @@ def check(trial):
     high = trial["start"]["y"] > 500
     return {"passed": high, "score": 0.5, "message": f"went {way:.1f} mm", "measures": {"way": way}}
 """
-    result = checked(tmp_path / "a", text, rig).criteria[0]
+    result = checked(tmp_path / "a", text, runner).criteria[0]
     assert result.marks == 3
     assert "went 172.1 mm" in result.message
     assert [(each.passed, each.measures[0].name) for each in result.evidence] == [(True, "way"), (False, "way")]
@@ -361,7 +363,7 @@ def check(trial):
 
 
 @pytest.mark.parametrize("value", ["1 nan", "nan 1", "inf 1", "1e308 1", "1 -1e308", "1e999 2"])
-def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Path, rig: Rig) -> None:
+def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "assignment.toml").write_text(HEAD)
     (tmp_path / "check.py").write_text(
         "def check(trial):\n"
@@ -369,7 +371,7 @@ def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Pa
         "    return {'passed': not numbers, 'score': sum(numbers) - sum(numbers), 'measures': {'sum': sum(numbers)}}\n"
     )
     program = Source("robot.py", f"print('Light_left: {value}')\n" * 3)
-    assert grade(Submission("ada", program), read_assignment(tmp_path), rig=rig).marks == 4
+    assert grade(Submission("ada", program), read_assignment(tmp_path), runner=runner).marks == 4
 
 
 @pytest.mark.parametrize(
@@ -384,9 +386,11 @@ def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Pa
         ("def check(", "SyntaxError"),
     ],
 )
-def test_a_check_that_fails_is_the_instructors_mistake(check: str, words: str, tmp_path: Path, rig: Rig) -> None:
+def test_a_check_that_fails_is_the_instructors_mistake(
+    check: str, words: str, tmp_path: Path, runner: TrialRunner
+) -> None:
     with pytest.raises(AssignmentError, match=words):
-        checked(tmp_path / "a", check, rig)
+        checked(tmp_path / "a", check, runner)
 
 
 # what does not fit together

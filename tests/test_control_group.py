@@ -25,7 +25,7 @@ from responders.sandbox.control_group import ControlGroup
 from service.queue.broker import EmbeddedBroker
 from service.queue.processes import end_processes
 from service.settings import Settings
-from service.store import presence
+from service.store import workers
 from service.store.engine import open_store
 from sim.errors import HostError
 
@@ -200,7 +200,7 @@ from pathlib import Path
 from responders.sandbox import control_group
 from responders.sandbox.meter import JobMeter
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 
 logging.basicConfig(stream=sys.stderr)
 assert control_group.divide() is None, control_group.divide()
@@ -209,8 +209,8 @@ assert here.name == "robomark-service"
 slot = here.parent / f"robomark-slot-{os.getpid()}"
 ECHO = "def responder(text): return text\\n"
 BUSY = "print('PY::a')\\nsum(range(10**7))"
-def rig(memory_mb=1536):
-    return Rig(group=control_group.for_this_process(memory_mb))
+def runner(memory_mb=1536):
+    return TrialRunner(group=control_group.for_this_process(memory_mb))
 """
 
 
@@ -220,15 +220,15 @@ def test_all_processes_of_a_slot_are_in_its_group_and_none_other() -> None:
 seen = set()
 def look():
     seen.add((slot / "cgroup.procs").read_text())
-with rig() as made:
-    walls = run_program(made, BUSY, responder=ECHO, meter=JobMeter(pulse=look)).walls
+with runner() as made:
+    sandbox = run_program(made, BUSY, responder=ECHO, meter=JobMeter(heartbeat=look)).sandbox
     inside = {int(pid) for pids in seen for pid in pids.split()}
     limits = [(slot / file).read_text().strip() for file in ("memory.max", "pids.max")]
-print(json.dumps([walls, len(inside), os.getpid() in inside, limits, slot.exists()]))
+print(json.dumps([sandbox, len(inside), os.getpid() in inside, limits, slot.exists()]))
 """
     )
-    walls, inside, worker_inside, limits, left_over = said
-    assert "control group" in walls
+    sandbox, inside, worker_inside, limits, left_over = said
+    assert "control group" in sandbox
     assert inside >= 4  # two zygotes and their children
     assert not worker_inside
     assert limits == [str(1536 << 20), "32"]
@@ -260,7 +260,7 @@ def test_whoever_is_killed_for_the_limit_of_its_slot_is_at_fault_at_once() -> No
         f"""
 control_group._BESIDE_LIMITS = -(1 << 30)  # else a slot is never smaller than what the assignment allows
 told = {{}}
-with rig(330) as made:
+with runner(330) as made:
     for name, hog in {HOGS!r}.items():
         told[name] = [[fault.verdict, fault.message] for fault in run_program(made, BUSY, responder=hog).faults]
     honest = run_program(made, BUSY, responder=ECHO).verdict
@@ -278,7 +278,7 @@ print(json.dumps([told, honest]))
 def test_whoever_is_killed_because_a_group_above_is_full_is_run_again() -> None:
     said, log = in_group(
         f"""
-with rig() as made:
+with runner() as made:
     faults = run_program(made, BUSY, responder={HOGS["bytes"]!r}).faults
 print(json.dumps([[fault.verdict, fault.message] for fault in faults]))
 """,
@@ -299,12 +299,12 @@ def test_a_worker_divides_its_group_and_leaves_nothing_that_grows(tmp_path: Path
             """Those with a zygote in them."""
             return {file.parent for file in group.folder.glob("robomark-slot-*/cgroup.procs") if file.read_text()}
 
-        def walls() -> list[str]:
+        def sandbox() -> list[str]:
             with store.reading() as session:
-                return [seen.worker.walls for seen in presence.workers(session)]
+                return [seen.worker.sandbox for seen in workers.known_workers(session)]
 
         with _worker(broker.settings, group.folder) as worker:
-            assert "control group" in until(walls)[0]
+            assert "control group" in until(sandbox)[0]
             (killed,) = until(
                 lambda: slots() & {group.folder / f"robomark-slot-{pid}" for pid in descendants(worker.pid)}
             )
@@ -314,7 +314,7 @@ def test_a_worker_divides_its_group_and_leaves_nothing_that_grows(tmp_path: Path
         assert killed.exists()
         with _worker(broker.settings, group.folder / "robomark-service") as worker:
             until(lambda: not killed.exists())
-            until(lambda: len(walls()) > 1)
+            until(lambda: len(sandbox()) > 1)
             until(slots)
             end_processes([worker], PATIENCE)
         assert list(group.folder.glob("robomark-slot-*")) == []

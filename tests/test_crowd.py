@@ -20,14 +20,14 @@ from builders import PROGRAM, echo, settings_in
 from floods import FLOODS, Flood
 from memory_group import MemoryGroup, memory_group
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.queue.processes import end_processes
 from service.settings import Settings
 from service.store.engine import Store, open_store
-from service.store.intake import HandIn, accept_batch
+from service.store.intake import GradingRequest, accept_batch
 from service.store.models import UNFINISHED, Enrolment, Job, JobState, Lane
 from sim.recording import Verdict
 from submissions.submission import Source, Submission
@@ -52,16 +52,16 @@ OTHERS = [
 ]
 
 
-def _submission(student: str, program: str, responder: str | None) -> HandIn:
+def _submission(student: str, program: str, responder: str | None) -> GradingRequest:
     parts = Source("robot.py", program), Source("responder.py", responder or ECHO)
-    return HandIn(Submission(student, *parts), echo(), student)
+    return GradingRequest(Submission(student, *parts), echo(), student)
 
 
-def _honest(number: int) -> HandIn:
+def _honest(number: int) -> GradingRequest:
     return _submission(f"honest-{number:03}", f"# {number}\n{HONEST}", None)
 
 
-def _floods(each: int, kinds: list[Flood]) -> list[HandIn]:
+def _floods(each: int, kinds: list[Flood]) -> list[GradingRequest]:
     return [
         _submission(f"flood-{place}-{number}", f"# {number}\n{kind.program}", kind.responder)
         for place, kind in enumerate(kinds)
@@ -87,13 +87,13 @@ def _worker(settings: Settings, group: MemoryGroup | None) -> Iterator[None]:
         end_processes([process], 20)
 
 
-def _run(settings: Settings, store: Store, hand_ins: list[HandIn], patience_seconds: float) -> str:
+def _run(settings: Settings, store: Store, grading_requests: list[GradingRequest], patience_seconds: float) -> str:
     """Take them in, in one batch and in a random order, and wait for the end of all; the batch."""
-    random.Random(1).shuffle(hand_ins)
-    batch = accept_batch(store, "crowd", hand_ins, [], max_attempts=3).id
+    random.Random(1).shuffle(grading_requests)
+    batch = accept_batch(store, "crowd", grading_requests, [], max_attempts=3).id
     with EmbeddedBroker(settings) as broker, memory_group(MEMORY) as group, _worker(broker.settings, group):
-        nudger = Nudger(make_celery(broker.settings), store, broker.settings)
-        nudger.grade(Lane.BATCH, len(hand_ins))
+        notifier = Notifier(make_celery(broker.settings), store, broker.settings)
+        notifier.grade(Lane.BATCH, len(grading_requests))
         until = time.monotonic() + patience_seconds
         open_jobs = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
         while True:
@@ -101,7 +101,7 @@ def _run(settings: Settings, store: Store, hand_ins: list[HandIn], patience_seco
                 left = session.scalar(open_jobs)
             if not left:
                 break
-            assert time.monotonic() < until, f"{left} of {len(hand_ins)} have not ended"
+            assert time.monotonic() < until, f"{left} of {len(grading_requests)} have not ended"
             time.sleep(0.5)
         if group is not None:
             print(f"most memory {group.most_bytes >> 20} MB, processes killed for it {group.killed}")
@@ -109,9 +109,9 @@ def _run(settings: Settings, store: Store, hand_ins: list[HandIn], patience_seco
 
 
 def _check(store: Store, batch: str, honest: int) -> None:
-    with Rig() as rig:
+    with TrialRunner() as runner:
         one = _honest(0)
-        right = grade(one.submission, one.assignment, rig=rig)
+        right = grade(one.submission, one.assignment, runner=runner)
     query = select(Enrolment.student, Job).join(Job, Job.enrolment_id == Enrolment.id).where(Job.batch_id == batch)
     with store.reading() as session:
         rows = [(student, job) for student, job in session.execute(query)]

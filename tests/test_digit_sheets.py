@@ -11,7 +11,7 @@ import pytest
 from notebook_builder import notebook
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.reports.plots import draw_all
 from service.store.recordings import from_bytes, to_bytes
 from sim.backgrounds import floor, label_names
@@ -50,8 +50,8 @@ def assignment(folder: Path, sheet: str, labels: str = "false") -> Assignment:
     return read_assignment(folder)
 
 
-def graded(folder: Path, sheet: str, rig: Rig, labels: str = "false") -> Grade:
-    return grade(LOOK, assignment(folder, sheet, labels), rig=rig)
+def graded(folder: Path, sheet: str, runner: TrialRunner, labels: str = "false") -> Grade:
+    return grade(LOOK, assignment(folder, sheet, labels), runner=runner)
 
 
 def shown(image: Image) -> bytes:
@@ -66,13 +66,13 @@ def on_sheet(seed: int) -> bytes:
 
 
 @pytest.mark.parametrize(("sheet", "seed"), [('"fixed"', 0), ("7", 7)])
-def test_every_trial_has_the_same_sheet(tmp_path: Path, rig: Rig, sheet: str, seed: int) -> None:
-    images = [trial.recording.images[0] for trial in graded(tmp_path, sheet, rig).trials]
+def test_every_trial_has_the_same_sheet(tmp_path: Path, runner: TrialRunner, sheet: str, seed: int) -> None:
+    images = [trial.recording.images[0] for trial in graded(tmp_path, sheet, runner).trials]
     assert {shown(image) for image in images} == {on_sheet(seed)}
 
 
-def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path, rig: Rig) -> None:
-    result = graded(tmp_path, '"per-seed"', rig)
+def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path, runner: TrialRunner) -> None:
+    result = graded(tmp_path, '"per-seed"', runner)
     for trial in result.trials:
         image = trial.recording.images[0]
         assert shown(image) == on_sheet(trial.seed)
@@ -83,8 +83,10 @@ def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path
     assert result.accuracy.labels == label_names("MNIST_Digits") == tuple("0123456789")
 
 
-def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(tmp_path: Path, rig: Rig) -> None:
-    bare = graded(tmp_path, '"per-seed"', rig)
+def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
+    bare = graded(tmp_path, '"per-seed"', runner)
     recording = bare.trials[0].recording
     assert (recording.sheet, recording.patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
@@ -96,7 +98,9 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(tmp
     assert len(pictures) == 3
 
 
-def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(tmp_path: Path, rig: Rig) -> None:
+def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
     asked = assignment(tmp_path, '"per-seed"')
     asked = replace(asked, parts=replace(asked.parts, responder="student"))
     cells = [
@@ -105,7 +109,7 @@ def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(tmp_
         "seen = roboSim.image_data().vals[0]",
         '%%sim_magic_preloaded -R\nimport time\nprint("IMG_DATA")\ntime.sleep(1)',
     ]
-    result = grade(read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts), asked, rig=rig)
+    result = grade(read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts), asked, runner=runner)
     for trial in result.trials:
         (answer,) = (message.text for message in trial.recording.messages if message.sender == "responder")
         pixels = np.array(answer.split(","), np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 3)

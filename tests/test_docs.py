@@ -63,7 +63,7 @@ _SHOWING = [
 @pytest.mark.parametrize("document", _SHOWING)
 def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")
-    shutil.copytree(EXAMPLE, tmp_path / "hand-ins" / "ada")
+    shutil.copytree(EXAMPLE, tmp_path / "submissions" / "ada")
     shutil.copy(MESSAGING, tmp_path)
     environment = os.environ | {"ROBOMARK_HOME": str(tmp_path / "home")}
     ids: dict[str, str] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose
 
 _TELL = """
@@ -27,8 +27,8 @@ time.sleep(6)
         '"speed_sp": -1e300, "position_sp": -1e300, "position": 1e300, "command": "run-to-abs-pos"',
     ],
 )
-def test_no_motor_is_faster_than_motors_are(rig: Rig, words: str) -> None:
-    recording = run_program(rig, _TELL % words, Pose(1000, 500, 0))
+def test_no_motor_is_faster_than_motors_are(runner: TrialRunner, words: str) -> None:
+    recording = run_program(runner, _TELL % words, Pose(1000, 500, 0))
     way = abs(recording.end.x - 1000)
     # 1050 degrees a second on wheels of 56 mm
     assert way <= 6 * 1050 * 56 * 3.1416 / 360

@@ -21,8 +21,8 @@ from responders.bridge import Bridge
 from responders.conversation import Conversation
 from responders.sandbox.meter import JobLimits, JobMeter
 from running import run_program
-from service.grading.rig import Rig
 from service.grading.slots import Slots
+from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled, HostError
 from sim.recording import Verdict
 
@@ -42,8 +42,8 @@ _VERDICTS = {signal.SIGXCPU: Verdict.CPU_LIMIT, signal.SIGSYS: Verdict.SANDBOX_V
 
 
 @pytest.mark.parametrize("number", sorted(set(range(1, 65)) - _STOPPING - {32, 33}))
-def test_a_program_that_signals_itself_is_at_fault(number: int, rig: Rig) -> None:
-    recording = run_program(rig, f"import os\nos.kill(os.getpid(), {number})\nimport time; time.sleep(1)")
+def test_a_program_that_signals_itself_is_at_fault(number: int, runner: TrialRunner) -> None:
+    recording = run_program(runner, f"import os\nos.kill(os.getpid(), {number})\nimport time; time.sleep(1)")
     expected = {_VERDICTS[number]} if number in _VERDICTS else {Verdict.FINISHED, Verdict.PROGRAM_ERROR}
     assert recording.verdict in expected, recording.faults
     assert "again" not in "".join(fault.message for fault in recording.faults)
@@ -59,8 +59,8 @@ def test_a_program_that_signals_itself_is_at_fault(number: int, rig: Rig) -> Non
         "import os\ndef responder(text):\n    os.close(3)\n    import select; select.select([], [], [], 0.1)\n",
     ],
 )
-def test_a_responder_that_ends_itself_is_at_fault(responder: str, rig: Rig) -> None:
-    recording = run_program(rig, HONEST, responder=responder)
+def test_a_responder_that_ends_itself_is_at_fault(responder: str, runner: TrialRunner) -> None:
+    recording = run_program(runner, HONEST, responder=responder)
     assert [fault.verdict for fault in recording.faults] == [Verdict.RESPONDER_ERROR]
 
 
@@ -81,32 +81,32 @@ class _Killer:
 
 
 @pytest.fixture
-def plain_rig() -> Iterator[Rig]:
+def plain_runner() -> Iterator[TrialRunner]:
     """Without bubblewrap, in which a child's number is another."""
-    from responders.sandbox.manager import Walls
+    from responders.sandbox.manager import Isolation
 
-    with Rig(Walls(bubblewrap=False)) as made:
+    with TrialRunner(Isolation(bubblewrap=False)) as made:
         yield made
 
 
 @pytest.mark.parametrize("times", [1, 2])
-def test_a_child_that_is_killed_from_outside_is_run_again(times: int, plain_rig: Rig) -> None:
-    undisturbed = run_program(plain_rig, BUSY, responder=ECHO)
+def test_a_child_that_is_killed_from_outside_is_run_again(times: int, plain_runner: TrialRunner) -> None:
+    undisturbed = run_program(plain_runner, BUSY, responder=ECHO)
     killer = _Killer(times)
-    meter = JobMeter(pulse=killer)
-    recording = run_program(plain_rig, BUSY, responder=ECHO, meter=meter)
+    meter = JobMeter(heartbeat=killer)
+    recording = run_program(plain_runner, BUSY, responder=ECHO, meter=meter)
     assert killer.left == 0
     assert (recording.verdict, recording.sha256) == (Verdict.FINISHED, undisturbed.sha256)
 
 
-def test_what_was_spent_on_a_killed_run_is_given_back(plain_rig: Rig) -> None:
+def test_what_was_spent_on_a_killed_run_is_given_back(plain_runner: TrialRunner) -> None:
     program = f"print({'x' * 40_000!r})\nsum(range(10**7))"
-    meter = JobMeter(JobLimits(kept_bytes=60_000), pulse=_Killer(2))
-    assert run_program(plain_rig, program, meter=meter).verdict is Verdict.FINISHED
+    meter = JobMeter(JobLimits(kept_bytes=60_000), heartbeat=_Killer(2))
+    assert run_program(plain_runner, program, meter=meter).verdict is Verdict.FINISHED
 
 
-def test_a_child_that_is_killed_whenever_it_runs_alone_is_to_blame(plain_rig: Rig) -> None:
-    recording = run_program(plain_rig, BUSY, responder=ECHO, meter=JobMeter(pulse=_Killer(1000)))
+def test_a_child_that_is_killed_whenever_it_runs_alone_is_to_blame(plain_runner: TrialRunner) -> None:
+    recording = run_program(plain_runner, BUSY, responder=ECHO, meter=JobMeter(heartbeat=_Killer(1000)))
     assert recording.verdict is Verdict.MEMORY_LIMIT
     assert "with nothing else running" in recording.faults[0].message
 
@@ -135,11 +135,11 @@ with getattr(Slots(folder), sys.argv[2])(lambda: None):
         beside.communicate("")
         assert not (tmp_path / "alone").exists()
     until((tmp_path / "alone").exists)
-    pulses: list[None] = []
+    heartbeats: list[None] = []
 
     def count() -> None:
-        pulses.append(None)
-        if len(pulses) == 3:
+        heartbeats.append(None)
+        if len(heartbeats) == 3:
             raise Cancelled("the lease is lost")
 
     with pytest.raises(Cancelled), slots.beside_others(count):
@@ -168,20 +168,22 @@ _STUMBLES = [
 
 @pytest.mark.parametrize(("where", "what", "program", "responder"), _STUMBLES)
 def test_what_our_code_stumbles_over_is_a_verdict(
-    where: type, what: str, program: str, responder: str | None, rig: Rig, monkeypatch: pytest.MonkeyPatch
+    where: type, what: str, program: str, responder: str | None, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(where, what, _raising(ValueError("41 is not a valid Signals")))
-    recording = run_program(rig, program, responder=responder)
+    recording = run_program(runner, program, responder=responder)
     (fault,) = recording.faults
     assert (fault.verdict, fault.staff) == (Verdict.SANDBOX_VIOLATION, "ValueError: 41 is not a valid Signals")
     assert "Signals" not in fault.message
 
 
 @pytest.mark.parametrize("error", [OSError("no space left"), MemoryError(), HostError("the camera is gone")])
-def test_what_the_machine_stumbles_over_is_not(error: Exception, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_the_machine_stumbles_over_is_not(
+    error: Exception, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Bridge, "_print", _raising(error))
     with pytest.raises(type(error)):
-        run_program(rig, "print('x')")
+        run_program(runner, "print('x')")
 
 
 @pytest.mark.parametrize(
@@ -196,8 +198,8 @@ def test_what_the_machine_stumbles_over_is_not(error: Exception, rig: Rig, monke
         "raise Exception('\\ud800\\x00' * 1000)",
     ],
 )  # fmt: skip
-def test_numbers_and_texts_at_the_edge_are_no_surprise(program: str, rig: Rig) -> None:
-    recording = run_program(rig, f"{program}\nfrom time import sleep\nsleep(2)", responder=ECHO)
+def test_numbers_and_texts_at_the_edge_are_no_surprise(program: str, runner: TrialRunner) -> None:
+    recording = run_program(runner, f"{program}\nfrom time import sleep\nsleep(2)", responder=ECHO)
     assert all(not fault.staff for fault in recording.faults)
     str(recording).encode("utf-8", "strict")
 
@@ -213,8 +215,8 @@ def test_numbers_and_texts_at_the_edge_are_no_surprise(program: str, rig: Rig) -
         '\'JSON::{"a": "\\\\ud800"}\'',
     ],
 )
-def test_answers_at_the_edge_are_delivered_or_malformed(answer: str, rig: Rig) -> None:
-    recording = run_program(rig, COUNTS, responder=f"def responder(text): return {answer}")
+def test_answers_at_the_edge_are_delivered_or_malformed(answer: str, runner: TrialRunner) -> None:
+    recording = run_program(runner, COUNTS, responder=f"def responder(text): return {answer}")
     assert {fault.verdict for fault in recording.faults} <= {Verdict.PROTOCOL_ERROR}
     assert recording.printed[-1].text == str(1 - len(recording.faults))
 
@@ -222,9 +224,9 @@ def test_answers_at_the_edge_are_delivered_or_malformed(answer: str, rig: Rig) -
 NAP = "import select\nselect.select([], [], [], 0.9)\n"
 
 
-def test_naps_in_all_trials_together_are_counted(rig: Rig) -> None:
+def test_naps_in_all_trials_together_are_counted(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(sleep_seconds=1.0))
-    verdicts = [run_program(rig, NAP, meter=meter).verdict for _ in range(6)]
+    verdicts = [run_program(runner, NAP, meter=meter).verdict for _ in range(6)]
     assert verdicts[:2] == [Verdict.FINISHED] * 2
     assert verdicts[-1] is Verdict.STALLED
     assert meter.spent.sleep_seconds < 2.5
@@ -241,23 +243,23 @@ def test_naps_in_all_trials_together_are_counted(rig: Rig) -> None:
         "import select\ndef responder(text):\n    select.poll().poll(900)\n    return text",
     ],
 )
-def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, rig: Rig) -> None:
+def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(sleep_seconds=0.7))
-    verdicts = [run_program(rig, HONEST, responder=responder, meter=meter).verdict for _ in range(4)]
+    verdicts = [run_program(runner, HONEST, responder=responder, meter=meter).verdict for _ in range(4)]
     assert verdicts[0] is Verdict.FINISHED
     assert verdicts[-1] is Verdict.STALLED
 
 
-def test_computing_in_all_trials_together_is_counted(rig: Rig) -> None:
+def test_computing_in_all_trials_together_is_counted(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(cpu_seconds=0.5))
-    recordings = [run_program(rig, "sum(range(10**7))", meter=meter) for _ in range(8)]
+    recordings = [run_program(runner, "sum(range(10**7))", meter=meter) for _ in range(8)]
     assert recordings[0].verdict is Verdict.FINISHED
     assert recordings[-1].verdict is Verdict.CPU_LIMIT
     assert "all trials together" in recordings[-1].faults[0].message
 
 
-def test_honest_trials_sleep_next_to_nothing(rig: Rig) -> None:
+def test_honest_trials_sleep_next_to_nothing(runner: TrialRunner) -> None:
     meter = JobMeter()
     for _ in range(5):
-        run_program(rig, HONEST, responder=ECHO, meter=meter)
+        run_program(runner, HONEST, responder=ECHO, meter=meter)
     assert meter.spent.sleep_seconds < 0.5

@@ -14,7 +14,7 @@ import pytest
 from driving import along, driven, rest, spin, straight
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Datum, Image, Line, Message, Pose, Recording
 from submissions.assignment_file import find_assignment
 from submissions.submission import Source, Submission
@@ -101,12 +101,12 @@ _SUBMISSIONS: Sequence[tuple[str, str, str, str, str]] = [
     ("name", "robot", "responder", "most", "before"), _SUBMISSIONS, ids=lambda value: value if "-" in value else ""
 )
 def test_what_does_not_do_what_was_asked_gets_little(
-    name: str, robot: str, responder: str, most: str, before: str, rig: Rig
+    name: str, robot: str, responder: str, most: str, before: str, runner: TrialRunner
 ) -> None:
     submission = Submission(
         "x", Source("robot.py", _BEGIN + robot), Source("responder.py", responder) if responder else None
     )
-    graded = grade(submission, find_assignment(name), rig=rig)
+    graded = grade(submission, find_assignment(name), runner=runner)
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
 
 

@@ -1,4 +1,4 @@
-"""Every example and every failing hand-in, graded for real: marks, verdict and what the student is told."""
+"""Every example and every failing submission, graded for real: marks, verdict and what the student is told."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import pytest
 from service.grading.example_check import check_examples
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment_file import catalogue, find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
 from submissions.example_folder import REFERENCE, Expectation, examples
 
 TESTS = Path(__file__).parent
-HANDINS = TESTS / "handins"
-FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((HANDINS / "expected.toml").read_text())
+FAILING = TESTS / "failing_submissions"
+FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FAILING / "expected.toml").read_text())
 
 
-def graded(folder: Path, assignment: str, rig: Rig) -> Grade:
+def graded(folder: Path, assignment: str, runner: TrialRunner) -> Grade:
     asked = find_assignment(assignment)
-    return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
+    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
 
 
 def assert_as_expected(result: Grade, wanted: Expectation) -> None:
@@ -36,8 +36,8 @@ def assert_as_expected(result: Grade, wanted: Expectation) -> None:
 
 
 @pytest.mark.parametrize("assignment", catalogue())
-def test_every_example_is_marked_as_expected(assignment: str, rig: Rig) -> None:
-    checked = check_examples(assignment, rig=rig)
+def test_every_example_is_marked_as_expected(assignment: str, runner: TrialRunner) -> None:
+    checked = check_examples(assignment, runner=runner)
     assert checked.problems == ()
     names = [example.name for example in checked.examples]
     full = checked.assignment.max_marks
@@ -47,31 +47,31 @@ def test_every_example_is_marked_as_expected(assignment: str, rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(FAILING))
-def test_failing_hand_in_gets_a_verdict_or_one_sentence(name: str, rig: Rig) -> None:
+def test_failing_submission_gets_a_verdict_or_one_sentence(name: str, runner: TrialRunner) -> None:
     wanted = FAILING[name]
     if "refused" in wanted:
         with pytest.raises(UsageError) as refusal:
-            graded(HANDINS / name, "echo-responder", rig)
+            graded(FAILING / name, "echo-responder", runner)
         assert str(refusal.value) == wanted["refused"]
     else:
-        assert_as_expected(graded(HANDINS / name, "echo-responder", rig), Expectation(**wanted))
+        assert_as_expected(graded(FAILING / name, "echo-responder", runner), Expectation(**wanted))
 
 
-def test_every_failing_hand_in_has_an_expectation() -> None:
-    assert {path.name for path in HANDINS.iterdir() if path.is_dir()} == set(FAILING)
+def test_every_failing_submission_has_an_expectation() -> None:
+    assert {path.name for path in FAILING.iterdir() if path.is_dir()} == set(FAILING)
 
 
-def test_what_the_database_keeps_is_graded_alike(rig: Rig) -> None:
+def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
     asked = find_assignment("shape-at-random")
     submission = read_submission(examples("shape-at-random") / "flawed", asked=asked.parts)
     kept = unpack_submission(pack_submission(submission))
-    first, second = grade(submission, asked, rig=rig), grade(kept, asked, rig=rig)
+    first, second = grade(submission, asked, runner=runner), grade(kept, asked, runner=runner)
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
     assert (first.submission, first.criteria) == (second.submission, second.criteria)
 
 
-def test_seed_echo_has_three_exchanges_and_ends_with_all_done(rig: Rig) -> None:
-    recording = graded(examples("echo-responder") / "seed", "echo-responder", rig).trials[0].recording
+def test_seed_echo_has_three_exchanges_and_ends_with_all_done(runner: TrialRunner) -> None:
+    recording = graded(examples("echo-responder") / "seed", "echo-responder", runner).trials[0].recording
     assert [(message.sender, message.text) for message in recording.messages] == [
         (sender, text)
         for number in (0, 2, 4)
@@ -81,15 +81,15 @@ def test_seed_echo_has_three_exchanges_and_ends_with_all_done(rig: Rig) -> None:
     assert recording.responder_log.count("---") == 3
 
 
-def test_seed_json_queue_grows_by_one_a_message(rig: Rig) -> None:
-    recording = graded(examples("json-queue") / "seed", "json-queue", rig).trials[0].recording
+def test_seed_json_queue_grows_by_one_a_message(runner: TrialRunner) -> None:
+    recording = graded(examples("json-queue") / "seed", "json-queue", runner).trials[0].recording
     queues = [line.text.count("Py saw") for line in recording.printed if line.text.startswith("Message queue")]
     assert queues == [0, 1, 1, 2, 2, 3]
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
 
 
-def test_seed_names_all_six_shapes_and_says_so(rig: Rig) -> None:
-    result = graded(examples("shape-recognition") / "seed", "shape-recognition", rig)
+def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
+    result = graded(examples("shape-recognition") / "seed", "shape-recognition", runner)
     assert result.accuracy is not None
     assert (result.accuracy.value, result.accuracy.n) == (1.0, 6)
     said = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}

@@ -21,11 +21,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from responders import wire
-from responders.bridge import Bridge, ProgramOrder, TrialOrder
+from responders.bridge import Bridge, ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, Responder, ResponderOrder
-from responders.notebook_play import Staged, play_notebook
-from responders.notebook_process import NotebookOrder
+from responders.conversation import Code, Responder, ResponderSpec
+from responders.notebook_executor import PlannedRun, execute_notebook
+from responders.notebook_process import NotebookSpec
 from responders.sandbox import running_child
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
@@ -67,7 +67,7 @@ def _one_of(*words: str) -> st.SearchStrategy[str]:
 
 
 #: After these nothing more is heard.
-_LAST = {"busy", "ready", "end", "stuck", "played"}
+_LAST = {"busy", "ready", "end", "stuck", "executed"}
 _ERROR = st.fixed_dictionaries({"type": _texts(), "text": _texts(), "line": st.none()})
 #: What fields hold that a schema allows; texts, where a field is not named here.
 _NAMED = {
@@ -163,11 +163,11 @@ def ground() -> Iterator[tuple[Arena, Any]]:
     cameras.close()
 
 
-def _order() -> TrialOrder:
-    program = ProgramOrder(Code("robot.py", ""), "none", LIMITS, 1 << 40)
+def _spec() -> TrialSpec:
+    program = ProgramSpec(Code("robot.py", ""), "none", LIMITS, 1 << 40)
     ground = floor("Empty_Map")
     noise, channel = Noise(), Channel()
-    return TrialOrder(
+    return TrialSpec(
         program, None, True, ground, robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1, 1
     )
 
@@ -179,7 +179,7 @@ def test_of_a_robot_program(
 ) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     with _child(frames, tmp_path_factory.mktemp("folder"), meter) as child:
-        bridge = Bridge(_order(), *ground, child, None, meter)
+        bridge = Bridge(_spec(), *ground, child, None, meter)
         fault = bridge.run()
     assert fault is None or not fault.staff, fault
     kept = (bridge.printed, bridge.spoken, bridge.images, bridge.image_log, bridge.notes, bridge.conversation.messages)
@@ -192,25 +192,25 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     folder = tmp_path_factory.mktemp("folder")
     with _child([b'{"do":"ready","error":null}', *frames], folder, meter) as child:
-        order = ResponderOrder(Code("responder.py", ""), {}, LIMITS, 1 << 40)
-        responder = Responder(order, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
+        spec = ResponderSpec(Code("responder.py", ""), {}, LIMITS, 1 << 40)
+        responder = Responder(spec, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
         faults = [responder.load()]
         faults += [responder.answer("PY::x", n, n)[2] for n in range(len(frames)) if responder.alive]
     assert not any(fault.staff for fault in faults if fault is not None), faults
     assert len(pickle.dumps((responder.output, responder.calls, responder.notes, faults))) < 2 * BUDGET
 
 
-class _NoStage:
+class _NoRuns:
     """Nothing that a notebook calls starts a robot."""
 
-    def call(self, call: object) -> Staged:
-        return Staged(notes=("noted",))
+    def call(self, call: object) -> PlannedRun:
+        return PlannedRun(notes=("noted",))
 
     def ran(self, recording: Recording) -> None:
         raise AssertionError
 
-    def last(self) -> Staged:
-        return Staged()
+    def last(self) -> PlannedRun:
+        return PlannedRun()
 
 
 @given(frames=_sequences(wire.NOTEBOOK))
@@ -221,7 +221,7 @@ def test_of_a_notebook(
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     folder = tmp_path_factory.mktemp("folder")
     with _child(frames, folder, meter) as child:
-        order = NotebookOrder("n.ipynb", ("pass", "pass"), {}, LIMITS, 1 << 40, 1)
-        played = play_notebook(order, _NoStage(), lambda *_: ground, _Sandboxes(folder, child), meter)  # type: ignore[arg-type]
-    assert played.stopped is None or not played.stopped.staff, played.stopped
-    assert len(pickle.dumps(played)) < 2 * BUDGET
+        spec = NotebookSpec("n.ipynb", ("pass", "pass"), {}, LIMITS, 1 << 40, 1)
+        executed = execute_notebook(spec, _NoRuns(), lambda *_: ground, _Sandboxes(folder, child), meter)  # type: ignore[arg-type]
+    assert executed.stopped is None or not executed.stopped.staff, executed.stopped
+    assert len(pickle.dumps(executed)) < 2 * BUDGET

@@ -1,4 +1,4 @@
-"""Hidden trials reach a student by their marks alone: whatever a hand-in does in them, it reads the same report.
+"""Hidden trials reach a student by their marks alone: whatever a submission does in them, it reads the same report.
 
 Each attack lets what its robot sees in a hidden trial decide on something that could be told: a count, a text, a
 time, a place. It is graded in two hidden worlds that differ; the visible ones and the marks do not.
@@ -15,7 +15,7 @@ import pytest
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.reports.audience import student_view
 from service.reports.csv_output import moodle_csv
 from service.reports.gradescope import gradescope_text
@@ -78,7 +78,7 @@ def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) 
 
 
 def chosen(graded: Grade) -> list[Any]:
-    """What the hand-in did in hidden trials, but for what its robot saw."""
+    """What the submission did in hidden trials, but for what its robot saw."""
     return [
         (
             recording.verdict,
@@ -98,8 +98,8 @@ def chosen(graded: Grade) -> list[Any]:
     ]
 
 
-def told_apart(rig: Rig, submission: Submission, asked: Assignment, *, draw: bool = False) -> None:
-    first, second = (grade(submission, replace(asked, secret=secret), rig=rig) for secret in ("one", "two"))
+def told_apart(runner: TrialRunner, submission: Submission, asked: Assignment, *, draw: bool = False) -> None:
+    first, second = (grade(submission, replace(asked, secret=secret), runner=runner) for secret in ("one", "two"))
     assert [result.marks for result in first.criteria] == [result.marks for result in second.criteria]
     # There was something to hide.
     assert chosen(first) != chosen(second)
@@ -164,21 +164,23 @@ RESPONDERS = {
 
 
 @pytest.mark.parametrize("channel", PROGRAMS)
-def test_what_a_program_does_in_hidden_trials_is_not_told(rig: Rig, asked: Assignment, channel: str) -> None:
+def test_what_a_program_does_in_hidden_trials_is_not_told(runner: TrialRunner, asked: Assignment, channel: str) -> None:
     program = Source("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
-    told_apart(rig, Submission("s", program, Source("responder.py", ANSWERS)), asked)
+    told_apart(runner, Submission("s", program, Source("responder.py", ANSWERS)), asked)
 
 
 @pytest.mark.parametrize("channel", RESPONDERS)
-def test_what_a_responder_does_in_hidden_trials_is_not_told(rig: Rig, asked: Assignment, channel: str) -> None:
+def test_what_a_responder_does_in_hidden_trials_is_not_told(
+    runner: TrialRunner, asked: Assignment, channel: str
+) -> None:
     responder = Source("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
-    told_apart(rig, Submission("s", Source("robot.py", SENDS), responder), asked)
+    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), asked)
 
 
-def test_plots_for_students_are_of_visible_trials(rig: Rig, asked: Assignment) -> None:
+def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, asked: Assignment) -> None:
     few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
     responder = Source("responder.py", LOOKS + RESPONDERS["which answers are given"])
-    told_apart(rig, Submission("s", Source("robot.py", SENDS), responder), few, draw=True)
+    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), few, draw=True)
 
 
 CELLS = (
@@ -192,9 +194,9 @@ CELLS = (
 )
 
 
-def test_what_the_cells_after_a_hidden_run_do_is_not_told(rig: Rig, asked: Assignment) -> None:
+def test_what_the_cells_after_a_hidden_run_do_is_not_told(runner: TrialRunner, asked: Assignment) -> None:
     cells = tuple(Cell(number, source) for number, source in enumerate(CELLS, 1))
-    told_apart(rig, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
+    told_apart(runner, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
 
 
 #: Trained on visible pictures, asked about visible and hidden ones in one process.
@@ -228,6 +230,8 @@ def training() -> Assignment:
 
 
 @pytest.mark.parametrize("channel", MODELS)
-def test_what_a_model_does_with_hidden_pictures_is_not_told(rig: Rig, training: Assignment, channel: str) -> None:
+def test_what_a_model_does_with_hidden_pictures_is_not_told(
+    runner: TrialRunner, training: Assignment, channel: str
+) -> None:
     model = Source("responder.py", MODEL.replace("{}", MODELS[channel]))
-    told_apart(rig, Submission("s", None, model), training)
+    told_apart(runner, Submission("s", None, model), training)

@@ -1,4 +1,4 @@
-"""The home is ours alone: closed when it is made, mended when it is not, refused where others could reach into it."""
+"""The home is ours alone: closed when it is made, repaired when it is not, refused where others could reach into it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _old_home(home: Path) -> None:
         path.chmod(0o777 if path.is_dir() else 0o666)
 
 
-def test_an_open_home_is_mended_and_said_so_once(tmp_path: Path) -> None:
+def test_an_open_home_is_repaired_and_said_so_once(tmp_path: Path) -> None:
     home = tmp_path / "home"
     _old_home(home)
     assert len(_open(home)) == 9

@@ -19,7 +19,7 @@ from command import robomark
 from first_release import lay_first_release
 from service import home_secret
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
 from service.settings import Settings, load_settings
 from service.store.engine import open_store
@@ -151,8 +151,8 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
     search = SEARCH.format(database=tmp_path / "robomark.db", codes=scrambled(SECRET, str(seed)))
     program = Source("robot.py", f"{search}\nprint('PY::', told())\n")
     responder = Source("responder.py", f"{search}\ndef responder(text): return str(told())\n")
-    with Rig() as rig:
-        (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), rig=rig).trials
+    with TrialRunner() as runner:
+        (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), runner=runner).trials
     assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]
     # The search finds what is there.
     kept = {"it": SECRET}

@@ -369,7 +369,7 @@ def test_what_an_answer_names(answer: str | None, right: bool) -> None:
     assert result.marks == (4 if right else 0), result.message
     assert result.accuracy is not None
     assert result.accuracy.n == 1
-    assert [sight.truth for sight in result.sights] == ["upwards facing triangle"]
+    assert [prediction.truth for prediction in result.predictions] == ["upwards facing triangle"]
 
 
 def test_classification_pools_and_counts_silence_as_wrong() -> None:
@@ -390,7 +390,7 @@ def test_classification_pools_and_counts_silence_as_wrong() -> None:
         (DIAMOND, None): 1,
         (NO_PICTURE, None): 2,
     }
-    assert len(result.sights) == 3
+    assert len(result.predictions) == 3
     assert 'The picture showed "square", but it was taken for "diamond".' in result.message
     assert [evidence.passed for evidence in result.evidence] == [True, False, False, False, False]
 
@@ -398,7 +398,7 @@ def test_classification_pools_and_counts_silence_as_wrong() -> None:
 @pytest.mark.parametrize(("pictures", "count"), [("all", 3), ("first", 1), ("last", 1)])
 def test_which_pictures_count(pictures: str, count: int) -> None:
     result = judged(criterion("classification", pictures=pictures), pictured(SQUARE, "square", count=3))
-    assert len(result.sights) == count
+    assert len(result.predictions) == count
 
 
 def test_truth_told_for_each_pose() -> None:

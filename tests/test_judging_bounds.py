@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.grading.findings import Findings
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade
 from service.grading.judging import bounded
 from service.grading.judging.bounded import Bounds, bounds_for, judge_within
 from service.grading.judging.judge import judge, judge_one
-from service.grading.rig import Rig
+from service.grading.static_analysis import StaticAnalysis
+from service.grading.trial_runner import TrialRunner
 from service.reports.sequence import MOST_CALL_STEPS, Gap, conversation
 from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Line, Message, Verdict
@@ -174,13 +174,13 @@ path = "0.0"
 
 
 @pytest.mark.parametrize("name", _PROGRAMS)
-def test_hostile_programs_are_graded_in_little_time(name: str, rig: Rig, tmp_path: Path) -> None:
+def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunner, tmp_path: Path) -> None:
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text[4:]\n")
     asked = read_assignment(tmp_path)
     program = Source("robot.py", _STORY.format(lines=_PROGRAMS[name]))
     begin = time.process_time()
-    graded = grade(Submission("ada", program, None), asked, rig=rig)
+    graded = grade(Submission("ada", program, None), asked, runner=runner)
     assert time.process_time() - begin < 30
     assert graded.verdict in (Verdict.FINISHED, Verdict.PROTOCOL_ERROR)
     marks = {result.id: result.marks for result in graded.criteria}
@@ -343,7 +343,7 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
     _spoil(monkeypatch, {"bad": misbehave})
     trials = _trials(_LITTLE if run == "little" else _MUCH)
     bounds = replace(_SMALL, seconds=2.0) if misbehave is _sleeps else _SMALL
-    before, bad, after = judge_within(bounds, _criteria("before", "bad", "after"), trials, Findings())
+    before, bad, after = judge_within(bounds, _criteria("before", "bad", "after"), trials, StaticAnalysis())
     assert [result.marks for result in (before, bad, after)] == [2, 0, 2]
     assert bad.max_marks == 2
     assert bad.message == "This could not be judged within the limits that judging has; staff will look at it."
@@ -356,7 +356,7 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
 
 def test_many_misbehave_and_each_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     _spoil(monkeypatch, {"a": _raises, "c": _aborts, "d": _eats, "e": _is_killed})
-    results = judge_within(_SMALL, _criteria(*"abcdef"), _trials(_MUCH), Findings())
+    results = judge_within(_SMALL, _criteria(*"abcdef"), _trials(_MUCH), StaticAnalysis())
     assert [result.id for result in results] == list("abcdef")
     assert [bool(result.unjudged) for result in results] == [True, False, True, True, True, False]
 
@@ -365,7 +365,7 @@ def test_a_rank_of_what_could_not_be_judged_is_not_judged_either(monkeypatch: py
     lap = SCHEMAS["finishes"].model_validate({"id": "lap", "title": "L", "marks": 2, "check": "finishes"})
     rank = criterion("ranking", of="lap", measure="time", steps=[[50, 1.0]])
     _spoil(monkeypatch, {"lap": _raises})
-    ranked, _ = judge_within(_SMALL, _asking(rank, lap), _trials(_LITTLE), Findings())
+    ranked, _ = judge_within(_SMALL, _asking(rank, lap), _trials(_LITTLE), StaticAnalysis())
     assert ranked.marks == 0
     assert ranked.unjudged == "lap, which it ranks, could not be judged"
 
@@ -378,25 +378,27 @@ def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> 
     asked = _asking(criterion("classification", labels=["a"]))
     plain = judge(asked, _trials(run))
     monkeypatch.setattr(bounded, "_LITTLE", -1)
-    apart = judge_within(_SMALL, asked, _trials(run), Findings())
+    apart = judge_within(_SMALL, asked, _trials(run), StaticAnalysis())
     assert apart == plain
-    assert [sight.image is image for sight, image in zip(apart[0].sights, images, strict=True)] == [True] * 3
+    assert [prediction.image is image for prediction, image in zip(apart[0].predictions, images, strict=True)] == [
+        True
+    ] * 3
 
 
 def test_what_a_machine_spoilt_is_not_judged() -> None:
     with pytest.raises(HostError, match="has to be run again"):
-        judge_within(_SMALL, _criteria("a"), _trials(recorded(verdict=Verdict.HOST_ERROR)), Findings())
+        judge_within(_SMALL, _criteria("a"), _trials(recorded(verdict=Verdict.HOST_ERROR)), StaticAnalysis())
 
 
 def test_whoever_waits_may_stop_the_judging(monkeypatch: pytest.MonkeyPatch) -> None:
     _spoil(monkeypatch, {"bad": _sleeps})
 
-    def pulse() -> None:
+    def heartbeat() -> None:
         raise Cancelled("no longer ours")
 
     before = _children()
     with pytest.raises(Cancelled):
-        judge_within(_SMALL, _criteria("bad"), _trials(_MUCH), Findings(), pulse)
+        judge_within(_SMALL, _criteria("bad"), _trials(_MUCH), StaticAnalysis(), heartbeat)
     assert _children() == before
 
 
@@ -406,12 +408,14 @@ def test_bounds_grow_with_what_there_is_to_judge() -> None:
     assert many.cpu_seconds > 500
 
 
-def test_a_grade_says_that_staff_have_to_look(monkeypatch: pytest.MonkeyPatch, rig: Rig, tmp_path: Path) -> None:
+def test_a_grade_says_that_staff_have_to_look(
+    monkeypatch: pytest.MonkeyPatch, runner: TrialRunner, tmp_path: Path
+) -> None:
     _spoil(monkeypatch, {"number": _raises})
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text\n")
     program = Source("robot.py", _STORY.format(lines="print('1 2 3!')"))
-    graded = grade(Submission("ada", program, None), read_assignment(tmp_path), rig=rig)
+    graded = grade(Submission("ada", program, None), read_assignment(tmp_path), runner=runner)
     assert graded.notes == ("1 of 6 criteria could not be judged; staff will look at it",)
     assert {result.id: result.marks for result in graded.criteria} | {"number": 0} == {
         "end": 1, "pattern": 1, "number": 0, "words": 1, "log": 0, "answers": 1,

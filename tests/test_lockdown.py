@@ -1,4 +1,4 @@
-"""The walls by themselves, round a bare process: what a rule gives, what root loses, and who a child is."""
+"""The layers by themselves, round a bare process: what a rule gives, what root loses, and who a child is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from battery import SYSTEM_PYTHON, run_text
 from responders.sandbox import manager
 from responders.sandbox.inside import grants
-from responders.sandbox.manager import NONE, Sandboxes, Walls
+from responders.sandbox.manager import NONE, Isolation, Sandboxes
 
 _SANDBOX = Path(manager.__file__).parent
 
@@ -105,7 +105,7 @@ print(os.getuid(), os.geteuid(), os.getgid(), os.getegid())
 print(open("given.txt").read())
 open("logger.txt", "w").write("mine")
 """
-    with Sandboxes(Walls(bubblewrap=bubblewrap)) as sandboxes, sandboxes.private_folder() as folder:
+    with Sandboxes(Isolation(bubblewrap=bubblewrap)) as sandboxes, sandboxes.private_folder() as folder:
         stamp = sandboxes.check()
         (folder / "given.txt").write_text("given")
         (folder / "given.txt").chmod(0o600)

@@ -1,4 +1,4 @@
-"""The magics' flags: clamps, order and side effects are the original's, and surprises are pointed out."""
+"""The magics' flags: clamps, spec and side effects are the original's, and surprises are pointed out."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ from floods import CALL, ECHO, FLOODS, Flood, long
 from hostile import flood
 from responders.conversation import Code
 from responders.function_calls import FunctionCall
-from responders.notebook_play import Played, Staged
-from responders.notebook_process import NotebookOrder
+from responders.notebook_executor import ExecutedNotebook, PlannedRun
+from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Fault, Recording, Verdict
 
 BUDGET = 2 << 20
@@ -33,10 +33,10 @@ def _limits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("each", FLOODS, ids=lambda each: each.name)
-def test_a_flood_ends_at_the_budget(each: Flood, rig: Rig) -> None:
+def test_a_flood_ends_at_the_budget(each: Flood, runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     collaborative = each.responder if each.responder is not None or "PY::" not in each.program else ECHO
-    recording = run_program(rig, each.program, responder=collaborative, output_bytes=1 << 30, meter=meter)
+    recording = run_program(runner, each.program, responder=collaborative, output_bytes=1 << 30, meter=meter)
     assert {fault.verdict for fault in recording.faults} & set(each.verdicts), recording.faults[:3]
     assert _held(recording) < 2 * BUDGET
     assert meter.spent.kept_bytes < BUDGET + (1 << 17)
@@ -55,65 +55,65 @@ def test_a_flood_ends_at_the_budget(each: Flood, rig: Rig) -> None:
         pytest.param(long('{"do":"refused","what":"@","line":null}'), id="refusals"),
     ],
 )
-def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, rig: Rig) -> None:
+def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
-    order = NotebookOrder("n.ipynb", (f"{flood(frame)}flood()",), {}, running.RESPONDER_LIMITS, 1 << 30, 1)
-    played = rig.play(order, _NoStage(), meter)
-    assert played.stopped is not None
-    assert played.stopped.verdict is Verdict.OUTPUT_LIMIT
-    assert _held(played) < 2 * BUDGET
+    spec = NotebookSpec("n.ipynb", (f"{flood(frame)}flood()",), {}, running.RESPONDER_LIMITS, 1 << 30, 1)
+    executed = runner.execute_notebook(spec, _NoRuns(), meter)
+    assert executed.stopped is not None
+    assert executed.stopped.verdict is Verdict.OUTPUT_LIMIT
+    assert _held(executed) < 2 * BUDGET
 
 
-def test_a_flood_while_functions_are_called_ends_at_the_budget(rig: Rig) -> None:
+def test_a_flood_while_functions_are_called_ends_at_the_budget(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     code = Code("responder.py", f"def f(): return {'x' * 50_000!r}")
-    called = rig.call(code, {}, [FunctionCall("f")] * 200, running.RESPONDER_LIMITS, 1 << 30, 1, meter)
+    called = runner.call(code, {}, [FunctionCall("f")] * 200, running.RESPONDER_LIMITS, 1 << 30, 1, meter)
     faults = [returned.fault for returned in called.returned if returned.fault is not None]
     assert faults[0].verdict is Verdict.OUTPUT_LIMIT
     assert _held(called.returned) < 2 * BUDGET
 
 
-def test_all_trials_of_a_job_have_one_budget(rig: Rig) -> None:
+def test_all_trials_of_a_job_have_one_budget(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     program = f"print({'x' * 40_000!r})\n" * 20
-    verdicts = [run_program(rig, program, meter=meter).verdict for _ in range(4)]
+    verdicts = [run_program(runner, program, meter=meter).verdict for _ in range(4)]
     assert verdicts == [Verdict.FINISHED] * 2 + [Verdict.OUTPUT_LIMIT] * 2
 
 
-def test_a_log_file_is_paid_for_too(rig: Rig) -> None:
+def test_a_log_file_is_paid_for_too(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     responder = "open('logger.txt', 'w').write('x' * 900_000)\n" + ECHO
-    recordings = [run_program(rig, "pass", responder=responder, meter=meter) for _ in range(3)]
+    recordings = [run_program(runner, "pass", responder=responder, meter=meter) for _ in range(3)]
     assert [len(each.responder_log) for each in recordings] == [900_000, 900_000, 0]
     assert recordings[2].verdict is Verdict.OUTPUT_LIMIT
 
 
-def test_what_honest_programs_send_in_thousands_costs_nothing(rig: Rig) -> None:
+def test_what_honest_programs_send_in_thousands_costs_nothing(runner: TrialRunner) -> None:
     program = "for _ in range(3000): x = colorLeft.reflected_light_intensity\ntank_drive.on_for_seconds(20, 20, 1)"
     meter = JobMeter()
-    assert run_program(rig, program, meter=meter).verdict is Verdict.FINISHED
+    assert run_program(runner, program, meter=meter).verdict is Verdict.FINISHED
     assert meter.spent.kept_bytes < 1000
 
 
-class _NoStage:
+class _NoRuns:
     """Nothing that a notebook calls starts a robot."""
 
-    def call(self, call: object) -> Staged:
-        return Staged()
+    def call(self, call: object) -> PlannedRun:
+        return PlannedRun()
 
     def ran(self, recording: Recording) -> None:
         raise AssertionError
 
-    def last(self) -> Staged:
-        return Staged()
+    def last(self) -> PlannedRun:
+        return PlannedRun()
 
 
-def _held(kept: Recording | Played | tuple[object, ...]) -> int:
+def _held(kept: Recording | ExecutedNotebook | tuple[object, ...]) -> int:
     """Bytes of everything that hangs on it."""
     return len(pickle.dumps(kept))
 
 
-def test_the_budget_is_named_in_the_fault(rig: Rig) -> None:
+def test_the_budget_is_named_in_the_fault(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
-    fault: Fault = run_program(rig, FLOODS[2].program, output_bytes=1 << 30, meter=meter).faults[0]
+    fault: Fault = run_program(runner, FLOODS[2].program, output_bytes=1 << 30, meter=meter).faults[0]
     assert "all trials together said more than 2 MB" in fault.message

@@ -13,7 +13,7 @@ import pytest
 
 from notebook_builder import MESSAGING, document
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import read_assignment
@@ -181,7 +181,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
     return read_assignment(folder)
 
 
-def handled(path: Path, asked: Assignment, rig: Rig) -> str:
+def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
     """``graded``, or the sentence of the refusal."""
     try:
         submission = read_submission(path, asked=asked.parts)
@@ -192,37 +192,39 @@ def handled(path: Path, asked: Assignment, rig: Rig) -> str:
         assert "expected" in sentence
         assert len(sentence) < 300
         return sentence
-    result = grade(submission, asked, rig=rig)
+    result = grade(submission, asked, runner=runner)
     assert len(result.trials) == 1
     assert result.verdict not in ("host_error", "assignment_error")
     return "graded"
 
 
 @pytest.mark.parametrize("group", [pytest.param(each, marks=[pytest.mark.long] * (each > 0)) for each in range(4)])
-def test_each_is_graded_or_refused_with_one_sentence(group: int, tmp_path: Path, asked: Assignment, rig: Rig) -> None:
+def test_each_is_graded_or_refused_with_one_sentence(
+    group: int, tmp_path: Path, asked: Assignment, runner: TrialRunner
+) -> None:
     outcomes = []
     for number in range(group * 50, group * 50 + 50):
         path = tmp_path / f"mutant-{number}.ipynb"
         path.write_bytes(mutant(number))
-        outcomes.append(handled(path, asked, rig))
+        outcomes.append(handled(path, asked, runner))
     assert 15 < outcomes.count("graded") < 48
 
 
-def test_sizes_have_a_limit_and_a_sentence(tmp_path: Path, asked: Assignment, rig: Rig) -> None:
+def test_sizes_have_a_limit_and_a_sentence(tmp_path: Path, asked: Assignment, runner: TrialRunner) -> None:
     path = tmp_path / "large.ipynb"
     whole = document(CELLS)
     whole["cells"][0]["outputs"] = [{"data": {"image/png": "A" * (50 << 20)}}]
     path.write_text(json.dumps(whole))
-    assert "is too large, expected at most 16 MB a file; clear its outputs" in handled(path, asked, rig)
+    assert "is too large, expected at most 16 MB a file; clear its outputs" in handled(path, asked, runner)
     path.write_text('{"cells": [' + "[]," * 4_000_000 + "[]]}")
-    assert "has too much output in it" in handled(path, asked, rig)
+    assert "has too much output in it" in handled(path, asked, runner)
     path.write_text(json.dumps(document(["x = 1"] * 10_000)))
-    assert "has 10000 code cells, expected at most 5000" in handled(path, asked, rig)
+    assert "has 10000 code cells, expected at most 5000" in handled(path, asked, runner)
     path.write_text(json.dumps(document([*CELLS, "# " + "x" * (1 << 20)])))
-    assert "has too much code, expected at most 1 MB" in handled(path, asked, rig)
+    assert "has too much code, expected at most 1 MB" in handled(path, asked, runner)
 
 
-def test_thousands_of_cells_are_run(tmp_path: Path, asked: Assignment, rig: Rig) -> None:
+def test_thousands_of_cells_are_run(tmp_path: Path, asked: Assignment, runner: TrialRunner) -> None:
     path = tmp_path / "long.ipynb"
     path.write_text(json.dumps(document([*["x = 1"] * 4_900, *CELLS])))
-    assert handled(path, asked, rig) == "graded"
+    assert handled(path, asked, runner) == "graded"

@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from sqlalchemy import insert, select, update
 
-from builders import hand_in
+from builders import grading_request
 from command import robomark
 from service.preflight import Preflight, preflight
 from service.reports.written import file_stem, file_stems
@@ -109,7 +109,7 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
     tmp_path: Path, batch: Callable[..., Path], ada: str, eve: str
 ) -> None:
     checked = preflight(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
-    assert [each.submission.student for each in checked.hand_ins] == ["bob the third"]
+    assert [each.submission.student for each in checked.grading_requests] == ["bob the third"]
     assert len(_refused(checked)) == 2
     assert all("cannot be told from" in each or "too, and not the same" in each for each in _refused(checked))
 
@@ -118,7 +118,9 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
 def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: Store, ada: str, eve: str) -> None:
     """Refused in a later batch; but for what one normal form makes the same name, it can only be written otherwise."""
     batches = [preflight(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
-    first, later = (intake.accept_new(store, "b", each.hand_ins, each.problems, max_attempts=3) for each in batches)
+    first, later = (
+        intake.accept_new(store, "b", each.grading_requests, each.problems, max_attempts=3) for each in batches
+    )
     assert first.batch is not None
     assert first.refused == ()
     if shown_name(ada) == shown_name(eve) and eve == "Zoe\u0308":
@@ -128,7 +130,7 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
     ((_, sentence),) = later.refused
     assert "cannot be told from" in sentence
     with pytest.raises(UsageError, match="cannot be told from"):
-        intake.accept_batch(store, "b", batches[1].hand_ins, (), max_attempts=3)
+        intake.accept_batch(store, "b", batches[1].grading_requests, (), max_attempts=3)
 
 
 @PAIRS
@@ -153,7 +155,7 @@ def test_files_of_alike_names_never_share_a_name(ada: str, eve: str) -> None:
 def test_students_of_different_names_are_all_taken_in(tmp_path: Path, names: tuple[str, ...]) -> None:
     assert alike(names) == {}
     checked = preflight(_folder(tmp_path, *names), ASSIGNMENT)
-    assert {each.submission.student for each in checked.hand_ins} == set(names)
+    assert {each.submission.student for each in checked.grading_requests} == set(names)
     assert checked.problems == ()
 
 
@@ -163,7 +165,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
         archive.writestr("robot.py", "print('not hers')\n")
         archive.writestr("responder.py", RESPONDER)
     checked = preflight(folder, ASSIGNMENT)
-    assert [each.submission.student for each in checked.hand_ins] == ["bob"]
+    assert [each.submission.student for each in checked.grading_requests] == ["bob"]
     assert [name for name, _ in checked.problems] == ["ada", "ada.zip"]
     assert all("not the same; expected one" in sentence for sentence in _refused(checked))
 
@@ -171,7 +173,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
 @pytest.mark.parametrize("name", ["\u200b", "\u3164", "x" * 101])
 def test_a_folder_that_names_nobody_is_refused(tmp_path: Path, name: str) -> None:
     checked = preflight(_folder(tmp_path, "ada", name), ASSIGNMENT)
-    assert [each.submission.student for each in checked.hand_ins] == ["ada"]
+    assert [each.submission.student for each in checked.grading_requests] == ["ada"]
     (sentence,) = _refused(checked)
     assert f"a student's name of {len(shown_name(name))} characters" in sentence
 
@@ -184,7 +186,7 @@ def test_a_submission_does_not_say_whose_it_is(tmp_path: Path, named: str) -> No
     assert "submission.toml names the student" in submission.notes[0]
     roster = tmp_path / "roster.csv"
     roster.write_text("student,file\nmallory,eve\n")
-    (taken,) = preflight(roster, ASSIGNMENT).hand_ins
+    (taken,) = preflight(roster, ASSIGNMENT).grading_requests
     assert taken.submission.student == "mallory"
 
 
@@ -214,7 +216,7 @@ def test_a_report_made_later_does_not_take_the_place_of_anothers(tmp_path: Path)
 
 
 def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> None:
-    intake.accept(store, hand_in("ada"), max_attempts=3)
+    intake.accept(store, grading_request("ada"), max_attempts=3)
     with store.transaction() as session:
         students = Students(session, intake.course_of(session, "default", now(session)))
         known = students.enrol("ada", now(session))
@@ -247,16 +249,16 @@ def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> 
             row = {"id": number + 1, "course_id": course_id, "person_id": number + 1, "student": name}
             session.execute(insert(Enrolment).values(role=Role.STUDENT, **row))
     for name, expected in (("Ada", 1), ("ada", 2), ("bob", 3)):
-        accepted = intake.accept(store, hand_in(name), max_attempts=3)
+        accepted = intake.accept(store, grading_request(name), max_attempts=3)
         assert (accepted.student, accepted.attempt) == (name, 1)
         with store.reading() as session:
             assert session.scalar(select(intake.Job.enrolment_id).where(intake.Job.id == accepted.job_id)) == expected
     with pytest.raises(UsageError, match="cannot be told from"):
-        intake.accept(store, hand_in("ADA"), max_attempts=3)
+        intake.accept(store, grading_request("ADA"), max_attempts=3)
 
 
 def test_an_older_hash_means_only_that_it_is_graded_again(store: Store) -> None:
-    taken = hand_in("ada")
+    taken = grading_request("ada")
     intake.accept_new(store, "b", [taken], (), max_attempts=3)
     with store.transaction() as session:
         session.execute(update(intake.models.Submission).values(sha256="0" * 64))

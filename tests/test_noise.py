@@ -9,7 +9,7 @@ import pytest
 
 from running import run_program
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.camera import CachedCamera
 from sim.chance import Stream
 from sim.recording import Pose
@@ -62,9 +62,9 @@ def test_light_noise_is_the_same_for_a_seed_and_another_for_another() -> None:
     assert not np.array_equal(pixels(128, 32, 3), pixels(128, 32, 4))
 
 
-def speeds(rig: Rig, program: str, amplitude: float, seed: int = 1) -> np.ndarray:
+def speeds(runner: TrialRunner, program: str, amplitude: float, seed: int = 1) -> np.ndarray:
     """Degrees per second of the left wheel at each tick, after the first second."""
-    recording = run_program(rig, program, Pose(1100, 500, 0), noise=Noise(motor=amplitude), seed=seed, seconds=30)
+    recording = run_program(runner, program, Pose(1100, 500, 0), noise=Noise(motor=amplitude), seed=seed, seconds=30)
     return np.diff(recording.ticks.left_position)[30:590] * 30
 
 
@@ -81,9 +81,9 @@ def wavering(amplitude: float, ticks: int) -> np.ndarray:
     return drawn
 
 
-def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(rig: Rig) -> None:
+def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(runner: TrialRunner) -> None:
     """Seen in the original with W = 100 at 525 degrees a second: 262 to 732, 530 on the whole."""
-    drawn = np.concatenate([speeds(rig, AHEAD, 100, seed) for seed in range(20)])
+    drawn = np.concatenate([speeds(runner, AHEAD, 100, seed) for seed in range(20)])
     formula = wavering(100, 100_000)
     assert drawn.mean() == pytest.approx(formula.mean(), abs=20)
     assert drawn.std() == pytest.approx(formula.std(), rel=0.15)
@@ -92,16 +92,16 @@ def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(rig: Rig) -> 
     assert fast == pytest.approx(np.round(fast), abs=1e-6)
 
 
-def test_a_noisy_wheel_creeps_when_it_should_stand_and_is_exact_backwards(rig: Rig) -> None:
-    creeping = speeds(rig, STILL, 20)
+def test_a_noisy_wheel_creeps_when_it_should_stand_and_is_exact_backwards(runner: TrialRunner) -> None:
+    creeping = speeds(runner, STILL, 20)
     assert creeping.min() >= 0
     assert creeping.mean() > 1
-    assert speeds(rig, BACK, 100) == pytest.approx(speeds(rig, BACK, 0), abs=1e-6)
+    assert speeds(runner, BACK, 100) == pytest.approx(speeds(runner, BACK, 0), abs=1e-6)
 
 
-def test_wheel_noise_is_the_same_for_a_seed_and_another_for_another(rig: Rig) -> None:
-    assert np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50))
-    assert not np.array_equal(speeds(rig, AHEAD, 50), speeds(rig, AHEAD, 50, seed=2))
+def test_wheel_noise_is_the_same_for_a_seed_and_another_for_another(runner: TrialRunner) -> None:
+    assert np.array_equal(speeds(runner, AHEAD, 50), speeds(runner, AHEAD, 50))
+    assert not np.array_equal(speeds(runner, AHEAD, 50), speeds(runner, AHEAD, 50, seed=2))
 
 
 #: Ways to turn wheels at negative speeds, where the original has no noise; the last three drive the robot forwards.
@@ -136,20 +136,22 @@ time.sleep(4)
 
 
 @pytest.mark.parametrize("program", BACKWARDS.values(), ids=BACKWARDS)
-def test_noise_in_both_directions_cannot_be_driven_round(rig: Rig, program: str) -> None:
+def test_noise_in_both_directions_cannot_be_driven_round(runner: TrialRunner, program: str) -> None:
     def ends(noise: Noise) -> set[Pose]:
         start = Pose(1100, 500, 0)
-        return {run_program(rig, program, start, noise=noise, seed=seed, seconds=10).end for seed in (1, 2, 3)}
+        return {run_program(runner, program, start, noise=noise, seed=seed, seconds=10).end for seed in (1, 2, 3)}
 
     assert len(ends(Noise(motor=20))) == 1  # as in the original
     assert len(ends(Noise(motor=20, both_directions=True))) == 3
     assert ends(Noise(motor=0, both_directions=True)) == ends(Noise())
 
 
-def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(rig: Rig) -> None:
+def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(runner: TrialRunner) -> None:
     def of(program: str, *, both: bool) -> np.ndarray:
         noise = Noise(motor=20, both_directions=both)
-        recordings = (run_program(rig, program, Pose(1100, 500, 0), noise=noise, seed=s, seconds=9) for s in range(6))
+        recordings = (
+            run_program(runner, program, Pose(1100, 500, 0), noise=noise, seed=s, seconds=9) for s in range(6)
+        )
         return np.concatenate([np.diff(each.ticks.left_position)[30:240] * 30 for each in recordings])
 
     ahead, back = of(AHEAD, both=True), of(BACK, both=True)
@@ -160,8 +162,8 @@ def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(ri
 
 
 @pytest.mark.parametrize("name", ["dead-reckoning-with-noise", "lollipop-with-noise"])
-def test_in_the_catalogue_backwards_is_noisy(rig: Rig, name: str) -> None:
+def test_in_the_catalogue_backwards_is_noisy(runner: TrialRunner, name: str) -> None:
     backwards = Submission("eve", Source("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
-    trials = grade(backwards, find_assignment(name), rig=rig).trials
+    trials = grade(backwards, find_assignment(name), runner=runner).trials
     noisy = [trial.recording.end for trial in trials if trial.motor_noise]
     assert len(set(noisy)) == len(noisy)

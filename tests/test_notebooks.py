@@ -1,4 +1,4 @@
-"""Notebooks as hand-ins: played from top to bottom, with one run marked, and everything else told as a note."""
+"""Notebooks as hand-ins: executed from top to bottom, with one run marked, and everything else told as a note."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from models import weights_bytes
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.reports.faults import fault_groups
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
@@ -55,7 +55,7 @@ def assignment(folder: Path, parts: str = "", given: Mapping[str, str] | None = 
 
 def graded(
     folder: Path,
-    rig: Rig,
+    runner: TrialRunner,
     cells: Sequence[str],
     parts: str = "",
     *,
@@ -64,11 +64,11 @@ def graded(
 ) -> Grade:
     asked = assignment(folder, parts, given)
     submission = read_submission(notebook(folder / "ada.ipynb", cells, tags), asked=asked.parts)
-    return grade(submission, asked, rig=rig)
+    return grade(submission, asked, runner=runner)
 
 
-def recorded(folder: Path, rig: Rig, cells: Sequence[str], parts: str = "") -> Recording:
-    return graded(folder, rig, cells, parts).trials[0].recording
+def recorded(folder: Path, runner: TrialRunner, cells: Sequence[str], parts: str = "") -> Recording:
+    return graded(folder, runner, cells, parts).trials[0].recording
 
 
 def spoken(recording: Recording) -> list[str]:
@@ -102,11 +102,11 @@ def messaging(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     ],
 )
 def test_the_course_notebook_gets_full_marks_for_each_of_its_programs(
-    messaging: Path, rig: Rig, name: str, cell: str, marks: int
+    messaging: Path, runner: TrialRunner, name: str, cell: str, marks: int
 ) -> None:
     found = find_assignment(name)
     asked = replace(found, parts=replace(found.parts, cell=cell), scenarios=found.scenarios[:1])
-    result = grade(read_submission(messaging, asked=asked.parts), asked, rig=rig)
+    result = grade(read_submission(messaging, asked=asked.parts), asked, runner=runner)
     lost = [each for each in result.criteria if each.marks < each.max_marks and each.id != "shape-in-noise"]
     assert lost == []
     assert result.verdict is Verdict.FINISHED
@@ -155,7 +155,9 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
 # Which run is marked.
 
 
-def test_the_scenario_places_the_marked_run_and_the_others_keep_their_flags(tmp_path: Path, rig: Rig) -> None:
+def test_the_scenario_places_the_marked_run_and_the_others_keep_their_flags(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
     cells = [
         RESPONDER,
         "%%sim_magic_preloaded -b Loop -x 500 -y 400 -a 90 -R\ntank_drive.on_for_seconds(50, 50, 1)",
@@ -163,7 +165,7 @@ def test_the_scenario_places_the_marked_run_and_the_others_keep_their_flags(tmp_
         "%sim_magic -R -x 100",
         "after = %sim_robot_state\nprint('left at', round(after.state['x']), round(after.state['y']))",
     ]
-    recording = recorded(tmp_path, rig, cells)
+    recording = recorded(tmp_path, runner, cells)
     assert "left at 500 572" in recording.responder_output
     assert "left at 472 700" in recording.responder_output
     assert (recording.start.x, recording.start.y, recording.start.heading) == (300, 700, 0)
@@ -174,32 +176,32 @@ def two_programs(which: str) -> str:
     return f'%%sim_magic_preloaded -R\nsay("{which}")'
 
 
-def test_marked_by_tag_by_number_or_the_last(tmp_path: Path, rig: Rig) -> None:
+def test_marked_by_tag_by_number_or_the_last(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("one"), "x = 1", two_programs("two"), two_programs("three")]
     for cell, expected in (("2", "two"), ('"last"', "three"), ('"tag:hand in"', "one")):
-        result = graded(tmp_path, rig, cells, f"cell = {cell}", tags={2: ["hand in"]})
+        result = graded(tmp_path, runner, cells, f"cell = {cell}", tags={2: ["hand in"]})
         assert spoken(result.trials[0].recording) == [expected]
 
 
-def test_a_program_without_autorun_is_run_when_it_is_the_marked_one(tmp_path: Path, rig: Rig) -> None:
+def test_a_program_without_autorun_is_run_when_it_is_the_marked_one(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("one"), '%%sim_magic_preloaded -b Loop\nsay("two")']
-    assert spoken(recorded(tmp_path, rig, cells)) == ["two"]
+    assert spoken(recorded(tmp_path, runner, cells)) == ["two"]
 
 
 @pytest.mark.parametrize(
     "cell", ["if False:\n    %sim_magic -R", "1 / 0\n%sim_magic -R", "def again():\n    %sim_magic -R"]
 )
 def test_a_last_program_that_is_never_come_to_gives_way_to_the_last_that_ran(
-    tmp_path: Path, rig: Rig, cell: str
+    tmp_path: Path, runner: TrialRunner, cell: str
 ) -> None:
-    recording = recorded(tmp_path, rig, [RESPONDER, two_programs("one"), cell])
+    recording = recorded(tmp_path, runner, [RESPONDER, two_programs("one"), cell])
     assert (spoken(recording), recording.verdict) == (["one"], Verdict.FINISHED)
     assert recording.start.x == 300
 
 
-def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, rig: Rig) -> None:
+def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("one"), "import math\nmath.sqrt(-1)\n%sim_magic -R"]
-    result = graded(tmp_path, rig, cells, 'cell = "tag:this"', tags={3: ["this"]})
+    result = graded(tmp_path, runner, cells, 'cell = "tag:this"', tags={3: ["this"]})
     (fault,) = result.trials[0].recording.faults
     assert (fault.message, fault.place) == ("ValueError: math domain error", "cell 3, line 2")
     assert fault.hint == "The robot program of cell 3 is marked, and was never run."
@@ -232,26 +234,28 @@ def test_what_is_no_cell_is_refused(tmp_path: Path, cell: str) -> None:
 # Parts.
 
 
-def test_a_given_program_meets_the_responder_that_the_notebook_ends_with(tmp_path: Path, rig: Rig) -> None:
+def test_a_given_program_meets_the_responder_that_the_notebook_ends_with(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, "def other(text):\n    return 'other'", two_programs("mine"), "roboSim.pyresponder = other"]
     given = {"given.py": 'import time\nprint("PY::hi")\ntime.sleep(1)\n'}
-    result = graded(tmp_path, rig, cells, 'program = "given.py"', given=given)
+    result = graded(tmp_path, runner, cells, 'program = "given.py"', given=given)
     recording = result.trials[0].recording
     assert (answers(recording), recording.spoken) == (["other"], ())
     assert any("the assignment brings the robot program" in note for note in result.notes)
 
 
-def test_a_notebook_without_a_robot_program_will_do_where_the_program_is_given(tmp_path: Path, rig: Rig) -> None:
+def test_a_notebook_without_a_robot_program_will_do_where_the_program_is_given(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
     given = {"given.py": 'print("PY::hi")\nimport time\ntime.sleep(1)\n'}
-    result = graded(tmp_path, rig, [RESPONDER], 'program = "given.py"', given=given)
+    result = graded(tmp_path, runner, [RESPONDER], 'program = "given.py"', given=given)
     assert answers(result.trials[0].recording) == ["heard PY::hi"]
     with pytest.raises(UsageError, match="has no robot program, expected a cell"):
-        graded(tmp_path, rig, [RESPONDER])
+        graded(tmp_path, runner, [RESPONDER])
 
 
-def test_only_the_program_is_taken_where_no_responder_is_asked_for(tmp_path: Path, rig: Rig) -> None:
+def test_only_the_program_is_taken_where_no_responder_is_asked_for(tmp_path: Path, runner: TrialRunner) -> None:
     cells = ["while True: pass", "%%sim_magic_preloaded -R\nsay('one')", "#\n%%sim_magic_preloaded\nsay('two')\n1/0"]
-    result = graded(tmp_path, rig, cells, 'responder = "none"')
+    result = graded(tmp_path, runner, cells, 'responder = "none"')
     recording = result.trials[0].recording
     assert spoken(recording) == ["two"]
     assert [(fault.verdict, fault.place) for fault in recording.faults] == [(Verdict.PROGRAM_ERROR, "cell 3, line 4")]
@@ -277,7 +281,7 @@ def test_files_beside_win_when_they_are_what_is_asked_for(tmp_path: Path) -> Non
         read_submission(folder)
 
 
-def test_what_the_database_keeps_is_the_same_hand_in(tmp_path: Path) -> None:
+def test_what_the_database_keeps_is_the_same_submission(tmp_path: Path) -> None:
     path = notebook(tmp_path / "ada.ipynb", [RESPONDER, PROGRAM, "x = '\u2028 \ud800'"], {2: ["a", "b\nc"]})
     submission = read_submission(path)
     kept = unpack_submission(pack_submission(submission))
@@ -294,7 +298,7 @@ def test_what_the_database_keeps_is_the_same_hand_in(tmp_path: Path) -> None:
 # What cells do.
 
 
-def test_data_of_a_run_is_there_for_later_cells(tmp_path: Path, rig: Rig) -> None:
+def test_data_of_a_run_is_there_for_later_cells(tmp_path: Path, runner: TrialRunner) -> None:
     log = (
         "%%sim_magic_preloaded -b Linear_grey -R\nfor i in range(3):\n"
         '    print("Light_left:", colorLeft.reflected_light_intensity, get_clock())\n    print("image_data both")\n'
@@ -310,17 +314,17 @@ def test_data_of_a_run_is_there_for_later_cells(tmp_path: Path, rig: Rig) -> Non
         "for place in (200, 400):\n    %sim_magic -R -x $place -y {place + 1}\nlen(roboSim.results_log)",
         PROGRAM,
     ]
-    output = recorded(tmp_path, rig, cells).responder_output
+    output = recorded(tmp_path, runner, cells).responder_output
     assert "(['time', 'variable', 'value'], 3, True)" in output
     assert "--- cell 4 ---\n((6, 3), 3)" in output
     assert "(14, 14)" in output
     assert "--- cell 6 ---\n0\n--- cell 7 ---\n6" in output
 
 
-def test_a_responder_sees_what_the_robot_has_logged_so_far(tmp_path: Path, rig: Rig) -> None:
+def test_a_responder_sees_what_the_robot_has_logged_so_far(tmp_path: Path, runner: TrialRunner) -> None:
     program = '%%sim_magic_preloaded\nimport time\nfor i in range(3):\n    print("Gyro: 1")\n    print("PY::n")\n'
     cells = ["def responder(text):\n    return str(len(roboSim.results_log))", program + "time.sleep(1)"]
-    assert answers(recorded(tmp_path, rig, cells)) == ["1", "2", "3"]
+    assert answers(recorded(tmp_path, runner, cells)) == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize(
@@ -333,8 +337,8 @@ def test_a_responder_sees_what_the_robot_has_logged_so_far(tmp_path: Path, rig: 
         ),
     ],
 )
-def test_the_report_says_which_cell_is_marked(tmp_path: Path, rig: Rig, cells: list[str], note: str) -> None:
-    assert graded(tmp_path, rig, cells).notes[0] == note.format(name="ada.ipynb")
+def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunner, cells: list[str], note: str) -> None:
+    assert graded(tmp_path, runner, cells).notes[0] == note.format(name="ada.ipynb")
 
 
 @pytest.mark.parametrize(
@@ -357,8 +361,10 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, rig: Rig, cells: l
         ("get_ipython().system('rm x')", "cell 2, line 1: !rm x was refused"),
     ],
 )
-def test_what_cannot_be_done_is_told_and_the_rest_goes_on(tmp_path: Path, rig: Rig, cell: str, note: str) -> None:
-    result = graded(tmp_path, rig, [RESPONDER, cell, PROGRAM])
+def test_what_cannot_be_done_is_told_and_the_rest_goes_on(
+    tmp_path: Path, runner: TrialRunner, cell: str, note: str
+) -> None:
+    result = graded(tmp_path, runner, [RESPONDER, cell, PROGRAM])
     assert any(each.startswith(note) for each in result.notes), result.notes
     assert result.verdict is Verdict.FINISHED
     assert answers(result.trials[0].recording) == ["heard PY::hello"]
@@ -378,14 +384,14 @@ def test_what_cannot_be_done_is_told_and_the_rest_goes_on(tmp_path: Path, rig: R
         "import time\nbegan = time.time()\ntime.sleep(3)\nassert time.time() - began == 3",
     ],
 )
-def test_what_only_shows_or_sets_up_is_let_through(tmp_path: Path, rig: Rig, cell: str) -> None:
-    result = graded(tmp_path, rig, [RESPONDER, cell, PROGRAM])
+def test_what_only_shows_or_sets_up_is_let_through(tmp_path: Path, runner: TrialRunner, cell: str) -> None:
+    result = graded(tmp_path, runner, [RESPONDER, cell, PROGRAM])
     assert [note for note in result.notes if note.startswith("cell")] == []
     assert "unseen" not in result.trials[0].recording.responder_output
     assert result.verdict is Verdict.FINISHED
 
 
-def test_writefile_cat_and_values_at_the_end_of_a_cell(tmp_path: Path, rig: Rig) -> None:
+def test_writefile_cat_and_values_at_the_end_of_a_cell(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [
         RESPONDER,
         "%%writefile notes.txt\none",
@@ -394,7 +400,7 @@ def test_writefile_cat_and_values_at_the_end_of_a_cell(tmp_path: Path, rig: Rig)
         "3 * 7",
         PROGRAM,
     ]
-    output = recorded(tmp_path, rig, cells).responder_output
+    output = recorded(tmp_path, runner, cells).responder_output
     assert "Writing notes.txt" in output
     assert "--- cell 4 ---\none\ntwo\n" in output
     assert "--- cell 5 ---\n21" in output
@@ -403,9 +409,11 @@ def test_writefile_cat_and_values_at_the_end_of_a_cell(tmp_path: Path, rig: Rig)
 # Faults and limits.
 
 
-def test_a_responder_that_fails_is_told_by_cell_and_line_with_the_lines_around(tmp_path: Path, rig: Rig) -> None:
+def test_a_responder_that_fails_is_told_by_cell_and_line_with_the_lines_around(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
     cells = ["import re\n\ndef responder(text):\n    # a comment\n    return codemap[text]", "x = 1", PROGRAM]
-    result = graded(tmp_path, rig, cells)
+    result = graded(tmp_path, runner, cells)
     (fault,) = result.trials[0].recording.faults
     assert (fault.message, fault.place) == ("NameError: name 'codemap' is not defined", "cell 1, line 5")
     submission = read_submission(tmp_path / "ada.ipynb")
@@ -414,8 +422,8 @@ def test_a_responder_that_fails_is_told_by_cell_and_line_with_the_lines_around(t
     assert [line.text for line in group.excerpt if line.marked] == ["    return codemap[text]"]
 
 
-def test_no_responder_is_a_fault_with_the_cell_that_may_be_why(tmp_path: Path, rig: Rig) -> None:
-    recording = recorded(tmp_path, rig, ["import torch\n" + RESPONDER, "%%sim_magic_preloaded\nsay('x')"])
+def test_no_responder_is_a_fault_with_the_cell_that_may_be_why(tmp_path: Path, runner: TrialRunner) -> None:
+    recording = recorded(tmp_path, runner, ["import torch\n" + RESPONDER, "%%sim_magic_preloaded\nsay('x')"])
     (fault,) = recording.faults
     assert fault.verdict is Verdict.RESPONDER_ERROR
     assert "there is no responder" in fault.message
@@ -432,9 +440,9 @@ def test_no_responder_is_a_fault_with_the_cell_that_may_be_why(tmp_path: Path, r
     ],
 )
 def test_limits_stop_the_notebook_and_keep_what_was_marked_before(
-    tmp_path: Path, rig: Rig, cell: str, verdict: Verdict | None, words: str
+    tmp_path: Path, runner: TrialRunner, cell: str, verdict: Verdict | None, words: str
 ) -> None:
-    after = graded(tmp_path, rig, [RESPONDER, PROGRAM, cell])
+    after = graded(tmp_path, runner, [RESPONDER, PROGRAM, cell])
     recording = after.trials[0].recording
     assert spoken(recording) == ["done"]
     if verdict is None:
@@ -444,12 +452,12 @@ def test_limits_stop_the_notebook_and_keep_what_was_marked_before(
     (fault,) = recording.faults
     assert (fault.verdict, fault.cell) == (verdict, 3)
     assert words in fault.message
-    before = recorded(tmp_path, rig, [RESPONDER, cell, PROGRAM])
+    before = recorded(tmp_path, runner, [RESPONDER, cell, PROGRAM])
     assert (before.faults[0].cell, before.faults[0].who, len(before.ticks)) == (2, "program", 0)
     assert before.verdict is (Verdict.PROGRAM_ERROR if verdict is Verdict.RESPONDER_ERROR else verdict)
 
 
-def test_the_same_notebook_gives_the_same_chain_whatever_ran_before(tmp_path: Path, rig: Rig) -> None:
+def test_the_same_notebook_gives_the_same_chain_whatever_ran_before(tmp_path: Path, runner: TrialRunner) -> None:
     drive = "import random\ntank_drive.on_for_seconds(30, 40, random.random())"
     noisy = f"%%sim_magic_preloaded -R -N 20 -M 20 -b Loop\n{drive}"
     cells = [
@@ -459,26 +467,26 @@ def test_the_same_notebook_gives_the_same_chain_whatever_ran_before(tmp_path: Pa
         "import random\nprint([random.random() for i in range(3)])",
         PROGRAM,
     ]
-    first = recorded(tmp_path, rig, cells)
-    recorded(tmp_path, rig, [RESPONDER, PROGRAM])
-    second = recorded(tmp_path, rig, cells)
+    first = recorded(tmp_path, runner, cells)
+    recorded(tmp_path, runner, [RESPONDER, PROGRAM])
+    second = recorded(tmp_path, runner, cells)
     assert (first.sha256, first.responder_output) == (second.sha256, second.responder_output)
     assert answers(first) == answers(second)
 
 
-def test_a_responder_may_call_magics_but_no_second_robot(tmp_path: Path, rig: Rig) -> None:
+def test_a_responder_may_call_magics_but_no_second_robot(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [
         "def responder(text):\n    %sim_magic -R\n    %cat log.txt\n    !ls\n    return 'ok'",
         "%%writefile log.txt\nhi",
     ]
-    result = graded(tmp_path, rig, [*cells, PROGRAM])
+    result = graded(tmp_path, runner, [*cells, PROGRAM])
     recording = result.trials[0].recording
     assert (answers(recording), recording.verdict) == (["ok"], Verdict.FINISHED)
     assert "cell 1, line 2: %sim_magic was skipped: the robot is still running" in result.notes
     assert recording.responder_output.endswith("hi\n")
 
 
-def test_the_program_whose_text_is_marked_is_the_one_that_is_run(tmp_path: Path, rig: Rig) -> None:
+def test_the_program_whose_text_is_marked_is_the_one_that_is_run(tmp_path: Path, runner: TrialRunner) -> None:
     """A notebook changes what its own magics hand over."""
     swap = (
         "shell = type(get_ipython())\nreal = shell.run_cell_magic\n"
@@ -488,19 +496,19 @@ def test_the_program_whose_text_is_marked_is_the_one_that_is_run(tmp_path: Path,
     rule = '[[criterion]]\ntitle = "T"\nmarks = 1\ncheck = "source"\navoids = ["on()"]\n'
     assignment(tmp_path)
     (tmp_path / "assignment.toml").write_text((tmp_path / "assignment.toml").read_text() + rule)
-    result = grade(read_submission(notebook(tmp_path / "a.ipynb", cells)), read_assignment(tmp_path), rig=rig)
+    result = grade(read_submission(notebook(tmp_path / "a.ipynb", cells)), read_assignment(tmp_path), runner=runner)
     assert [line.text for line in result.trials[0].recording.printed] == ["as it stands"]
 
 
-def test_forged_frames_end_the_notebook(tmp_path: Path, rig: Rig) -> None:
-    forged = 'import os\nos.write(3, b\'{"n":2,"do":"played","missing":null}\\n\')'
-    (fault,) = recorded(tmp_path, rig, [RESPONDER, forged, PROGRAM]).faults
+def test_forged_frames_end_the_notebook(tmp_path: Path, runner: TrialRunner) -> None:
+    forged = 'import os\nos.write(3, b\'{"n":2,"do":"executed","missing":null}\\n\')'
+    (fault,) = recorded(tmp_path, runner, [RESPONDER, forged, PROGRAM]).faults
     assert (fault.verdict, fault.cell) == (Verdict.SANDBOX_VIOLATION, 2)
 
 
 @pytest.mark.long
-def test_runs_that_are_not_marked_have_an_end(tmp_path: Path, rig: Rig) -> None:
+def test_runs_that_are_not_marked_have_an_end(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("x"), "for i in range(400):\n    %sim_magic -R", PROGRAM]
-    result = graded(tmp_path, rig, cells)
+    result = graded(tmp_path, runner, cells)
     assert any("a notebook may start it 300 times" in note for note in result.notes)
     assert spoken(result.trials[0].recording) == ["done"]

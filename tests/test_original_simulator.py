@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.backgrounds import floor
 from sim.camera import CachedCamera
@@ -21,8 +21,8 @@ GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name
 
 
 @pytest.mark.parametrize("row", GOLDEN["drive"], ids=lambda row: row["program"].replace("\n", "; "))
-def test_drive(rig: Rig, row: dict[str, Any]) -> None:
-    recording = run_program(rig, row["program"], Pose(*row["start"]))
+def test_drive(runner: TrialRunner, row: dict[str, Any]) -> None:
+    recording = run_program(runner, row["program"], Pose(*row["start"]))
     x, y, heading = row["end"]
     assert recording.end.x == pytest.approx(x, abs=0.01)
     assert recording.end.y == pytest.approx(y, abs=0.01)

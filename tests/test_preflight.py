@@ -1,4 +1,4 @@
-"""Folders and zips of hand-ins: every bad row is named, and stops no other."""
+"""Folders and zips of submissions: every bad row is named, and stops no other."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _student(folder: Path, name: str, *, responder: bool = True, toml: str = "")
 
 @pytest.fixture
 def class_folder(tmp_path: Path) -> Path:
-    """A class with two good hand-ins and one of everything that goes wrong."""
+    """A class with two good submissions and one of everything that goes wrong."""
     folder = tmp_path / "class"
     _student(folder, "ada")
     _student(folder, "Zoë 🤖")
@@ -49,13 +49,13 @@ def class_folder(tmp_path: Path) -> Path:
 
 def test_every_bad_row_is_named_and_the_rest_taken(class_folder: Path) -> None:
     checked = preflight(class_folder, "echo-responder")
-    assert [hand_in.submission.student for hand_in in checked.hand_ins] == ["Zoë 🤖", "ada"]
+    assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
     problems = dict(checked.problems)
     assert set(problems) == {
         "no-responder", "empty", "notes.docx", "broken.zip", "link", "ada.zip", "climber.zip",
     }  # fmt: skip
     assert "responder.py" in problems["no-responder"]
-    assert "already this student's hand-in" in problems["ada.zip"]
+    assert "already this student's submission" in problems["ada.zip"]
     assert all(sentence.strip().endswith(".") and "\n" not in sentence for sentence in problems.values())
 
 
@@ -69,26 +69,29 @@ def test_a_zip_of_the_same_folder_is_the_same(class_folder: Path, tmp_path: Path
             if path.is_file() and not path.is_symlink():
                 archive.write(path, prefix + str(path.relative_to(class_folder)))
     checked = preflight(tmp_path / "all.zip", "echo-responder")
-    assert [hand_in.submission.student for hand_in in checked.hand_ins] == ["Zoë 🤖", "ada"]
+    assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
     assert {name for name, _ in checked.problems} == {
         "no-responder", "notes.docx", "broken.zip", "ada.zip", "climber.zip",
     }  # fmt: skip
 
 
-def test_each_hand_in_may_name_its_own_assignment(tmp_path: Path) -> None:
+def test_each_submission_may_name_its_own_assignment(tmp_path: Path) -> None:
     folder = tmp_path / "mixed"
     _student(folder, "ada", toml='assignment = "echo-responder"\n')
     _student(folder, "bob", toml='assignment = "json-queue"\n')
     _student(folder, "eve", toml='assignment = "no-such-thing"\n')
     checked = preflight(folder, None)
-    named = {hand_in.submission.student: hand_in.assignment.id for hand_in in checked.hand_ins}
+    named = {
+        grading_request.submission.student: grading_request.assignment.id
+        for grading_request in checked.grading_requests
+    }
     assert named == {"ada": "echo-responder", "bob": "json-queue"}
     ((name, sentence),) = checked.problems
     assert name == "eve"
     assert "no-such-thing" in sentence
 
 
-def test_a_hand_in_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "class"
     _student(folder, "eve", toml='assignment = "eve"\n')
     shutil.copytree(assignment_folder("echo-responder"), folder / "bait")
@@ -97,17 +100,17 @@ def test_a_hand_in_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: 
     with pytest.raises(UsageError, match="no assignment 'eve' in the catalogue"):
         read_with_assignment(Path("eve"), None)
     checked = preflight(Path(), None)
-    assert checked.hand_ins == ()
+    assert checked.grading_requests == ()
     assert "no assignment 'eve' in the catalogue" in dict(checked.problems)["eve"]
 
 
-def test_in_a_batch_nobody_hands_in_for_somebody_else(tmp_path: Path) -> None:
+def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
     folder = tmp_path / "class"
     _student(folder, "ada", toml='student = "bob"\n')
     _student(folder, "bob")
     checked = preflight(folder, "echo-responder")
     assert checked.problems == ()
-    ada, bob = checked.hand_ins
+    ada, bob = checked.grading_requests
     assert (ada.submission.student, bob.submission.student) == ("ada", "bob")
     assert "submission.toml names the student bob" in " ".join(ada.submission.notes)
 
@@ -115,11 +118,11 @@ def test_in_a_batch_nobody_hands_in_for_somebody_else(tmp_path: Path) -> None:
 def test_a_folder_named_after_an_assignment_names_it(tmp_path: Path) -> None:
     folder = tmp_path / "echo-responder"
     _student(folder, "ada")
-    (hand_in,) = preflight(folder, None).hand_ins
-    assert hand_in.assignment.id == "echo-responder"
+    (grading_request,) = preflight(folder, None).grading_requests
+    assert grading_request.assignment.id == "echo-responder"
 
 
-def _one_hand_in(tmp_path: Path) -> Path:
+def _one_request(tmp_path: Path) -> Path:
     _student(tmp_path, "ada")
     return tmp_path / "ada"
 
@@ -160,7 +163,7 @@ def _double_zip(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
-        (_one_hand_in, "looks like one hand-in"),
+        (_one_request, "looks like one submission"),
         (_nothing, "does not exist"),
         (_empty, "is empty"),
         (_text_file, "neither a folder nor a .zip"),

@@ -19,17 +19,17 @@ from sqlalchemy import select
 import false_worker
 import report_builders
 import sim.robot
-from builders import hand_in, settings_in
+from builders import grading_request, settings_in
 from service.grading.grader import grade
-from service.grading.rig import Rig
-from service.queue import canaries as known_answers
+from service.grading.trial_runner import TrialRunner
+from service.queue import self_tests as known_answers
 from service.queue.broker import EmbeddedBroker
-from service.queue.canaries import Answer, Watch
 from service.queue.celery_app import make_celery
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
+from service.queue.self_test import Answer, Watch
 from service.queue.worker import QUARANTINED
 from service.settings import Settings
-from service.store import audit, canaries, grades, intake, jobs
+from service.store import audit, grades, intake, jobs, self_tests
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 
 def _take(store: Store, *students: str) -> str:
-    return accept_batch(store, "class", [hand_in(name) for name in students], [], max_attempts=3).id
+    return accept_batch(store, "class", [grading_request(name) for name in students], [], max_attempts=3).id
 
 
 def _grade_next(store: Store, worker: str) -> str:
@@ -59,12 +59,12 @@ def _job(store: Store, job_id: str) -> Job:
         return session.get_one(Job, job_id)
 
 
-def test_this_machine_gives_the_known_answer(rig: Rig) -> None:
-    assert known_answers.ask(rig) == known_answers.known()
+def test_this_machine_gives_the_known_answer(runner: TrialRunner) -> None:
+    assert known_answers.ask(runner) == known_answers.known()
 
 
-def test_a_falsified_constant_is_found_out(store: Store, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    watch = Watch(store, rig, "machine-1", 3600)
+def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = Watch(store, runner, "machine-1", 3600)
     assert watch.look() is Answer.RIGHT
     monkeypatch.setattr(sim.robot, "ACCELERATION", 5100.0)
     _take(store, "ada")
@@ -72,25 +72,25 @@ def test_a_falsified_constant_is_found_out(store: Store, rig: Rig, monkeypatch: 
         assert jobs.claim(store, "machine-1", 60) is not None
     assert watch.look() is Answer.WRONG
     with store.reading() as session:
-        (shut_out,) = canaries.in_quarantine(session)
+        (shut_out,) = self_tests.in_quarantine(session)
         assert shut_out.worker == "machine-1"
         assert "trial 1 of the known answer has another hash" in shut_out.reason
         assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
 
 
 def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
-    class Broken(Rig):
+    class Broken(TrialRunner):
         def run(self, *_: object) -> Recording:  # type: ignore[override]
             raise OSError("no more processes")
 
     with Broken() as broken:
         assert Watch(store, broken, "machine-1", 3600).look() is Answer.UNCLEAR
     with store.reading() as session:
-        assert canaries.in_quarantine(session) == []
+        assert self_tests.in_quarantine(session) == []
 
 
-def test_a_process_looks_while_nobody_asks_it_to(store: Store, rig: Rig) -> None:
-    watch = Watch(store, rig, "machine-1", 1.0)
+def test_a_process_looks_while_nobody_asks_it_to(store: Store, runner: TrialRunner) -> None:
+    watch = Watch(store, runner, "machine-1", 1.0)
     watch.keep_looking()
     try:
         _until(lambda: _last_right(store))
@@ -102,21 +102,21 @@ def test_a_process_looks_while_nobody_asks_it_to(store: Store, rig: Rig) -> None
 
 def _last_right(store: Store) -> datetime | None:
     with store.reading() as session:
-        return session.scalar(select(canaries.Canary.right_at))
+        return session.scalar(select(self_tests.SelfTest.right_at))
 
 
 def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_to_be_seen(store: Store) -> None:
     _take(store, "ada", "bob", "cid", "dan", "eve")
-    canaries.answered_rightly(store, "wrong", os.getpid())
+    self_tests.answered_rightly(store, "wrong", os.getpid())
     good = _grade_next(store, "wrong")
-    canaries.answered_rightly(store, "wrong", os.getpid())
+    self_tests.answered_rightly(store, "wrong", os.getpid())
     bad = _grade_next(store, "wrong")
     elsewhere = _grade_next(store, "right")
     running = jobs.claim(store, "wrong", 60)
     assert running is not None
-    done = canaries.quarantine(store, "wrong", "it adds wrongly")
+    done = self_tests.quarantine(store, "wrong", "it adds wrongly")
     assert (done.taken_back, done.suspect, len(done.again)) == (1, (bad,), 1)
-    assert canaries.quarantine(store, "wrong", "again").suspect == ()
+    assert self_tests.quarantine(store, "wrong", "again").suspect == ()
 
     assert jobs.claim(store, "wrong", 60) is None
     with pytest.raises(jobs.Fenced):
@@ -137,7 +137,7 @@ def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) ->
     _take(store, "ada")
     claim = jobs.claim(store, "wrong", 60)
     assert claim is not None
-    canaries.quarantine(store, "wrong", "it adds wrongly")
+    self_tests.quarantine(store, "wrong", "it adds wrongly")
     with store.transaction() as session:
         job = session.get_one(Job, claim.job_id)
         job.state, job.lease = JobState.RUNNING, claim.lease
@@ -168,17 +168,19 @@ def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subproce
 
 
 @pytest.mark.long
-def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_hand_ins_again(tmp_path: Path, rig: Rig) -> None:
-    here = settings_in(tmp_path, concurrency=1, canary_seconds=4.0, lease_seconds=6.0)
+def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submissions_again(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
+    here = settings_in(tmp_path, concurrency=1, self_test_seconds=4.0, lease_seconds=6.0)
     switch = tmp_path / "false"
     entry = str(Path(false_worker.__file__))
     with EmbeddedBroker(here) as broker, open_store(here) as store:
-        nudger = Nudger(make_celery(broker.settings), store, broker.settings)
+        notifier = Notifier(make_celery(broker.settings), store, broker.settings)
 
         def submit(speeds: range) -> list[str]:
-            programs = [hand_in(f"student-{speed}", MOVE.format(speed=speed)) for speed in speeds]
+            programs = [grading_request(f"student-{speed}", MOVE.format(speed=speed)) for speed in speeds]
             batch = accept_batch(store, "class", programs, [], max_attempts=3)
-            nudger.grade(Lane.BATCH, len(programs))
+            notifier.grade(Lane.BATCH, len(programs))
             return [job.job_id for job in batch.jobs]
 
         with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
@@ -193,15 +195,15 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_hand_ins_a
             _until(lambda: any(_job(store, one).suspect for one in spoilt), seconds=60)
             assert wrong.wait(timeout=60) == QUARANTINED
         with _worker(broker.settings, "-m", "service.queue.worker"):
-            _until(lambda: nudger.sweep() or _unfinished(store) == 0)
+            _until(lambda: notifier.catch_up() or _unfinished(store) == 0)
         with store.reading() as session:
             differs = 0
             for job_id in [*before, *spoilt]:
-                taken_in = intake.load_hand_in(session, job_id)
+                taken_in = intake.load_grading_request(session, job_id)
                 job = session.get_one(Job, job_id)
                 query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
                 stands = session.scalars(query).one()
-                honest = grade(taken_in.submission, taken_in.assignment, secret=secret_of(store), rig=rig)
+                honest = grade(taken_in.submission, taken_in.assignment, secret=secret_of(store), runner=runner)
                 assert _chains(grades.load(session, stands.id)) == _chains(honest)
                 assert (stands.id == job_id) == (job.suspect is None)
                 differs += _chains(grades.load(session, job_id)) != _chains(honest)

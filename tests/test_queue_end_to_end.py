@@ -1,4 +1,4 @@
-"""Hand-ins through a real broker, worker and database: each is graded once, whatever is killed."""
+"""Submissions through a real broker, worker and database: each is graded once, whatever is killed."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ import pytest
 from rich.console import Console
 from sqlalchemy import func, select
 
-from builders import comparable, hand_in, settings_in
+from builders import comparable, grading_request, settings_in
 from databases import fresh_database
 from processes import children, command_line, descendants, until
 from service.commands.waiting import Waiting
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.preflight import preflight
 from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import artifacts, batches, grades, jobs
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
-from service.store.intake import HandIn, accept_batch, load_hand_in
+from service.store.intake import GradingRequest, accept_batch, load_grading_request
 from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
 from submissions.example_folder import examples
 
@@ -46,9 +46,9 @@ class Service:
     store: Store
     services: EmbeddedServices
 
-    def submit(self, hand_ins: list[HandIn]) -> str:
-        accepted = accept_batch(self.store, "test", hand_ins, [], max_attempts=3)
-        self.nudger.grade(Lane.BATCH, len(hand_ins))
+    def submit(self, grading_requests: list[GradingRequest]) -> str:
+        accepted = accept_batch(self.store, "test", grading_requests, [], max_attempts=3)
+        self.notifier.grade(Lane.BATCH, len(grading_requests))
         return accepted.id
 
     def wait(self, batch: str) -> list[Job]:
@@ -58,7 +58,7 @@ class Service:
             assert time.monotonic() - begun < PATIENCE, "the batch does not end"
             self.services.ensure()
 
-        waiting = Waiting(self.store, self.nudger, batch, Console(quiet=True), keep_up)
+        waiting = Waiting(self.store, self.notifier, batch, Console(quiet=True), keep_up)
         waiting.for_marks()
         waiting.for_plots()
         return self.jobs(batch)
@@ -68,8 +68,8 @@ class Service:
             return list(session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)))
 
     @property
-    def nudger(self) -> Nudger:
-        return Nudger(make_celery(self.services.settings), self.store, self.services.settings)
+    def notifier(self) -> Notifier:
+        return Notifier(make_celery(self.services.settings), self.store, self.services.settings)
 
     def until_running(self, batch: str) -> Job:
         """A job of the batch that a worker has in hand."""
@@ -83,7 +83,7 @@ class Service:
                 assert sorted(positions) == list(range(len(positions)))
                 assert positions
                 marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
-                assert session.scalar(marked) == len(load_hand_in(session, job.id).assignment.criteria)
+                assert session.scalar(marked) == len(load_grading_request(session, job.id).assignment.criteria)
 
 
 @pytest.fixture(scope="module")
@@ -113,21 +113,21 @@ def _pool_children(worker: int) -> list[int]:
     return [int(pid) for pid in pids if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
-def _spinning(count: int) -> list[HandIn]:
-    return [hand_in(f"spinner-{number}", SPIN) for number in range(count)]
+def _spinning(count: int) -> list[GradingRequest]:
+    return [grading_request(f"spinner-{number}", SPIN) for number in range(count)]
 
 
-def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, rig: Rig) -> None:
+def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
     checked = preflight(examples("echo-responder"), "echo-responder")
     assert checked.problems == ()
-    batch = service.submit(list(checked.hand_ins))
+    batch = service.submit(list(checked.grading_requests))
     graded = service.wait(batch)
     service.assert_graded_once(batch)
     assert {job.attempt for job in graded} == {1}
     with service.store.reading() as session:
         for job in graded:
-            taken_in = load_hand_in(session, job.id)
-            direct = grade(taken_in.submission, taken_in.assignment, secret=secret_of(service.store), rig=rig)
+            taken_in = load_grading_request(session, job.id)
+            direct = grade(taken_in.submission, taken_in.assignment, secret=secret_of(service.store), runner=runner)
             assert comparable(grades.load(session, job.id)) == comparable(direct)
             assert (job.marks, job.verdict) == (direct.marks, direct.verdict.value)
             plots = artifacts.get(session, job.id, prefix="plot-")
@@ -136,9 +136,9 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
 
 
 def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service: Service) -> None:
-    lacking = hand_in("lacking")
-    broken = HandIn(replace(lacking.submission, program=None), lacking.assignment, "lacking")
-    batch = service.submit([broken, hand_in("whole")])
+    lacking = grading_request("lacking")
+    broken = GradingRequest(replace(lacking.submission, program=None), lacking.assignment, "lacking")
+    batch = service.submit([broken, grading_request("whole")])
     by_student = {line.student: line for line in _lines(service, batch)}
     assert by_student["whole"].state is JobState.DONE
     assert by_student["lacking"].state is JobState.DEAD
@@ -175,7 +175,7 @@ def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
 
 
 def test_a_killed_broker_loses_nothing(service: Service) -> None:
-    batch = service.submit(_spinning(1) + [hand_in(f"quick-{number}") for number in range(4)])
+    batch = service.submit(_spinning(1) + [grading_request(f"quick-{number}") for number in range(4)])
     service.until_running(batch)
     (broker,) = [
         pid for pid in descendants(os.getpid()) if b"valkey-server" in Path(f"/proc/{pid}/cmdline").read_bytes()
@@ -190,7 +190,7 @@ def test_a_batch_on_postgresql(tmp_path: Path, postgresql: str) -> None:
     settings = settings_in(tmp_path, database_url=fresh_database(postgresql))
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         service = Service(settings, store, services)
-        batch = service.submit([*preflight(examples("json-queue"), "json-queue").hand_ins, *_spinning(1)])
+        batch = service.submit([*preflight(examples("json-queue"), "json-queue").grading_requests, *_spinning(1)])
         service.until_running(batch)
         assert services.worker_pid is not None
         os.kill(services.worker_pid, signal.SIGKILL)
@@ -203,7 +203,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
     settings = settings_in(tmp_path, concurrency=2, lease_seconds=6.0)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         service = Service(settings, store, services)
-        batch = service.submit([hand_in("warm-1"), hand_in("warm-2")])
+        batch = service.submit([grading_request("warm-1"), grading_request("warm-2")])
         service.wait(batch)
         batch = service.submit(_spinning(1))
         job = service.until_running(batch)
@@ -230,7 +230,7 @@ def test_a_cancelled_job_stops(service: Service) -> None:
     batch = service.submit(_spinning(1))
     job = service.until_running(batch)
     assert jobs.cancel(service.store, [job.id]) == 1
-    after = service.submit([hand_in("after")])
+    after = service.submit([grading_request("after")])
     service.wait(after)
     assert [found.state for found in service.jobs(batch)] == [JobState.CANCELLED]
     with service.store.reading() as session:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import report_builders as build
 from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.patches import decoded
+from service.grading.judging.label_patches import decoded
 from service.grading.judging.per_class import class_scores
 from service.grading.judging.truths import NO_PICTURE
 from service.reports.audience import student_view
@@ -91,7 +91,7 @@ def accuracy(result: CriterionResult) -> Accuracy:
 
 
 @pytest.mark.parametrize(
-    ("answers", "fate", "duplicates"),
+    ("answers", "status", "duplicates"),
     [
         ([("square", 0.1, "")], "answered", 0),
         ([("square", 1.0, "")], "answered", 0),
@@ -106,7 +106,9 @@ def accuracy(result: CriterionResult) -> Accuracy:
         ([], "unanswered", 0),
     ],
 )
-def test_every_picture_has_one_fate(answers: list[tuple[str, float | None, str]], fate: str, duplicates: int) -> None:
+def test_every_image_has_one_reply_status(
+    answers: list[tuple[str, float | None, str]], status: str, duplicates: int
+) -> None:
     first = Message(0.0, "robot", "IMG_DATA::{}", 0.0)
     replies = tuple(Message(0.0, "responder", text, t, 0, note) for text, t, note in answers)
     last = len(replies) + 1
@@ -118,7 +120,7 @@ def test_every_picture_has_one_fate(answers: list[tuple[str, float | None, str]]
     counts = accuracy(judged(asked(), recording)).counts
     assert counts is not None
     expected = {"answered": 0, "late": 0, "malformed": 0, "unanswered": 1} | {"sent": 2, "duplicates": duplicates}
-    expected[fate] += 1
+    expected[status] += 1
     assert {name: getattr(counts, name) for name in expected} == expected
 
 
@@ -332,7 +334,7 @@ def test_pictures_of_one_pattern_are_one_answer(how: str, answers: list[str | No
     close = tuple(replace(image, pose=Pose(100 + n, 800, 0)) for n, image in enumerate(recording.images))
     result = judged(asked(each_pattern=how), replace(recording, images=close))
     assert (accuracy(result).n, result.marks) == (1, 4 if named else 0), result.message
-    assert len(result.sights) == len(answers)
+    assert len(result.predictions) == len(answers)
     assert "patterns named rightly" in result.message
 
 

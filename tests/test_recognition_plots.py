@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from PIL import Image as Picture
 
 import report_builders as build
-from service.grading.grade import Accuracy, CriterionResult, Grade, Sight, TrialResult
+from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, TrialResult
 from service.reports.confusion_plot import draw_confusion
 from service.reports.html import student_report
 from service.reports.misread_plot import draw_misread, misread
@@ -31,7 +31,7 @@ def _moving() -> Grade:
     grade = build.line_follower_grade()
     left = build.shape_grade().trials[0].recording.images[0].left
     trials: list[TrialResult] = []
-    sights = []
+    predictions = []
     for index, trial in enumerate(grade.trials):
         ticks = trial.recording.ticks
         images = tuple(
@@ -40,15 +40,17 @@ def _moving() -> Grade:
         )
         trials.append(replace(trial, recording=replace(trial.recording, images=images)))
         answers = ("square", "square") if index == 0 else ("square", None)
-        sights += [Sight(image, "square", answers[n % 2], trial.scenario, index) for n, image in enumerate(images)]
-    result = replace(grade.criteria[0], sights=tuple(sights))
+        predictions += [
+            Prediction(image, "square", answers[n % 2], trial.scenario, index) for n, image in enumerate(images)
+        ]
+    result = replace(grade.criteria[0], predictions=tuple(predictions))
     return replace(grade, trials=tuple(trials), criteria=(result, *grade.criteria[1:]))
 
 
 def test_recognition_has_its_plots() -> None:
     kinds = [plot.kind for plot in plots_of(build.swept_grade()) if not plot.scenario]
-    assert kinds == ["confusion", "curves", "misread", "sights"]
-    assert [plot.kind for plot in plots_of(_moving()) if not plot.scenario] == ["track", "sights"]
+    assert kinds == ["confusion", "curves", "misread", "predictions"]
+    assert [plot.kind for plot in plots_of(_moving()) if not plot.scenario] == ["track", "predictions"]
     for data in draw_all(build.swept_grade()).values():
         assert 300 < Picture.open(io.BytesIO(data)).height < 2600
 
@@ -63,8 +65,8 @@ def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
 
 def test_a_misread_picture_stands_beside_the_nearest_right_ones() -> None:
     grade = build.shape_grade(wrong=4)
-    (found,) = misread(grade.criteria[0].sights)
-    assert (found.number, found.sight.truth, found.sight.answer) == (5, "upwards facing triangle", "diamond")
+    (found,) = misread(grade.criteria[0].predictions)
+    assert (found.number, found.prediction.truth, found.prediction.answer) == (5, "upwards facing triangle", "diamond")
     assert found.like_truth is None
     assert found.like_answer is not None
     assert found.like_answer.truth == "diamond"
@@ -73,31 +75,31 @@ def test_a_misread_picture_stands_beside_the_nearest_right_ones() -> None:
     assert any("1 misread of n = 6 pictures" in text for text in shown)
     # Of two right pictures of a class the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
-    (again,) = misread((far, *grade.criteria[0].sights))
+    (again,) = misread((far, *grade.criteria[0].predictions))
     assert again.like_answer is found.like_answer
 
 
 def test_a_track_shows_every_picture_and_the_share_along_the_way() -> None:
     grade = _moving()
-    sights = grade.criteria[0].sights
-    assert tracks(sights, grade.trials) == (0, 1)
-    assert worst_track(sights, grade.trials) == 1
-    pictures = taken(sights, grade.trials, 1)
+    predictions = grade.criteria[0].predictions
+    assert tracks(predictions, grade.trials) == (0, 1)
+    assert worst_track(predictions, grade.trials) == 1
+    pictures = taken(predictions, grade.trials, 1)
     assert [item.right for item in pictures[:3]] == [True, False, True]
     assert not pictures[1].answered
     way = np.array([item.way for item in pictures])
     assert (np.diff(way) > 0).all()
-    curve = along_the_way([*taken(sights, grade.trials, 0), *pictures])
-    assert sum(curve.n) == len(sights)
+    curve = along_the_way([*taken(predictions, grade.trials, 0), *pictures])
+    assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = _texts(draw_track(sights, grade.trials, "t", floor("Simple_Shapes").picture))
+    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").picture))
     assert {"x, mm", "y, mm", "way driven, mm", "share right"} <= set(shown)
-    assert any(f"of n = {len(sights)} pictures right, 2 trials" in text for text in shown)
+    assert any(f"of n = {len(predictions)} pictures right, 2 trials" in text for text in shown)
 
 
 def test_standing_still_is_no_track() -> None:
     grade = build.shape_grade()
-    assert tracks(grade.criteria[0].sights, grade.trials) == ()
+    assert tracks(grade.criteria[0].predictions, grade.trials) == ()
 
 
 @pytest.mark.parametrize("make", [build.swept_grade, build.hostile_grade])

@@ -1,4 +1,4 @@
-"""The reference responders inside the walls: they answer by the course's protocol, and take hostile text calmly."""
+"""The reference responders inside the sandbox: they answer by the course's protocol, and take hostile text calmly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from models import weights_bytes
 from responders import library
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.backgrounds import SHAPES
 from sim.recording import Pose, Recording, Verdict
 from sim.world import Noise
@@ -28,9 +28,9 @@ for text in {texts!r}:
 """
 
 
-def converse(rig: Rig, name: str, texts: list[str], **options: Any) -> Recording:
+def converse(runner: TrialRunner, name: str, texts: list[str], **options: Any) -> Recording:
     recording = run_program(
-        rig, SAY.format(texts=texts), responder=library.source(name), files=NETWORK, preamble="none", **options
+        runner, SAY.format(texts=texts), responder=library.source(name), files=NETWORK, preamble="none", **options
     )
     assert recording.verdict is Verdict.FINISHED, recording.faults
     return recording
@@ -52,8 +52,8 @@ TEXTS = [
 ]
 
 
-def test_echo_evaluates_literals_and_nothing_else(rig: Rig) -> None:
-    recording = converse(rig, "echo_responder", TEXTS)
+def test_echo_evaluates_literals_and_nothing_else(runner: TrialRunner) -> None:
+    recording = converse(runner, "echo_responder", TEXTS)
     assert answers(recording) == [
         f"Python saw >> {seen} << that..."
         for seen in ("1", "[1, 2]", "{'int': 1}", "my message", "__import__('os').getcwd()", "(" * 500)
@@ -61,22 +61,26 @@ def test_echo_evaluates_literals_and_nothing_else(rig: Rig) -> None:
     assert recording.responder_log.count("---") == len(TEXTS)
 
 
-def test_json_wraps_the_agents_answer(rig: Rig) -> None:
-    assert answers(converse(rig, "json_responder", TEXTS[:3])) == ["Py saw: 1", "Py saw: [1, 2]", "Py saw: {'int': 1}"]
+def test_json_wraps_the_agents_answer(runner: TrialRunner) -> None:
+    assert answers(converse(runner, "json_responder", TEXTS[:3])) == [
+        "Py saw: 1",
+        "Py saw: [1, 2]",
+        "Py saw: {'int': 1}",
+    ]
 
 
-def test_image_parser_says_which_kind(rig: Rig) -> None:
-    text, image = answers(converse(rig, "image_parser", ["PY::{'test_key':'test value'}", "IMG_DATA"]))
+def test_image_parser_says_which_kind(runner: TrialRunner) -> None:
+    text, image = answers(converse(runner, "image_parser", ["PY::{'test_key':'test value'}", "IMG_DATA"]))
     assert text == "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"
     assert image.startswith("Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,")
 
 
 @pytest.mark.parametrize("name", ["shape_responder", "rule_responder"])
 @pytest.mark.parametrize("code", range(6))
-def test_shapes_are_named_in_the_courses_poses_and_a_millimetre_off(rig: Rig, name: str, code: int) -> None:
+def test_shapes_are_named_in_the_courses_poses_and_a_millimetre_off(runner: TrialRunner, name: str, code: int) -> None:
     for dx, dy, noise in ((0, 0, 0.0), (1, -1, 0.0), (-1, 1, 32.0), (0, 1, 10.0)):
         recording = converse(
-            rig,
+            runner,
             name,
             ["IMG_DATA"],
             start=Pose(200 + 80 * code + dx, 900 + dy, 0),
@@ -88,24 +92,24 @@ def test_shapes_are_named_in_the_courses_poses_and_a_millimetre_off(rig: Rig, na
         assert recording.images[0].truth == shape
 
 
-def test_the_unlabelled_row_is_named_too(rig: Rig) -> None:
+def test_the_unlabelled_row_is_named_too(runner: TrialRunner) -> None:
     for column, code in enumerate((1, 5, 0, 2)):
         recording = converse(
-            rig, "rule_responder", ["IMG_DATA"], start=Pose(200 + 80 * column, 700, 0), background="Simple_Shapes"
+            runner, "rule_responder", ["IMG_DATA"], start=Pose(200 + 80 * column, 700, 0), background="Simple_Shapes"
         )
         assert answers(recording)[0]["shape"] == SHAPES[code]
 
 
 @pytest.mark.parametrize("name", ["shape_responder", "rule_responder"])
-def test_texts_get_an_answer_without_a_shape(rig: Rig, name: str) -> None:
-    assert answers(converse(rig, name, ["PY::hello", "PY::3"])) == [
+def test_texts_get_an_answer_without_a_shape(runner: TrialRunner, name: str) -> None:
+    assert answers(converse(runner, name, ["PY::hello", "PY::3"])) == [
         {"report": "Agent says: I heard hello"},
         {"report": "Agent says: I heard 3"},
     ]
 
 
-def test_an_empty_floor_is_no_shape(rig: Rig) -> None:
-    recording = converse(rig, "rule_responder", ["IMG_DATA"], noise=Noise(light=32.0))
+def test_an_empty_floor_is_no_shape(runner: TrialRunner) -> None:
+    recording = converse(runner, "rule_responder", ["IMG_DATA"], noise=Noise(light=32.0))
     assert answers(recording) == [{"report": "Agent says: I see no shape"}]
 
 
@@ -116,11 +120,11 @@ def test_the_library_gives_only_its_own_files() -> None:
 
 
 @pytest.mark.parametrize("name", ["digit_responder", "plain_digit_responder"])
-def test_digits_of_a_sheet_are_named(rig: Rig, name: str) -> None:
+def test_digits_of_a_sheet_are_named(runner: TrialRunner, name: str) -> None:
     right = 0
     for column in range(10):
         recording = run_program(
-            rig,
+            runner,
             SAY.format(texts=["IMG_DATA"]),
             Pose(100 + 100 * column, 1050, 90),
             responder=library.source(name),
@@ -133,11 +137,11 @@ def test_digits_of_a_sheet_are_named(rig: Rig, name: str) -> None:
     assert right >= 9
 
 
-def test_the_digit_responder_says_how_sure_it_is_and_sees_paper_as_paper(rig: Rig) -> None:
+def test_the_digit_responder_says_how_sure_it_is_and_sees_paper_as_paper(runner: TrialRunner) -> None:
     sheet = {"background": "MNIST_Digits", "start": Pose(100, 1050, 90)}
-    (answer,) = answers(converse(rig, "digit_responder", ["IMG_DATA"], **sheet))
+    (answer,) = answers(converse(runner, "digit_responder", ["IMG_DATA"], **sheet))
     assert 0.5 < answer["confidence"] <= 1
-    assert answers(converse(rig, "digit_responder", ["IMG_DATA"], noise=Noise(light=64))) == [
+    assert answers(converse(runner, "digit_responder", ["IMG_DATA"], noise=Noise(light=64))) == [
         {"report": "Agent says: I see no digit"}
     ]
-    assert answers(converse(rig, "digit_responder", ["PY::hello"])) == [{"report": "Agent says: I heard hello"}]
+    assert answers(converse(runner, "digit_responder", ["PY::hello"])) == [{"report": "Agent says: I heard hello"}]

@@ -102,7 +102,7 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
     assert "0 of 4 marks; error in the responder" in text
     assert "Responder, line 2: NameError" in text
     assert "2 times in 2 of 3 trials" in text
-    assert "walls: process limits only" in text
+    assert "sandbox: process limits only" in text
     assert max(len(line) for line in text.split("\n")) <= 96
 
 
@@ -120,7 +120,7 @@ def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
     view = student_view(build.hidden_grade())
     assert [result.id for result in view.criteria] == ["names-the-right-shape", "asks-aloud"]
     assert {trial.scenario for trial in view.trials} == {"each-shape"}
-    assert [sight.trial for sight in view.criteria[0].sights] == [0, 1, 2, 3]
+    assert [prediction.trial for prediction in view.criteria[0].predictions] == [0, 1, 2, 3]
     assert view.criteria[0].accuracy is not None
     assert (view.criteria[0].accuracy.n, view.criteria[0].message[:8]) == (4, "VISIBLE:")
     released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"}))
@@ -138,8 +138,10 @@ def test_a_grade_of_before_visible_trials_were_told_apart_tells_nothing_of_trial
 def test_student_view_where_the_first_trial_is_hidden() -> None:
     grade = build.shape_grade()
     view = student_view(replace(grade, trials=(replace(grade.trials[0], visibility="hidden"), *grade.trials[1:])))
-    sights = view.criteria[0].sights
-    assert [(sight.trial, sight.truth) for sight in sights] == [(i, build.SHAPES[i + 1]) for i in range(5)]
+    predictions = view.criteria[0].predictions
+    assert [(prediction.trial, prediction.truth) for prediction in predictions] == [
+        (i, build.SHAPES[i + 1]) for i in range(5)
+    ]
     assert worst_trial(view, "each-shape") == 3
 
 

@@ -13,12 +13,12 @@ import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
 from service.reports.confusion_plot import confusion_table, draw_confusion
 from service.reports.conversation_plot import draw_conversation
-from service.reports.figure import DPI, WIDTH
 from service.reports.path_plot import draw_path
+from service.reports.plot_style import DPI, WIDTH
 from service.reports.plots import draw_all, plots_of
+from service.reports.predictions_plot import chosen_predictions, focus_picture, sensor_picture
 from service.reports.sensor_plot import draw_sensors, panels_of, strips_of
 from service.reports.sequence import Gap, Step, conversation
-from service.reports.sights_plot import chosen_sights, focus_picture, sensor_picture
 from sim.recording import Call, Message, Pose, Recording
 
 
@@ -34,7 +34,7 @@ def test_names_of_all_plots() -> None:
     assert set(draw_all(build.shape_grade())) == {
         "confusion-names-the-right-shape",
         "misread-names-the-right-shape",
-        "sights-names-the-right-shape",
+        "predictions-names-the-right-shape",
         "path-each-shape-5",
         "sensors-each-shape-5",
         "conversation-each-shape-1",
@@ -56,10 +56,10 @@ def test_bytes_repeat_and_sizes_are_small() -> None:
 
 def test_hidden_trials_are_in_staff_plots_only() -> None:
     for plot in plots_of(build.hidden_grade()):
-        if "SECRET" in plot.title or plot.kind in ("confusion", "sights"):
+        if "SECRET" in plot.title or plot.kind in ("confusion", "predictions"):
             assert plot.name.endswith("-staff")
     students = {name for name in draw_all(build.hidden_grade()) if not name.endswith("-staff")}
-    assert "sights-names-the-right-shape" in students
+    assert "predictions-names-the-right-shape" in students
     assert not any("SECRET" in name for name in students)
 
 
@@ -178,7 +178,7 @@ def test_sensor_pictures_and_focus() -> None:
 
 
 def test_wrong_pictures_come_first_when_not_all_fit() -> None:
-    sights = build.shape_grade().criteria[0].sights * 10
-    chosen = chosen_sights(sights)
+    predictions = build.shape_grade().criteria[0].predictions * 10
+    chosen = chosen_predictions(predictions)
     assert len(chosen) == 12
     assert [index for index in chosen if index % 6 == 4] == list(range(4, 60, 6))

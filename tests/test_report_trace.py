@@ -14,7 +14,7 @@ def test_keys_rows_and_values() -> None:
     recording = build.line_follower_recording(300)
     document = trace(recording)
     assert list(document) == [
-        "ticks", "printed", "spoken", "messages", "datalog", "images", "verdict", "start", "end", "sha256", "walls",
+        "ticks", "printed", "spoken", "messages", "datalog", "images", "verdict", "start", "end", "sha256", "sandbox",
     ]  # fmt: skip
     assert list(document["ticks"]) == [
         "t", "x", "y", "heading", "left_position", "right_position", "left_rgb", "right_rgb", "ultrasonic", "gyro",

@@ -12,7 +12,7 @@ import pytest
 
 from models import weights_bytes
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
 from sim.world import Noise
 from submissions.example_folder import examples
@@ -34,15 +34,15 @@ for i in range(20):
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
-def chain(name: str, rig: Rig) -> str:
+def chain(name: str, runner: TrialRunner) -> str:
     """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
     if name == "follower":
-        recording = run_program(rig, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
+        recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT
         assert len(recording.ticks) == 1800
     else:
         recording = run_program(
-            rig,
+            runner,
             SHOW_AND_TELL,
             Pose(520, 900, 0),
             background="Simple_Shapes",
@@ -58,24 +58,24 @@ def chain(name: str, rig: Rig) -> str:
 ELSEWHERE = textwrap.dedent("""
     import sys
     sys.path.insert(0, sys.argv[1])
-    from service.grading.rig import Rig
+    from service.grading.trial_runner import TrialRunner
     from test_same_run_same_hash import chain
-    with Rig() as rig:
+    with TrialRunner() as runner:
         for name in sys.argv[2:]:
-            print(name, chain(name, rig), flush=True)
+            print(name, chain(name, runner), flush=True)
 """)
 
 
-def test_ten_processes_in_shuffled_order_beside_a_busy_core(rig: Rig) -> None:
-    here = {name: chain(name, rig) for name in ("follower", "talk")}
+def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
+    here = {name: chain(name, runner) for name in ("follower", "talk")}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
             pair = []
             for half in range(2):
-                order = ["follower", "talk"]
-                random.Random(number * 2 + half).shuffle(order)
-                command = [sys.executable, "-c", ELSEWHERE, str(Path(__file__).parent), *order]
+                spec = ["follower", "talk"]
+                random.Random(number * 2 + half).shuffle(spec)
+                command = [sys.executable, "-c", ELSEWHERE, str(Path(__file__).parent), *spec]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
             for process in pair:
                 output, _ = process.communicate(timeout=300)
@@ -86,19 +86,19 @@ def test_ten_processes_in_shuffled_order_beside_a_busy_core(rig: Rig) -> None:
         busy.wait()
 
 
-def test_another_seed_gives_another_run(rig: Rig) -> None:
+def test_another_seed_gives_another_run(runner: TrialRunner) -> None:
     hashes = {
-        run_program(rig, "tank_drive.on_for_seconds(50, 50, 1)", noise=Noise(motor=20), seed=seed).sha256
+        run_program(runner, "tank_drive.on_for_seconds(50, 50, 1)", noise=Noise(motor=20), seed=seed).sha256
         for seed in (1, 2, 3)
     }
     assert len(hashes) == 3
 
 
 @pytest.mark.parametrize("extra", ["colorRight.rgb", "random.random()", "print(gyro.rate)"])
-def test_looking_more_often_or_switching_a_noise_on_disturbs_no_other_chance(rig: Rig, extra: str) -> None:
+def test_looking_more_often_or_switching_a_noise_on_disturbs_no_other_chance(runner: TrialRunner, extra: str) -> None:
     program = "import random\ntank_drive.on(30, 40)\nfor i in range(20):\n    {}\n    time.sleep(0.1)\n"
-    plain = run_program(rig, "import time\n" + program.format("pass"), noise=Noise(motor=30))
-    other = run_program(rig, "import time\n" + program.format(extra), noise=Noise(light=40, motor=30))
+    plain = run_program(runner, "import time\n" + program.format("pass"), noise=Noise(motor=30))
+    other = run_program(runner, "import time\n" + program.format(extra), noise=Noise(light=40, motor=30))
     count = min(len(plain.ticks), len(other.ticks))
     assert count >= 59
     assert plain.ticks.x[:count].tolist() == other.ticks.x[:count].tolist()

@@ -1,4 +1,4 @@
-"""A machine is asked, before it takes student code, whether its walls hold."""
+"""A machine is asked, before it takes student code, whether its sandbox holds."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 from battery import run_text
 from responders.sandbox import bubblewrap
 from responders.sandbox.inside.battery import ATTEMPTS
-from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.manager import Isolation, Sandboxes
 from responders.sandbox.running_child import ChildLimits
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 
 
 @pytest.mark.parametrize("role", ["robot", "responder"])
@@ -29,16 +29,16 @@ def test_every_attempt_is_refused_here(role: str) -> None:
     assert f"{len(ATTEMPTS)} of {len(ATTEMPTS)} refused" in said
 
 
-def test_the_battery_notices_a_wall_that_does_not_stand() -> None:
-    with Sandboxes(Walls(seccomp=False)) as sandboxes:
+def test_the_battery_notices_a_layer_that_does_not_stand() -> None:
+    with Sandboxes(Isolation(seccomp=False)) as sandboxes:
         said = sandboxes.check()
     refused = re.search(r"(\d+) of (\d+) refused", said)
     assert refused is not None
     assert int(refused[1]) < int(refused[2])
 
 
-def test_each_recording_says_what_stood(rig: Rig) -> None:
-    assert run_program(rig, "pass").walls == rig.check_walls().partition(" (battery")[0]
+def test_each_recording_says_what_stood(runner: TrialRunner) -> None:
+    assert run_program(runner, "pass").sandbox == runner.check_sandbox().partition(" (battery")[0]
 
 
 def test_bubblewrap_is_used_where_it_works_and_done_without_where_not(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,8 +65,8 @@ def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
 def test_a_trial_is_the_same_inside_bubblewrap_and_out() -> None:
     program = "from random import random\nfor _ in range(3): print(f'PY::{random()}')"
     responder = "import os, numpy as np\ndef responder(text): return f'{np.random.rand()} {sorted(os.environ)}'"
-    with Rig() as inside, Rig(Walls(bubblewrap=False)) as outside:
-        one, other = (run_program(rig, program, responder=responder) for rig in (inside, outside))
+    with TrialRunner() as inside, TrialRunner(Isolation(bubblewrap=False)) as outside:
+        one, other = (run_program(runner, program, responder=responder) for runner in (inside, outside))
     assert one.sha256 == other.sha256
     assert [message.text for message in one.messages] == [message.text for message in other.messages]
 

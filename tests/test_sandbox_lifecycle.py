@@ -16,7 +16,7 @@ import pytest
 
 from responders.sandbox.meter import JobMeter
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Verdict
 
 _WORKER = """
@@ -24,10 +24,10 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from responders.sandbox.meter import JobMeter
 from running import run_program
-from service.grading.rig import Rig
-with Rig() as rig:
+from service.grading.trial_runner import TrialRunner
+with TrialRunner() as runner:
     while True:
-        run_program(rig, sys.argv[2], responder=sys.argv[3])
+        run_program(runner, sys.argv[2], responder=sys.argv[3])
 """
 _ENDLESS = "while True: pass"
 _ECHO = "def responder(text): return text"
@@ -73,8 +73,8 @@ def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder:
 @pytest.mark.parametrize("who", ["it", "what is round it"])
 def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> None:
     others = _zygotes(os.getpid())
-    with Rig() as rig:
-        honest = run_program(rig, "print(1)")
+    with TrialRunner() as runner:
+        honest = run_program(runner, "print(1)")
         (zygote,) = _zygotes(os.getpid()) - others
         if who == "it":
             # Inside bubblewrap, where that is used.
@@ -84,14 +84,14 @@ def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> Non
             if _alive(zygote):
                 os.kill(zygote, signal.SIGKILL)
 
-        again = run_program(rig, "sum(range(10**7)); print(1)", meter=JobMeter(pulse=kill))
+        again = run_program(runner, "sum(range(10**7)); print(1)", meter=JobMeter(heartbeat=kill))
         assert not _alive(zygote)
         assert (again.verdict, again.sha256) == (Verdict.FINISHED, honest.sha256)
         (zygote,) = _zygotes(os.getpid()) - others
         family = {zygote, *_descendants(zygote)}
         os.kill(zygote, signal.SIGKILL)
         _wait_until(lambda: not any(_alive(pid) for pid in family))
-        assert run_program(rig, "print(1)").sha256 == honest.sha256
+        assert run_program(runner, "print(1)").sha256 == honest.sha256
 
 
 @pytest.mark.long
@@ -100,11 +100,11 @@ def test_five_hundred_children_leave_nothing(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     program = 'print("PY::x")'
     responder = "def responder(text):\n    open('file', 'w').write(text)\n    return text"
-    with Rig() as rig:
+    with TrialRunner() as runner:
 
         def trials(count: int) -> None:
             for _ in range(count):
-                assert run_program(rig, program, responder=responder).verdict is Verdict.FINISHED
+                assert run_program(runner, program, responder=responder).verdict is Verdict.FINISHED
 
         trials(25)
         processes = [os.getpid(), *_children(os.getpid())]

@@ -6,7 +6,7 @@ import pytest
 
 from models import weights_bytes
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Recording, Verdict
 from submissions.example_folder import examples
 from submissions.magics import setup, split_program
@@ -22,22 +22,22 @@ SHAPES = (
 )
 
 
-def play(rig: Rig, name: str, start: Pose | None = None) -> Recording:
-    hand_in = examples(name) / "seed"
-    flags, text = split_program((hand_in / "robot.py").read_text())
+def play(runner: TrialRunner, name: str, start: Pose | None = None) -> Recording:
+    grading_request = examples(name) / "seed"
+    flags, text = split_program((grading_request / "robot.py").read_text())
     chosen = setup(flags)
     return run_program(
-        rig,
+        runner,
         text,
         start or chosen.pose,
         background=chosen.background,
-        responder=(hand_in / "responder.py").read_text(),
+        responder=(grading_request / "responder.py").read_text(),
         files=NETWORK,
     )
 
 
-def test_echo(rig: Rig) -> None:
-    recording = play(rig, "echo-responder")
+def test_echo(runner: TrialRunner) -> None:
+    recording = play(runner, "echo-responder")
     assert [(message.sender, message.text) for message in recording.messages] == [
         line
         for number in (0, 2, 4)
@@ -49,8 +49,8 @@ def test_echo(rig: Rig) -> None:
     assert recording.verdict is Verdict.FINISHED
 
 
-def test_json(rig: Rig) -> None:
-    recording = play(rig, "json-queue")
+def test_json(runner: TrialRunner) -> None:
+    recording = play(runner, "json-queue")
     queues = [line.text for line in recording.printed if line.text.startswith("Message queue")]
     assert [queue.count("Py saw") for queue in queues] == [0, 1, 1, 2, 2, 3]
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
@@ -58,16 +58,16 @@ def test_json(rig: Rig) -> None:
     assert recording.verdict is Verdict.FINISHED
 
 
-def test_image_data(rig: Rig) -> None:
-    recording = play(rig, "image-parser")
+def test_image_data(runner: TrialRunner) -> None:
+    recording = play(runner, "image-parser")
     answers = [message.text for message in recording.messages if message.sender == "responder"]
     assert answers[0] == """JSON::{"message": "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"}"""
     assert answers[1].startswith("""JSON::{"message": "Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,""")
     assert recording.verdict is Verdict.FINISHED
 
 
-def test_shape_from_520_900(rig: Rig) -> None:
-    recording = play(rig, "shape-recognition")
+def test_shape_from_520_900(runner: TrialRunner) -> None:
+    recording = play(runner, "shape-recognition")
     assert recording.spoken[-1].text == "Is that a upwards facing triangle"
     assert [(call.caller, call.callee) for call in recording.calls] == [
         ("responder", "parser"),
@@ -78,7 +78,7 @@ def test_shape_from_520_900(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize(("number", "shape"), list(enumerate(SHAPES)))
-def test_every_shape(rig: Rig, number: int, shape: str) -> None:
-    recording = play(rig, "shape-recognition", Pose(200 + 80 * number, 900, 0))
+def test_every_shape(runner: TrialRunner, number: int, shape: str) -> None:
+    recording = play(runner, "shape-recognition", Pose(200 + 80 * number, 900, 0))
     assert recording.spoken[-1].text == f"Is that a {shape}"
     assert recording.images[0].truth == shape

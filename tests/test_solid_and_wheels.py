@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.motion import FreeMotion, Physics, SolidMotion
 from sim.recording import Pose
@@ -64,9 +64,9 @@ def test_an_oblique_robot_slides_along_the_wall_and_stays_out_of_it(facing: floa
     assert math.degrees(heading) == pytest.approx(ends_facing, abs=2)
 
 
-def test_the_post_stops_the_robot_and_the_wheels_slip(rig: Rig) -> None:
-    solid = run_program(rig, AHEAD, Pose(500, 600, 0), obstacles=(POST,), physics=SOLID)
-    free = run_program(rig, AHEAD, Pose(500, 600, 0), obstacles=(POST,))
+def test_the_post_stops_the_robot_and_the_wheels_slip(runner: TrialRunner) -> None:
+    solid = run_program(runner, AHEAD, Pose(500, 600, 0), obstacles=(POST,), physics=SOLID)
+    free = run_program(runner, AHEAD, Pose(500, 600, 0), obstacles=(POST,))
     assert solid.end.x == pytest.approx(855, abs=1)
     assert free.end.x > 1300
     assert solid.ticks.left_position[-1] == free.ticks.left_position[-1]
@@ -74,30 +74,30 @@ def test_the_post_stops_the_robot_and_the_wheels_slip(rig: Rig) -> None:
     assert solid.touches[0].pose.x == pytest.approx(855, abs=1.5)
 
 
-def test_the_gyro_feels_what_the_wall_does(rig: Rig) -> None:
-    ended = run_program(rig, AHEAD, Pose(2150, 300, 70), physics=SOLID)
+def test_the_gyro_feels_what_the_wall_does(runner: TrialRunner) -> None:
+    ended = run_program(runner, AHEAD, Pose(2150, 300, 70), physics=SOLID)
     assert abs(ended.end.heading - 70) > 10
     assert ended.ticks.gyro[-1] == pytest.approx(70 - ended.end.heading, abs=1e-6)
 
 
-def test_away_from_walls_solid_changes_no_bit(rig: Rig) -> None:
+def test_away_from_walls_solid_changes_no_bit(runner: TrialRunner) -> None:
     assert (
-        run_program(rig, ROUND, Pose(900, 500, 0), physics=SOLID).sha256
-        == run_program(rig, ROUND, Pose(900, 500, 0)).sha256
+        run_program(runner, ROUND, Pose(900, 500, 0), physics=SOLID).sha256
+        == run_program(runner, ROUND, Pose(900, 500, 0)).sha256
     )
 
 
 @pytest.mark.parametrize("physics", [SOLID, WHEELS, BOTH])
-def test_what_ran_before_leaves_no_trace(physics: Physics, rig: Rig) -> None:
-    def hashes(own: Rig, starts: Sequence[Pose]) -> dict[Pose, str]:
+def test_what_ran_before_leaves_no_trace(physics: Physics, runner: TrialRunner) -> None:
+    def hashes(own: TrialRunner, starts: Sequence[Pose]) -> dict[Pose, str]:
         return {
             start: run_program(own, AHEAD, start, obstacles=(POST,), physics=physics, seconds=8).sha256
             for start in starts
         }
 
     starts = [Pose(600, 610, 0), Pose(2200, 300, 60), Pose(700, 450, 20), Pose(300, 1000, 100)]
-    with Rig() as fresh:
-        assert hashes(rig, starts) == hashes(fresh, starts[::-1])
+    with TrialRunner() as fresh:
+        assert hashes(runner, starts) == hashes(fresh, starts[::-1])
 
 
 def random_drive(seed: int) -> Iterator[tuple[float, float]]:
@@ -135,10 +135,10 @@ def follow(motion: FreeMotion | RigidWheels, driven: Robot, seed: int) -> list[t
     return places
 
 
-def test_rigid_wheels_are_held_by_solid_walls_alone(rig: Rig) -> None:
+def test_rigid_wheels_are_held_by_solid_walls_alone(runner: TrialRunner) -> None:
     start = Pose(600, 600, 0)
-    assert run_program(rig, AHEAD, start, obstacles=(POST,), physics=BOTH).end.x == pytest.approx(855, abs=3)
-    assert run_program(rig, AHEAD, start, obstacles=(POST,), physics=WHEELS).end.x > 1300
+    assert run_program(runner, AHEAD, start, obstacles=(POST,), physics=BOTH).end.x == pytest.approx(855, abs=3)
+    assert run_program(runner, AHEAD, start, obstacles=(POST,), physics=WHEELS).end.x > 1300
 
 
 def test_an_arena_gives_each_physics_its_own_motion() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.reports.audience import student_view
 from service.reports.csv_output import marks_csv
 from service.reports.html import staff_report, student_report
@@ -60,25 +60,25 @@ def files_of(case: dict[str, Any]) -> dict[str, bytes]:
         stream = io.BytesIO()
         with zipfile.ZipFile(stream, "w") as archive:
             archive.writestr("helper.py", "run = eval")
-        files[case["archive"]] = b"not an archive at first sight" + stream.getvalue()
+        files[case["archive"]] = b"not an archive at first prediction" + stream.getvalue()
     return files
 
 
-def graded(case: dict[str, Any], folder: Path, rig: Rig) -> Grade:
+def graded(case: dict[str, Any], folder: Path, runner: TrialRunner) -> Grade:
     part = case.get("part", "responder")
     asked = assignment(part, {name: case[name] for name in _RULES if name in case})
     if "cells" in case:
         cells = tuple(Cell(number, source) for number, source in enumerate(case["cells"], 1))
-        return grade(Submission("ada", notebook=Notebook("a.ipynb", cells), files=files_of(case)), asked, rig=rig)
+        return grade(Submission("ada", notebook=Notebook("a.ipynb", cells), files=files_of(case)), asked, runner=runner)
     (folder / ("robot.py" if part == "program" else "responder.py")).write_text(case["text"].lstrip("\n"), "utf-8")
     for name, data in files_of(case).items():
         (folder / name).write_bytes(data)
-    return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
+    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
 
 
 @pytest.mark.parametrize("case", [pytest.param(case, id=case["name"]) for case in CASES])
-def test_what_becomes_of_it(case: dict[str, Any], tmp_path: Path, rig: Rig) -> None:
-    result = graded(case, tmp_path, rig)
+def test_what_becomes_of_it(case: dict[str, Any], tmp_path: Path, runner: TrialRunner) -> None:
+    result = graded(case, tmp_path, runner)
     source, *others = result.criteria
     became = case["became"]
     if became == "fails":
@@ -99,12 +99,12 @@ NETWORK = "from joblib import load\ndef responder(text): return text\n"
 WITHOUT = criterion("source", part="responder", avoids=["import joblib"])
 
 
-def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, rig: Rig) -> None:
+def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "robot.py").write_text("print('PY::x')\nimport time\ntime.sleep(1)")
     (tmp_path / "responder.py").write_text(NETWORK)
     scenario = Scenario("s", (Pose(200, 800, 0),), seconds=5.0)
     asked = Assignment("a", "A", WorldSpec(), Parts(), (scenario,), (WITHOUT,))
-    recording = grade(read_submission(tmp_path, asked=asked.parts), asked, rig=rig).trials[0].recording
+    recording = grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).trials[0].recording
     assert recording.verdict is Verdict.RESPONDER_ERROR
     assert recording.faults[0].message == "ModuleNotFoundError: this assignment does without joblib"
     assert recording.faults[0].line == 1
@@ -112,11 +112,11 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, rig
 
 
 @pytest.mark.parametrize("rules", [{"avoids": ["joblib"]}, {"avoids": ["import joblib"], "marks": "0"}, {}])
-def test_only_what_carries_marks_is_refused(rules: dict[str, Any], tmp_path: Path, rig: Rig) -> None:
+def test_only_what_carries_marks_is_refused(rules: dict[str, Any], tmp_path: Path, runner: TrialRunner) -> None:
     text = "import joblib\ndef f(): return True\n"
     (tmp_path / "responder.py").write_text(text)
     asked = assignment("responder", {"uses": ["import joblib"], **rules})
-    assert grade(read_submission(tmp_path, asked=asked.parts), asked, rig=rig).criteria[1].marks == 1
+    assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == 1
 
 
 COMPILED = """
@@ -127,33 +127,35 @@ def f(): return hasattr(SourcelessFileLoader("x", nn_tools.__path__[0] + "/__pyc
 
 
 @pytest.mark.parametrize(("module", "marks"), [("nn_tools.weights", 0), ("sklearn", 1)])
-def test_what_was_compiled_of_a_closed_file_is_closed_too(module: str, marks: int, tmp_path: Path, rig: Rig) -> None:
+def test_what_was_compiled_of_a_closed_file_is_closed_too(
+    module: str, marks: int, tmp_path: Path, runner: TrialRunner
+) -> None:
     source = Path(__file__).parent.parent / "responders" / "kit" / "nn_tools" / "weights.py"
     compiled = Path(py_compile.compile(str(source), doraise=True))
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})
-    assert grade(read_submission(tmp_path, asked=asked.parts), asked, rig=rig).criteria[1].marks == marks
+    assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks
 
 
-def test_a_robot_program_does_without_what_its_preamble_needs(tmp_path: Path, rig: Rig) -> None:
+def test_a_robot_program_does_without_what_its_preamble_needs(tmp_path: Path, runner: TrialRunner) -> None:
     text = "say('x')\nfrom ev3dev2.sound import Sound\nsay('y')"
     (tmp_path / "robot.py").write_text(text)
     asked = assignment("program", {"avoids": ["import ev3dev2.sound", "import time"]})
-    trial = grade(read_submission(tmp_path, asked=asked.parts), asked, rig=rig).trials[0]
+    trial = grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).trials[0]
     assert [line.text for line in trial.recording.spoken] == ["x"]
     assert trial.recording.faults[0].message == "ModuleNotFoundError: this assignment does without ev3dev2.sound"
 
 
-def test_one_job_after_the_other_has_its_own_modules(tmp_path: Path, rig: Rig) -> None:
+def test_one_job_after_the_other_has_its_own_modules(tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "responder.py").write_text("def f():\n    import sklearn\n    return True\n")
     for rules, marks in (({"avoids": ["import sklearn"]}, 0), ({"uses": ["import sklearn"]}, 1)) * 2:
         asked = assignment("responder", rules)
-        assert grade(read_submission(tmp_path, asked=asked.parts), asked, rig=rig).criteria[1].marks == marks
+        assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks
 
 
-def test_what_staff_are_told_no_student_reads(tmp_path: Path, rig: Rig) -> None:
+def test_what_staff_are_told_no_student_reads(tmp_path: Path, runner: TrialRunner) -> None:
     case = {"avoids": ["eval"], "text": "import gc\ndef f(): return True\n"}
-    result = graded(case, tmp_path, rig)
+    result = graded(case, tmp_path, runner)
     words = "line 1 has gc"
     for staff in (plain_text(result), json_text(result), marks_csv([result]), staff_report(result, {})):
         assert words in staff

@@ -1,4 +1,4 @@
-"""Whole batches in the store: handed in again, superseded, paused, cancelled, retried."""
+"""Whole batches in the store: submitted again, superseded, paused, cancelled, retried."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import func, select
 
-from builders import echo, hand_in
+from builders import echo, grading_request
 from service.store import batch_control, batches, jobs
 from service.store.engine import Store
-from service.store.intake import HandIn, accept_batch, accept_new
+from service.store.intake import GradingRequest, accept_batch, accept_new
+from service.store.lease_reaper import wanting_notices
 from service.store.models import Batch, BatchState, Job, JobState, Lane, Submission
-from service.store.sweep import wanting_nudges
 from sim.errors import UsageError
 
 OTHER = "print('other')\n"
 
 
-def _take(store: Store, *hand_ins: HandIn) -> str:
-    return accept_batch(store, "class", hand_ins, [], max_attempts=2).id
+def _take(store: Store, *grading_requests: GradingRequest) -> str:
+    return accept_batch(store, "class", grading_requests, [], max_attempts=2).id
 
 
 def _die(store: Store) -> str:
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    jobs.bury(store, claim, "the disk is full")
+    jobs.give_up(store, claim, "the disk is full")
     return claim.job_id
 
 
@@ -37,7 +37,7 @@ def _states(store: Store) -> list[tuple[int, JobState]]:
 
 
 def test_the_same_batch_again_changes_nothing(store: Store) -> None:
-    class_ = [hand_in("ada"), hand_in("bob")]
+    class_ = [grading_request("ada"), grading_request("bob")]
     first = accept_new(store, "class", class_, [], max_attempts=2)
     assert first.batch is not None
     assert first.known == ()
@@ -51,12 +51,12 @@ def test_the_same_batch_again_changes_nothing(store: Store) -> None:
 
 @pytest.mark.parametrize(
     "changed",
-    [hand_in("ada", OTHER), hand_in("ada", assignment=replace(echo(), title="Another title"))],
+    [grading_request("ada", OTHER), grading_request("ada", assignment=replace(echo(), title="Another title"))],
     ids=["other bytes", "other version of the assignment"],
 )
-def test_only_what_differs_is_taken_in_and_supersedes(store: Store, changed: HandIn) -> None:
-    accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
-    second = accept_new(store, "class", [changed, hand_in("bob")], [], max_attempts=2)
+def test_only_what_differs_is_taken_in_and_supersedes(store: Store, changed: GradingRequest) -> None:
+    accept_new(store, "class", [grading_request("ada"), grading_request("bob")], [], max_attempts=2)
+    second = accept_new(store, "class", [changed, grading_request("bob")], [], max_attempts=2)
     assert second.batch is not None
     (new,) = second.batch.jobs
     assert (new.student, new.attempt) == ("ada", 2)
@@ -67,38 +67,38 @@ def test_only_what_differs_is_taken_in_and_supersedes(store: Store, changed: Han
     assert reason == f"superseded by {new.job_id}"
 
 
-def test_going_back_to_an_earlier_hand_in_is_a_new_attempt(store: Store) -> None:
+def test_going_back_to_an_earlier_submission_is_a_new_attempt(store: Store) -> None:
     for program in (OTHER, "print('hello')\n", OTHER):
-        accept_new(store, "class", [hand_in("ada", program)], [], max_attempts=2)
+        accept_new(store, "class", [grading_request("ada", program)], [], max_attempts=2)
     assert _states(store) == [(1, JobState.CANCELLED), (2, JobState.CANCELLED), (3, JobState.QUEUED)]
 
 
 def test_what_was_cancelled_comes_in_again(store: Store) -> None:
-    first = accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
+    first = accept_new(store, "class", [grading_request("ada"), grading_request("bob")], [], max_attempts=2)
     assert first.batch is not None
     _die(store)
     batch_control.cancel(store, first.batch.id)
-    again = accept_new(store, "class", [hand_in("ada"), hand_in("bob")], [], max_attempts=2)
+    again = accept_new(store, "class", [grading_request("ada"), grading_request("bob")], [], max_attempts=2)
     assert again.batch is not None
     assert [job.attempt for job in again.batch.jobs] == [2, 2]
 
 
-def test_a_paused_batch_is_neither_claimed_nor_nudged_for(store: Store) -> None:
-    batch = _take(store, hand_in("ada"), hand_in("bob"))
+def test_a_paused_batch_is_neither_claimed_nor_notified_for(store: Store) -> None:
+    batch = _take(store, grading_request("ada"), grading_request("bob"))
     running = jobs.claim(store, "worker", 60)
     assert running is not None
     assert batch_control.pause(store, batch) == batch_control.Controlled(True, 1, 1)
     assert batch_control.pause(store, batch).changed is False
     assert jobs.claim(store, "worker", 60) is None
-    assert Lane.BATCH not in wanting_nudges(store, 60)
+    assert Lane.BATCH not in wanting_notices(store, 60)
     jobs.heartbeat(store, running, 60, 0.5)
     assert batch_control.resume(store, batch) == batch_control.Controlled(True, 1, 1)
-    assert wanting_nudges(store, 60)[Lane.BATCH].stale == 1
+    assert wanting_notices(store, 60)[Lane.BATCH].stale == 1
     assert jobs.claim(store, "worker", 60) is not None
 
 
 def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
-    batch = _take(store, hand_in("ada"), hand_in("bob"), hand_in("eve"))
+    batch = _take(store, grading_request("ada"), grading_request("bob"), grading_request("eve"))
     dead = _die(store)
     running = jobs.claim(store, "worker", 60)
     assert running is not None
@@ -107,7 +107,7 @@ def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
     with pytest.raises(jobs.Fenced, match="cancelled"):
         jobs.heartbeat(store, running, 60, 0.5)
     for change in (batch_control.pause, batch_control.resume, batch_control.retry):
-        with pytest.raises(UsageError, match="was cancelled; hand it in again"):
+        with pytest.raises(UsageError, match="was cancelled; submit it again"):
             change(store, batch)
     assert batch_control.retry(store, None) == batch_control.Retried(0, 0)
     with store.reading() as session:
@@ -117,16 +117,16 @@ def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
 
 
 def test_cancelling_what_has_ended_changes_nothing(store: Store) -> None:
-    batch = _take(store, hand_in("ada"))
+    batch = _take(store, grading_request("ada"))
     _die(store)
     assert batch_control.cancel(store, batch).changed is False
     assert batch_control.retry(store, batch) == batch_control.Retried(1, 0)
 
 
 def test_the_dead_are_tried_again_with_all_their_attempts_but_not_the_outdated(store: Store) -> None:
-    batch = _take(store, hand_in("ada"), hand_in("bob"))
+    batch = _take(store, grading_request("ada"), grading_request("bob"))
     dead = {_die(store), _die(store)}
-    other = _take(store, hand_in("bob", OTHER))
+    other = _take(store, grading_request("bob", OTHER))
     _die(store)
     assert batch_control.retry(store, batch) == batch_control.Retried(1, 1)
     assert batch_control.retry(store, None) == batch_control.Retried(1, 1)

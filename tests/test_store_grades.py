@@ -16,7 +16,7 @@ from service.grading.grade import Grade
 from service.store import artifacts, grades, jobs
 from service.store.columns import storable
 from service.store.engine import Store
-from service.store.intake import load_hand_in
+from service.store.intake import load_grading_request
 from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, Submission
 from sim.errors import HostError, UsageError
 from sim.recording import Line
@@ -106,7 +106,7 @@ def test_a_flood_of_pictures_is_cut_and_the_marks_stay(store: Store, monkeypatch
 def test_what_a_worker_needs_is_all_in_the_database(store: Store) -> None:
     accepted = accept_one(store, "Zoë 🤖")
     with store.reading() as session:
-        back = load_hand_in(session, accepted.job_id)
+        back = load_grading_request(session, accepted.job_id)
     assert back.submission.student == "Zoë 🤖"
     assert back.submission.program is not None
     assert "print('hello')" in back.submission.program.text

@@ -12,15 +12,15 @@ import pytest
 from sqlalchemy import func, select, update
 
 import report_builders
-from builders import accept_one, hand_in, settings_in
+from builders import accept_one, grading_request, settings_in
 from service.settings import Settings
 from service.store import batches, grades, jobs
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.jobs import Claim, Fenced, Retry
+from service.store.lease_reaper import note_notices, requeue_lost, wanting_notices
 from service.store.models import Batch, BatchState, CriterionRow, Job, JobState, Lane, PlotState, Submission, TrialRow
-from service.store.sweep import note_nudges, take_back_lost, wanting_nudges
-from service.store.turns import BATCH_EVERY
+from service.store.scheduling import BATCH_EVERY
 
 NO_WAIT = Retry(0.0)
 
@@ -77,13 +77,13 @@ def test_a_stale_worker_can_change_nothing(store: Store) -> None:
     job_id = accept_one(store).job_id
     stale = _claim(store, "stale")
     _lapse(store, job_id)
-    assert take_back_lost(store, NO_WAIT) == 1
+    assert requeue_lost(store, NO_WAIT) == 1
     fresh = _claim(store, "fresh")
     for change in (
         lambda: jobs.heartbeat(store, stale, 60, 0.5),
         lambda: _finish(store, stale),
         lambda: jobs.fail(store, stale, "late", NO_WAIT),
-        lambda: jobs.bury(store, stale, "late"),
+        lambda: jobs.give_up(store, stale, "late"),
     ):
         with pytest.raises(Fenced):
             change()
@@ -122,7 +122,7 @@ def test_a_heartbeat_keeps_the_lease_and_tells_the_progress(store: Store) -> Non
     claim = _claim(store)
     _lapse(store, job_id)
     jobs.heartbeat(store, claim, 60, 0.25)
-    assert take_back_lost(store, NO_WAIT) == 0
+    assert requeue_lost(store, NO_WAIT) == 0
     assert _job(store, job_id).progress == 0.25
 
 
@@ -149,11 +149,11 @@ def test_lost_workers_cost_attempts_and_end_with_a_reason(store: Store) -> None:
     for worker in ("one", "two"):
         _claim(store, worker)
         _lapse(store, job_id)
-        assert take_back_lost(store, NO_WAIT) == 1
+        assert requeue_lost(store, NO_WAIT) == 1
     job = _job(store, job_id)
     assert job.state is JobState.DEAD
     assert "the worker two fell silent" in (job.error or "")
-    assert take_back_lost(store, NO_WAIT) == 0
+    assert requeue_lost(store, NO_WAIT) == 0
 
 
 def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
@@ -179,7 +179,7 @@ def test_a_cancelled_job_stops_its_worker(store: Store) -> None:
     assert jobs.cancel(store, [running, queued]) == 0
 
 
-def test_the_newest_hand_in_supersedes_one_that_waits_not_one_that_runs(store: Store) -> None:
+def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store: Store) -> None:
     first = accept_one(store).job_id
     claim = _claim(store)
     second, third = accept_one(store).job_id, accept_one(store).job_id
@@ -192,8 +192,8 @@ def test_the_newest_hand_in_supersedes_one_that_waits_not_one_that_runs(store: S
 
 
 def _batch(store: Store, name: str, count: int) -> str:
-    hand_ins = [hand_in(f"{name}-{number}") for number in range(count)]
-    return accept_batch(store, name, hand_ins, [("odd.txt", "is odd.")], max_attempts=3).id
+    grading_requests = [grading_request(f"{name}-{number}") for number in range(count)]
+    return accept_batch(store, name, grading_requests, [("odd.txt", "is odd.")], max_attempts=3).id
 
 
 def _served(store: Store, count: int) -> list[str | None]:
@@ -255,14 +255,14 @@ def test_a_batch_knows_how_far_it_is(store: Store) -> None:
     assert sum(line.ended for line in lines) == 1
 
 
-def test_nudges_are_wanting_until_they_are_noted(store: Store) -> None:
+def test_notices_are_wanting_until_they_are_noted(store: Store) -> None:
     _batch(store, "batch", 3)
-    assert (wanting_nudges(store, 60)[Lane.BATCH].due, wanting_nudges(store, 60)[Lane.BATCH].stale) == (3, 3)
-    note_nudges(store, Lane.BATCH, 2)
-    assert (wanting_nudges(store, 60)[Lane.BATCH].due, wanting_nudges(store, 60)[Lane.BATCH].stale) == (3, 1)
-    assert wanting_nudges(store, 0)[Lane.BATCH].stale == 3
+    assert (wanting_notices(store, 60)[Lane.BATCH].due, wanting_notices(store, 60)[Lane.BATCH].stale) == (3, 3)
+    note_notices(store, Lane.BATCH, 2)
+    assert (wanting_notices(store, 60)[Lane.BATCH].due, wanting_notices(store, 60)[Lane.BATCH].stale) == (3, 1)
+    assert wanting_notices(store, 0)[Lane.BATCH].stale == 3
     _claim(store)
-    assert wanting_nudges(store, 60)[Lane.BATCH].due == 2
+    assert wanting_notices(store, 60)[Lane.BATCH].due == 2
 
 
 def test_plots_are_tried_a_few_times(store: Store) -> None:
@@ -282,7 +282,7 @@ def _race(settings: Settings, number: int, counts: Any) -> None:
     with open_store(settings) as store:
         while (claim := jobs.claim(store, f"racer-{number}", 60)) is not None:
             claimed.append(claim.job_id)
-            jobs.bury(store, claim, "raced")
+            jobs.give_up(store, claim, "raced")
     counts.put(claimed)
 
 

@@ -70,7 +70,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             assert len(graded.trials[0].recording.ticks) > 10
             assert bob.student == "Bob 🤖"
             assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
-            assert intake.load_hand_in(session, ada.id).submission.program is not None
+            assert intake.load_grading_request(session, ada.id).submission.program is not None
         with store.engine.begin() as connection:
             command.check(configuration(connection))
         # What waited is graded by the new release, and what comes in is numbered on.
@@ -88,7 +88,7 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
     engine.dispose()
     with open_store(service_settings) as store, store.reading() as session:
         reasons = session.scalars(select(Job.error).where(Job.state == JobState.CANCELLED)).all()
-    assert reasons == ["superseded by a newer hand-in"]
+    assert reasons == ["superseded by a newer submission"]
 
 
 @pytest.mark.parametrize("revision", ["0002", "0001", "base"])

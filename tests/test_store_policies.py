@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import select
 
 import report_builders
-from builders import hand_in
+from builders import grading_request
 from service.store import batches, grades, jobs, policies, regrades
 from service.store.engine import Store, now
 from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
@@ -36,8 +36,8 @@ def _extend(store: Store, student: str, due_at: datetime | None = None, more: in
         )
 
 
-def _hand_in(store: Store, program: int, at: datetime | None = None, student: str = "ada") -> Accepted:
-    taken = replace(hand_in(student, f"print({program})\n"), handed_in_at=at)
+def _request(store: Store, program: int, at: datetime | None = None, student: str = "ada") -> Accepted:
+    taken = replace(grading_request(student, f"print({program})\n"), submitted_at=at)
     batch = accept_new(store, "class", [taken], [], max_attempts=3).batch
     assert batch is not None
     return batch.jobs[0]
@@ -54,36 +54,36 @@ def _grade_all(store: Store, verdict: Verdict | None = None) -> None:
 
 def test_without_a_policy_everything_counts(store: Store) -> None:
     for number in range(5):
-        assert _hand_in(store, number, DUE + number * DAY).staff_only == ""
+        assert _request(store, number, DUE + number * DAY).staff_only == ""
         _grade_all(store)
 
 
-def test_attempts_are_different_hand_ins_that_were_graded(store: Store) -> None:
+def test_attempts_are_different_submissions_that_were_graded(store: Store) -> None:
     _set(store, Limits(attempts=2))
     # Superseded before it began, a fault of the assignment's or of ours, the same again: none is an attempt.
-    assert _hand_in(store, 1).staff_only == ""
-    assert _hand_in(store, 2).staff_only == ""
+    assert _request(store, 1).staff_only == ""
+    assert _request(store, 2).staff_only == ""
     _grade_all(store, Verdict.ASSIGNMENT_ERROR)
-    assert _hand_in(store, 3).staff_only == ""
+    assert _request(store, 3).staff_only == ""
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    jobs.bury(store, claim, "the disk is full")
-    assert _hand_in(store, 4).staff_only == ""
+    jobs.give_up(store, claim, "the disk is full")
+    assert _request(store, 4).staff_only == ""
     _grade_all(store)
-    assert _hand_in(store, 5).staff_only == ""
+    assert _request(store, 5).staff_only == ""
     _grade_all(store)
-    over = _hand_in(store, 6)
+    over = _request(store, 6)
     assert over.staff_only == "attempt 3, allowed: 2"
-    assert _hand_in(store, 4).staff_only == ""
-    assert _hand_in(store, 1, student="bob").staff_only == ""
+    assert _request(store, 4).staff_only == ""
+    assert _request(store, 1, student="bob").staff_only == ""
 
 
 def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: Store) -> None:
     _set(store, Limits(attempts=1))
-    first = _hand_in(store, 1)
+    first = _request(store, 1)
     _grade_all(store)
-    over = _hand_in(store, 2)
-    assert _hand_in(store, 3).staff_only
+    over = _request(store, 2)
+    assert _request(store, 3).staff_only
     with store.reading() as session:
         job = session.get_one(Job, over.job_id)
         assert (job.state, job.lane) == (JobState.QUEUED, Lane.BATCH)
@@ -109,7 +109,7 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
 )
 def test_late_days(store: Store, after: timedelta, days_late: int, over: str) -> None:
     _set(store, Limits(DUE, late_days=2))
-    accepted = _hand_in(store, 1, DUE + after)
+    accepted = _request(store, 1, DUE + after)
     with store.reading() as session:
         assert session.scalars(select(Submission.days_late)).one() == days_late
     assert accepted.staff_only == over
@@ -117,28 +117,28 @@ def test_late_days(store: Store, after: timedelta, days_late: int, over: str) ->
 
 def test_a_moment_that_nobody_knows_is_in_time_and_staff_may_always(store: Store) -> None:
     _set(store, Limits(DUE - 10_000 * DAY, attempts=1))
-    assert _hand_in(store, 1).staff_only == ""
+    assert _request(store, 1).staff_only == ""
     _grade_all(store)
-    batch = accept_batch(store, "class", [hand_in("ada", "print(2)\n")], [], max_attempts=3)
+    batch = accept_batch(store, "class", [grading_request("ada", "print(2)\n")], [], max_attempts=3)
     assert batch.jobs[0].staff_only == ""
 
 
 def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
     _set(store, Limits(cool_down_seconds=600))
-    assert _hand_in(store, 1, DUE).staff_only == ""
+    assert _request(store, 1, DUE).staff_only == ""
     _grade_all(store)
-    over = _hand_in(store, 2, DUE + timedelta(minutes=9))
-    assert over.staff_only == "handed in 9 min after the one before, asked for: 10 min"
+    over = _request(store, 2, DUE + timedelta(minutes=9))
+    assert over.staff_only == "submitted 9 min after the one before, asked for: 10 min"
     # What was over does not itself count.
-    assert _hand_in(store, 3, DUE + timedelta(minutes=10)).staff_only == ""
+    assert _request(store, 3, DUE + timedelta(minutes=10)).staff_only == ""
 
 
-def test_what_a_person_hands_in_is_handed_in_now(store: Store) -> None:
+def test_what_a_person_submits_is_submitted_now(store: Store) -> None:
     _set(store, Limits(datetime.now(UTC) - DAY, late_days=2, cool_down_seconds=3600))
-    first = accept(store, hand_in("ada", "print(1)\n"), max_attempts=3)
+    first = accept(store, grading_request("ada", "print(1)\n"), max_attempts=3)
     assert first.staff_only == ""
     _grade_all(store)
-    assert "0 min after" in accept(store, hand_in("ada", "print(2)\n"), max_attempts=3).staff_only
+    assert "0 min after" in accept(store, grading_request("ada", "print(2)\n"), max_attempts=3).staff_only
     with store.reading() as session:
         assert session.scalars(select(Submission.days_late)).all() == [2, 2]
 
@@ -147,22 +147,22 @@ def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store)
     _set(store, Limits(DUE, attempts=1))
     _set(store, Limits(DUE + DAY, attempts=1), "echo-responder")
     _extend(store, "ada", DUE + 3 * DAY, more=1)
-    assert _hand_in(store, 1, DUE + DAY).staff_only == ""
+    assert _request(store, 1, DUE + DAY).staff_only == ""
     _grade_all(store)
-    assert _hand_in(store, 2, DUE + 3 * DAY).staff_only == ""
+    assert _request(store, 2, DUE + 3 * DAY).staff_only == ""
     _grade_all(store)
-    assert "attempt 3" in _hand_in(store, 3, DUE).staff_only
-    assert "late" in _hand_in(store, 1, DUE + 2 * DAY, "bob").staff_only
+    assert "attempt 3" in _request(store, 3, DUE).staff_only
+    assert "late" in _request(store, 1, DUE + 2 * DAY, "bob").staff_only
     _extend(store, "cid", DUE + 5 * DAY)
     _extend(store, "cid", DUE - DAY, assignment="echo-responder")
     # An extension never takes away what all have.
-    assert _hand_in(store, 1, DUE + DAY, "cid").staff_only == ""
-    assert "late" in _hand_in(store, 2, DUE + 4 * DAY, "cid").staff_only
+    assert _request(store, 1, DUE + DAY, "cid").staff_only == ""
+    assert "late" in _request(store, 2, DUE + 4 * DAY, "cid").staff_only
 
 
-def test_what_is_hidden_opens_when_nobody_can_hand_in_any_more_or_when_published(store: Store) -> None:
+def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_published(store: Store) -> None:
     _set(store, Limits(datetime.now(UTC) - DAY, late_days=0))
-    job_id = _hand_in(store, 1).job_id
+    job_id = _request(store, 1).job_id
     _grade_all(store)
 
     def released() -> frozenset[str]:

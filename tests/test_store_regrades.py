@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import select, update
 
 import report_builders
-from builders import echo, hand_in
+from builders import echo, grading_request
 from service.grading.grade import Grade
 from service.store import audit, batch_control, batches, grades, jobs, regrades
 from service.store.engine import Store
@@ -34,7 +34,7 @@ def _other_run(grade: Grade) -> Grade:
 
 
 def _batch(store: Store, *students: str) -> str:
-    return accept_batch(store, "class", [hand_in(name) for name in students], [], max_attempts=3).id
+    return accept_batch(store, "class", [grading_request(name) for name in students], [], max_attempts=3).id
 
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
@@ -149,14 +149,14 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
     batch = _batch(store, "ada", "bob", "cid")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    with pytest.raises(UsageError, match="nothing to grade again: 3 of its hand-ins are not graded yet"):
+    with pytest.raises(UsageError, match="nothing to grade again: 3 of its submissions are not graded yet"):
         regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
-    jobs.bury(store, claim, "no program")
+    jobs.give_up(store, claim, "no program")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     jobs.finish(store, claim, grades.prepare(GRADE), datetime.now(UTC))
     other = replace(echo(), id="other")
-    with pytest.raises(UsageError, match="has no hand-in for other, only for echo-responder"):
+    with pytest.raises(UsageError, match="has no submission for other, only for echo-responder"):
         regrades.regrade(store, batch, other, max_attempts=3, actor="staff")
     made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
     assert (made.jobs, made.other_assignment, made.unfinished) == (2, 0, 1)
@@ -168,18 +168,18 @@ def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
     batch = _batch(store, "ada")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    jobs.bury(store, claim, "no program")
+    jobs.give_up(store, claim, "no program")
     (change,) = _changes(store, _regrade(store, batch, changed=True))
     assert (change.before, change.after) == (None, GRADE.marks)
     assert "had no grade" in change.reason
     assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0)
 
 
-def test_a_newer_hand_in_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
+def test_a_newer_submission_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
     made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
-    accept_new(store, "late", [hand_in("ada", "print('other')\n")], [], max_attempts=3)
+    accept_new(store, "late", [grading_request("ada", "print('other')\n")], [], max_attempts=3)
     with store.reading() as session:
         assert session.scalars(select(Job.state).where(Job.batch_id == made.batch_id)).all() == [JobState.QUEUED]
 
@@ -189,11 +189,11 @@ def test_the_same_batch_again_after_a_regrade_changes_nothing_and_points_at_a_ch
     _grade_all(store)
     _regrade(store, batch, changed=True)
     for assignment in (echo(), CHANGED):
-        again = accept_new(store, "class", [hand_in("ada", assignment=assignment)], [], max_attempts=3)
+        again = accept_new(store, "class", [grading_request("ada", assignment=assignment)], [], max_attempts=3)
         assert (again.batch, again.known[0].other_grader) == (None, False)
     with store.transaction() as session:
         session.execute(update(Job).values(grader_sha256="f" * 64))
-    assert accept_new(store, "class", [hand_in("ada")], [], max_attempts=3).known[0].other_grader
+    assert accept_new(store, "class", [grading_request("ada")], [], max_attempts=3).known[0].other_grader
 
 
 def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: Store) -> None:

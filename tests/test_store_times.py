@@ -10,20 +10,20 @@ from sqlalchemy import update
 import report_builders
 from builders import accept_one
 from service.queue.celery_app import make_celery
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import figures, grades, jobs, phases, presence
+from service.store import grades, jobs, metrics, phases, workers
 from service.store.engine import Store
 from service.store.jobs import Retry
-from service.store.models import Job, JobState, Lane, Presence
-from service.store.sweep import take_back_lost, wanting_nudges
+from service.store.lease_reaper import requeue_lost, wanting_notices
+from service.store.models import Heartbeat, Job, JobState, Lane
 
 HOUR = timedelta(hours=1)
 NO_WAIT = Retry(0.0)
 
 
-def _worker(name: str) -> presence.Worker:
-    return presence.Worker(name, "here", 1, "1", "walls")
+def _worker(name: str) -> workers.WorkerDescription:
+    return workers.WorkerDescription(name, "here", 1, "1", "sandbox")
 
 
 def _change(store: Store, table: Any, **values: Any) -> None:
@@ -38,18 +38,18 @@ def _job(store: Store, job_id: str) -> Job:
 
 def test_a_job_that_failed_goes_to_another_worker_where_there_is_one(store: Store) -> None:
     accept_one(store)
-    presence.tell(store, _worker("first"))
+    workers.beat(store, _worker("first"))
     failed = jobs.claim(store, "first", 60)
     assert failed is not None
     jobs.fail(store, failed, "it broke", NO_WAIT)
-    presence.tell(store, _worker("second"))
+    workers.beat(store, _worker("second"))
     assert jobs.claim(store, "first", 60) is None
     claim = jobs.claim(store, "second", 60)
     assert claim is not None
     assert claim.attempt == 2
     jobs.fail(store, claim, "it broke again", NO_WAIT)
     # The other one was not heard of for long, so that the same one is better than none.
-    _change(store, Presence, seen_at=datetime.now(UTC) - HOUR)
+    _change(store, Heartbeat, seen_at=datetime.now(UTC) - HOUR)
     assert jobs.claim(store, "second", 60) is not None
 
 
@@ -60,16 +60,16 @@ def test_a_clock_that_is_set_back_holds_nothing_up(store: Store) -> None:
     assert claim is not None
     assert claim.job_id == waits
     ahead = datetime.now(UTC) + HOUR
-    _change(store, Job, due_at=ahead, nudged_at=ahead)
+    _change(store, Job, due_at=ahead, notified_at=ahead)
     with store.transaction() as session:
         later = {"heartbeat_at": ahead, "lease_until": ahead + timedelta(seconds=60)}
         session.execute(update(Job).where(Job.id == waits).values(**later))
     for _ in range(2):
-        assert take_back_lost(store, NO_WAIT) == 0
+        assert requeue_lost(store, NO_WAIT) == 0
     held = _job(store, waits)
     assert held.lease_until is not None
     assert timedelta(seconds=50) < held.lease_until - datetime.now(UTC) <= timedelta(seconds=60)
-    assert wanting_nudges(store, 3600)[Lane.INTERACTIVE].stale == 1
+    assert wanting_notices(store, 3600)[Lane.INTERACTIVE].stale == 1
     other = jobs.claim(store, "worker", 60)
     assert other is not None
     assert other.job_id == begun
@@ -87,11 +87,11 @@ def test_the_times_of_a_grade_are_kept_and_told(store: Store) -> None:
     told = phases.durations(job.phases)
     assert (told["trials"], told["judging"]) == (timedelta(seconds=2), timedelta(seconds=1))
     with store.reading() as session:
-        assert figures.look(session).times["trials"] == [2.0]
+        assert metrics.collect(session).times["trials"] == [2.0]
 
 
-def test_a_nudge_that_could_not_be_given_is_not_remembered_as_given(store: Store, service_settings: Settings) -> None:
+def test_a_notice_that_could_not_be_given_is_not_remembered_as_given(store: Store, service_settings: Settings) -> None:
     job_id = accept_one(store).job_id
     away = service_settings.with_broker(f"redis+socket://{service_settings.home / 'nothing.sock'}")
-    Nudger(make_celery(away), store, away).grade(Lane.INTERACTIVE)
-    assert _job(store, job_id).nudged_at is None
+    Notifier(make_celery(away), store, away).grade(Lane.INTERACTIVE)
+    assert _job(store, job_id).notified_at is None

@@ -1,4 +1,4 @@
-"""Models that hand-ins bring: good ones are marked, bad ones get a verdict and a sentence and touch nothing."""
+"""Models that submissions bring: good ones are marked, bad ones get a verdict and a sentence and touch nothing."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from model_handins_maker import FOLDER, TRACE, hand_ins
+from model_submissions_maker import FOLDER, TRACE, grading_requests
 from models import weights_bytes
 from models.networks import read
 from running import run_program
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment_file import find_assignment
@@ -40,17 +40,17 @@ ASK_ONCE = 'import time\nprint("PY::now")\ntime.sleep(1)\n'
 LOAD = 'import joblib\nnetwork = joblib.load("model.joblib")\ndef responder(text): return str(network)\n'
 
 
-def graded(folder: Path, rig: Rig) -> Grade:
+def graded(folder: Path, runner: TrialRunner) -> Grade:
     asked = find_assignment(str(FOLDER))
-    return grade(read_submission(folder, asked=asked.parts), asked, rig=rig)
+    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
-def test_a_model_gets_marks_or_a_sentence(name: str, rig: Rig) -> None:
+def test_a_model_gets_marks_or_a_sentence(name: str, runner: TrialRunner) -> None:
     wanted = EXPECTED[name]
     if importlib.util.find_spec(wanted.get("needs", "numpy")) is None:
         pytest.skip(f"{wanted['needs']} is not installed")
-    result = graded(FOLDER / name, rig)
+    result = graded(FOLDER / name, runner)
     told = "\n".join(criterion.message for criterion in result.criteria)
     assert (str(result.verdict), result.marks) == (wanted["verdict"], Decimal(wanted["marks"])), told
     for phrase in wanted["feedback"]:
@@ -61,26 +61,26 @@ def test_a_model_gets_marks_or_a_sentence(name: str, rig: Rig) -> None:
     assert not Path(TRACE).exists()
 
 
-def test_every_hand_in_with_a_model_has_an_expectation() -> None:
+def test_every_submission_with_a_model_has_an_expectation() -> None:
     assert {path.name for path in FOLDER.iterdir() if path.is_dir()} == set(EXPECTED)
 
 
 @pytest.mark.skipif(ONNX, reason="onnxruntime is installed")
-def test_without_onnxruntime_the_sentence_says_what_to_use_instead(rig: Rig) -> None:
-    result = graded(FOLDER / "convolution", rig)
+def test_without_onnxruntime_the_sentence_says_what_to_use_instead(runner: TrialRunner) -> None:
+    result = graded(FOLDER / "convolution", runner)
     assert result.verdict is Verdict.RESPONDER_ERROR
     assert "use a scikit-learn network or plain weights (.npz) (line 9)" in result.criteria[0].message
 
 
 @pytest.mark.skipif(not ONNX, reason="onnxruntime is not installed")
-def test_a_session_of_the_students_own_has_one_thread(rig: Rig) -> None:
+def test_a_session_of_the_students_own_has_one_thread(runner: TrialRunner) -> None:
     text = (
         "import onnxruntime, numpy\noptions = onnxruntime.SessionOptions()\noptions.intra_op_num_threads = 4\n"
         'session = onnxruntime.InferenceSession("shapes.onnx", options)\n'
         'def responder(text): return str(session.run(None, {"image": numpy.ones((1, 1, 14, 14), "f4")})[0].shape)\n'
     )
     files = {"shapes.onnx": (FOLDER / "convolution" / "shapes.onnx").read_bytes()}
-    recording = run_program(rig, ASK_ONCE, responder=text, files=files, preamble="none")
+    recording = run_program(runner, ASK_ONCE, responder=text, files=files, preamble="none")
     assert recording.verdict is Verdict.FINISHED, recording.faults
     assert recording.messages[-1].text == "(1, 6)"
 
@@ -96,7 +96,7 @@ class Calls:
 
 
 @pytest.mark.parametrize("deed", ["writes a file", "reads a file", "deletes a file", "ends its parent", "connects"])
-def test_a_hostile_pickle_touches_nothing_outside(deed: str, rig: Rig, tmp_path: Path) -> None:
+def test_a_hostile_pickle_touches_nothing_outside(deed: str, runner: TrialRunner, tmp_path: Path) -> None:
     victim = tmp_path / "victim.txt"
     victim.write_text("secret")
     with socket.create_server(("127.0.0.1", 0)) as listening:
@@ -109,7 +109,7 @@ def test_a_hostile_pickle_touches_nothing_outside(deed: str, rig: Rig, tmp_path:
             "connects": Calls(socket.create_connection, listening.getsockname()),
         }
         files = {"model.joblib": pickle.dumps(calls[deed])}
-        recording = run_program(rig, ASK_ONCE, responder=LOAD, files=files, preamble="none")
+        recording = run_program(runner, ASK_ONCE, responder=LOAD, files=files, preamble="none")
         with pytest.raises(TimeoutError):
             listening.accept()
     assert recording.verdict is Verdict.RESPONDER_ERROR
@@ -129,10 +129,10 @@ def test_a_model_of_more_than_16_mb_is_refused_by_name(tmp_path: Path) -> None:
         read_submission(tmp_path, asked=asked.parts)
 
 
-def test_large_models_that_may_be_handed_in_can_be_used(rig: Rig) -> None:
+def test_large_models_that_may_be_submitted_can_be_used(runner: TrialRunner) -> None:
     files = {f"{name}.joblib": bytes(11 << 20) for name in ("first", "second")}
     text = 'size = len(open("second.joblib", "rb").read())\ndef responder(text): return str(size)\n'
-    recording = run_program(rig, ASK_ONCE, responder=text, files=files, preamble="none")
+    recording = run_program(runner, ASK_ONCE, responder=text, files=files, preamble="none")
     assert recording.verdict is Verdict.FINISHED, recording.faults
     assert recording.messages[-1].text == str(11 << 20)
 
@@ -205,5 +205,5 @@ def test_plain_weights_answer_as_the_network_that_they_come_from(
 
 
 def test_the_responders_are_what_their_maker_makes() -> None:
-    for name, files in hand_ins().items():
+    for name, files in grading_requests().items():
         assert (FOLDER / name / "responder.py").read_bytes() == files["responder.py"], name

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from service.grading.grade import Level
 from service.grading.grader import grade
 from service.grading.judging.sweeps import area, part_above, range_above
-from service.grading.rig import Rig
-from service.store.plain import from_plain, to_plain
+from service.grading.trial_runner import TrialRunner
+from service.store.codec import decode, encode
 from sim.recording import Pose
 from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
 from submissions.assignment_file import find_assignment, read_assignment
@@ -104,7 +104,7 @@ def test_shuffled_poses_come_once_each_and_jitter_stays_within_its_bounds() -> N
 
 def test_a_stored_assignment_keeps_its_sweep() -> None:
     asked = find_assignment("shapes-off-centre")
-    back = from_plain(Assignment, to_plain(asked))
+    back = decode(Assignment, encode(asked))
     assert list(back.trials()) == list(asked.trials())
     assert back.criteria == asked.criteria
 
@@ -170,7 +170,7 @@ def test_a_better_level_never_costs_marks(pairs: list[tuple[int, int]], data: st
     assert 0 <= part_above(before, level) <= part_above(after, level) <= 1
 
 
-def test_delay_loss_and_offset_are_felt(rig: Rig) -> None:
+def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
     """Two pictures over a square, a second apart, count as one; the answer \"square\" comes 0.2 s after each."""
     sweep = Sweep(offset_x=(0, 80), loss=(0, 1), delay=(0.1, 0.9, 3))
     base = {"marks": Decimal(6), "late": "wrong", "check": "robustness"}
@@ -184,7 +184,7 @@ def test_delay_loss_and_offset_are_felt(rig: Rig) -> None:
     )
     asked = assignment(Scenario("s", POSES[:1], sweep=sweep, seconds=5), *wanted)
     submission = Submission("s", Source("robot.py", SENDS_TWO), Source("responder.py", SAYS_SQUARE))
-    result = grade(submission, asked, rig=rig)
+    result = grade(submission, asked, runner=runner)
     curves = {
         found.id: [(level.at, level.right, level.n) for level in found.curves[0].levels] for found in result.criteria
     }
@@ -196,17 +196,17 @@ def test_delay_loss_and_offset_are_felt(rig: Rig) -> None:
     assert [found.marks for found in result.criteria] == [3, 3, 0]
     assert "By message delay (s): 1.00 at 0.1, 0.00 at 0.9, 0.00 at 3." in result.criteria[2].message
     assert "2 answered, 4 late" in result.criteria[2].message
-    again = grade(submission, asked, rig=rig)
+    again = grade(submission, asked, runner=runner)
     assert [t.recording.sha256 for t in again.trials] == [t.recording.sha256 for t in result.trials]
 
 
-def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(rig: Rig) -> None:
+def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(runner: TrialRunner) -> None:
     """What the catalogue's cheats get on the course's own floor, with its patches, against the shuffled one."""
     forbidding = find_assignment("shapes-on-the-move")
     allowing = replace(forbidding, world=replace(forbidding.world, background="Simple_Shapes", labels=True, sheet=0))
     got = {}
     for name in ("by-the-way-driven", "counts-the-messages", "echoes-the-patch"):
         submission = read_submission(examples("shapes-on-the-move") / name, asked=forbidding.parts)
-        results = [grade(submission, asked, rig=rig).criteria for asked in (allowing, forbidding)]
+        results = [grade(submission, asked, runner=runner).criteria for asked in (allowing, forbidding)]
         got[name] = [next(found.marks for found in criteria if found.id == "shapes") for criteria in results]
     assert got == {"by-the-way-driven": [9, 0], "counts-the-messages": [9, 0], "echoes-the-patch": [9, 0]}

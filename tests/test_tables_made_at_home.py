@@ -1,6 +1,6 @@
 """A table made at home with the same tool is worth nothing where marks are given: the worlds and the chance are others.
 
-Each attack is a hand-in that looks up what a spy wrote down in other installations' worlds. That it works at all is
+Each attack is a submission that looks up what a spy wrote down in other installations' worlds. That it works at all is
 shown where it has to: in the worlds that it was made in.
 """
 
@@ -19,8 +19,8 @@ import pytest
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.patches import grey_picture
-from service.grading.rig import Rig
+from service.grading.judging.label_patches import grey_picture
+from service.grading.trial_runner import TrialRunner
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment
 from submissions.example_folder import examples
@@ -89,7 +89,7 @@ def responder(text):
 Table = dict[str, dict[str, str]]
 
 
-def hand_in(program: str, table: Mapping[str, Mapping[str, str]], name: str) -> Submission:
+def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: str) -> Submission:
     packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
     # numpy is not there for robot programs.
     own = TELLTALE.replace("import numpy\n", "").replace('"numpy": float(numpy.random.random()), ', "")
@@ -137,33 +137,36 @@ _LONG = [pytest.param(name, marks=pytest.mark.long) if name == "shapes-on-the-mo
 
 
 @pytest.mark.parametrize("name", _LONG)
-def test_a_table_made_at_home_earns_nothing(rig: Rig, name: str) -> None:
+def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> None:
     asked, program = marked(name), ATTACKED[name]
     offered = sum(criterion.marks for criterion in asked.criteria)
     assert offered >= 8
-    at_home = [grade(hand_in(program, {}, "spy"), asked, secret=home, rig=rig) for home in HOMES]
+    at_home = [grade(grading_request(program, {}, "spy"), asked, secret=home, runner=runner) for home in HOMES]
     table = table_of(at_home)
     assert len(table["picture"]) >= 20
 
-    # Where it was made, the pictures tell everything. So would the chance, if it did not differ by hand-in.
-    seen = hand_in(program, {"picture": table["picture"]}, "table of pictures")
-    assert grade(seen, asked, secret=HOMES[1], rig=rig).marks == offered
+    # Where it was made, the pictures tell everything. So would the chance, if it did not differ by submission.
+    seen = grading_request(program, {"picture": table["picture"]}, "table of pictures")
+    assert grade(seen, asked, secret=HOMES[1], runner=runner).marks == offered
     chances = {kind: entries for kind, entries in table.items() if kind != "picture" and "place" not in kind}
     chances.pop("its step", None)
     assert len(chances) == 13
-    by_chance = hand_in(program, chances, "table of chance")
-    assert grade(by_chance, asked, secret=HOMES[1], rig=rig).marks == 0
+    by_chance = grading_request(program, chances, "table of chance")
+    assert grade(by_chance, asked, secret=HOMES[1], runner=runner).marks == 0
 
     # Where marks are given, no picture and no chance is met again.
     everything = grade(
-        hand_in(program, {**chances, "picture": table["picture"]}, "both"), asked, secret=MARKING, rig=rig
+        grading_request(program, {**chances, "picture": table["picture"]}, "both"), asked, secret=MARKING, runner=runner
     )
     hits = [kind for keys, _ in looked_up(everything) for kind, key in keys.items() if key in table[kind]]
     assert {kind for kind in hits if "place" not in kind and kind != "its step"} == set()
     assert everything.marks == 0
     # A place tells no more than a guess does.
     places = {kind: entries for kind, entries in table.items() if kind in ("its place", "its step")}
-    assert grade(hand_in(program, places, "table of places"), asked, secret=MARKING, rig=rig).marks <= offered / 3
+    assert (
+        grade(grading_request(program, places, "table of places"), asked, secret=MARKING, runner=runner).marks
+        <= offered / 3
+    )
 
 
 TRAINS = """
@@ -180,17 +183,17 @@ def train(images, labels):
 """
 
 
-def test_a_table_made_at_home_is_no_model(rig: Rig) -> None:
+def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
     asked = find_assignment("train-a-recogniser")
     marking = tuple(criterion for criterion in asked.criteria if criterion.marks)
     asked = replace(asked, criteria=marking)
     table = {}
-    for trial in grade(_model({}), asked, secret=HOMES[1], rig=rig).trials:
+    for trial in grade(_model({}), asked, secret=HOMES[1], runner=runner).trials:
         for image in trial.recording.images:
             row = grey_picture(image, focus=True).astype(float).ravel()
             table[str(np.round(row / max(1.0, row.max()) * 255).astype(int).tolist())] = str(image.truth)
-    assert grade(_model(table), asked, secret=HOMES[1], rig=rig).marks == asked.max_marks
-    assert grade(_model(table), asked, secret=MARKING, rig=rig).marks == 0
+    assert grade(_model(table), asked, secret=HOMES[1], runner=runner).marks == asked.max_marks
+    assert grade(_model(table), asked, secret=MARKING, runner=runner).marks == 0
 
 
 def _model(table: Mapping[str, str]) -> Submission:
@@ -233,8 +236,8 @@ def submission(comment: str) -> Submission:
 
 
 def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignment) -> None:
-    with Rig() as rig:
-        one, other = (grade(submission(text), noisy, secret=MARKING, rig=rig) for text in ("one", "other"))
+    with TrialRunner() as runner:
+        one, other = (grade(submission(text), noisy, secret=MARKING, runner=runner) for text in ("one", "other"))
     assert [trial.seed for trial in one.trials] == [trial.seed for trial in other.trials]
     assert _numbers(one) != _numbers(other)
     shown = len([trial for trial in one.trials if trial.visibility == "visible"])
@@ -245,19 +248,22 @@ def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignme
     assert len(spoken) == 2 * len(_said(one)) * len(_said(one)[0])
 
 
-def test_the_same_submission_and_secret_give_the_same_recordings(rig: Rig, noisy: Assignment) -> None:
+def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRunner, noisy: Assignment) -> None:
     asked = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
     quiet = Submission(
         "s", Source("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), Source("responder.py", ECHO)
     )
     chains = [
-        [trial.recording.sha256 for trial in grade(replace(quiet, student=who), asked, secret=secret, rig=rig).trials]
+        [
+            trial.recording.sha256
+            for trial in grade(replace(quiet, student=who), asked, secret=secret, runner=runner).trials
+        ]
         for who, secret in (("ada", MARKING), ("bob", MARKING), ("ada", HOMES[1]))
     ]
     assert chains[0] == chains[1] != chains[2]
 
 
-def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(rig: Rig) -> None:
+def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(runner: TrialRunner) -> None:
     """The start place that judging goes by is the one that was driven from, whatever the secret."""
     asked = find_assignment("black-or-grey")
     shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
@@ -265,7 +271,7 @@ def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(rig: R
     reference = Submission("s", Source("robot.py", program))
     orders = set()
     for secret in (PUBLIC, MARKING, *HOMES[1:]):
-        graded = grade(reference, shuffled, secret=secret, rig=rig)
+        graded = grade(reference, shuffled, secret=secret, runner=runner)
         assert graded.marks == Decimal(8)
         orders.add(tuple(trial.place for trial in graded.trials))
     assert len(orders) == 3

@@ -1,4 +1,4 @@
-"""Hand-ins that collect data or train a model on it, run for real; what goes wrong gets a verdict and a sentence."""
+"""Submissions that collect data or train a model on it, run for real; what goes wrong gets a verdict and a sentence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.collecting import pairs
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
 from submissions.assignment import Assignment
@@ -50,12 +50,12 @@ def training() -> Assignment:
     return replace(asked, scenarios=scenarios, criteria=criteria, limits=limits)
 
 
-def trained(rig: Rig, asked: Assignment, text: str) -> Grade:
-    return grade(Submission("s", None, Source("responder.py", text)), asked, rig=rig)
+def trained(runner: TrialRunner, asked: Assignment, text: str) -> Grade:
+    return grade(Submission("s", None, Source("responder.py", text)), asked, runner=runner)
 
 
-def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(rig: Rig, training: Assignment) -> None:
-    result = trained(rig, training, NEAREST)
+def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: TrialRunner, training: Assignment) -> None:
+    result = trained(runner, training, NEAREST)
     learnt, unseen = result.trials
     assert result.verdict is Verdict.FINISHED
     assert learnt.recording.messages == ()
@@ -66,9 +66,9 @@ def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(rig: Rig, tr
     assert accuracy.value > 0.5
     assert accuracy.counts is not None
     assert accuracy.counts.sent == accuracy.counts.answered == 170
-    again = trained(rig, training, NEAREST)
+    again = trained(runner, training, NEAREST)
     assert [trial.recording.sha256 for trial in again.trials] == [trial.recording.sha256 for trial in result.trials]
-    other = trained(rig, training, NEAREST.replace("fit(images, labels)", "fit(images, labels[::-1])"))
+    other = trained(runner, training, NEAREST.replace("fit(images, labels)", "fit(images, labels[::-1])"))
     assert other.trials[0].recording.sha256 == learnt.recording.sha256
     assert other.trials[1].recording.sha256 != unseen.recording.sha256
 
@@ -97,17 +97,17 @@ def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(rig: Rig, tr
     ],
 )  # fmt: skip
 def test_what_goes_wrong_in_training_is_told(
-    rig: Rig, training: Assignment, text: str, verdict: Verdict, sentence: str
+    runner: TrialRunner, training: Assignment, text: str, verdict: Verdict, sentence: str
 ) -> None:
-    result = trained(rig, training, text)
+    result = trained(runner, training, text)
     told = " ".join(found.message for found in result.criteria)
     assert (result.verdict, result.marks) == (verdict, 0), told
     assert sentence in told
     assert result.trials[0].verdict is Verdict.FINISHED
 
 
-def test_the_labels_of_unseen_images_are_nowhere_in_the_child(rig: Rig, training: Assignment) -> None:
-    """Everything that a hand-in can find: its folder, and its process's memory while it names unseen images."""
+def test_the_labels_of_unseen_images_are_nowhere_in_the_child(runner: TrialRunner, training: Assignment) -> None:
+    """Everything that a submission can find: its folder, and its process's memory while it names unseen images."""
     text = """
 import gc, os, numpy
 def train(images, labels):
@@ -121,33 +121,33 @@ class Model:
         print(sorted(os.listdir(".")), [numpy.load("train.npz")["labels"].size == self.count], sorted(named))
         return ["square"] * len(rows)
 """
-    found = trained(rig, training, text).trials[1].recording.responder_output
+    found = trained(runner, training, text).trials[1].recording.responder_output
     assert found.splitlines()[0] == "['train.npz'] [True] []"
 
 
-def test_unseen_images_do_not_come_in_the_order_of_the_track(rig: Rig, training: Assignment) -> None:
+def test_unseen_images_do_not_come_in_the_order_of_the_track(runner: TrialRunner, training: Assignment) -> None:
     """Else a model could name a whole stretch by the clearest picture in it."""
-    result = trained(rig, training, ROWS.format("return [str(place) for place in range(len(rows))]"))
+    result = trained(runner, training, ROWS.format("return [str(place) for place in range(len(rows))]"))
     messages = result.trials[1].recording.messages
     places = [int(message.text) for message in messages if message.sender == "responder"][:100]
     neighbours = sum(abs(one - other) == 1 for one, other in pairwise(places))
     assert neighbours < 10
 
 
-def test_a_notebook_is_no_function_that_trains(rig: Rig, training: Assignment) -> None:
+def test_a_notebook_is_no_function_that_trains(runner: TrialRunner, training: Assignment) -> None:
     notebook = Notebook("work.ipynb", (Cell(1, "def train(images, labels): pass"),))
     with pytest.raises(UsageError, match=r"work.ipynb: is a notebook, expected responder.py with a function train"):
-        grade(Submission("s", notebook=notebook), training, rig=rig)
+        grade(Submission("s", notebook=notebook), training, runner=runner)
 
 
-def collected(rig: Rig, name: str) -> Recording:
+def collected(runner: TrialRunner, name: str) -> Recording:
     asked = find_assignment("collect-shapes")
     submission = read_submission(examples("collect-shapes") / name, asked=asked.parts)
-    return grade(submission, asked, rig=rig).trials[0].recording
+    return grade(submission, asked, runner=runner).trials[0].recording
 
 
-def test_pairs_of_the_log_know_what_they_show(rig: Rig) -> None:
-    recording = collected(rig, "reference")
+def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
+    recording = collected(runner, "reference")
     found = pairs(recording, "log")
     assert len(found) * 2 == len(recording.image_log)
     assert pairs(recording, "sent") == []
@@ -162,8 +162,8 @@ def test_pairs_of_the_log_know_what_they_show(rig: Rig) -> None:
     ("changes", "marks"),
     [({}, 4), ({"each": 4}, 4), ({"each": 50}, 0), ({"classes": ("square",)}, 4), ({"most_duplicates": 0.0}, 0)],
 )
-def test_what_is_asked_of_training_data(rig: Rig, changes: dict[str, Any], marks: int) -> None:
+def test_what_is_asked_of_training_data(runner: TrialRunner, changes: dict[str, Any], marks: int) -> None:
     asked = find_assignment("collect-shapes")
     criterion = asked.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
     submission = read_submission(examples("collect-shapes") / "reference", asked=asked.parts)
-    assert grade(submission, replace(asked, criteria=(criterion,)), rig=rig).marks == marks
+    assert grade(submission, replace(asked, criteria=(criterion,)), runner=runner).marks == marks

@@ -1,4 +1,4 @@
-"""Doing without the walls: only when the command line says so, said out loud, and stamped on all that comes of it."""
+"""Doing without the sandbox: only when the command line says so, said out loud, and stamped on all that comes of it."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ _FLAG = "--unsafe-no-sandbox"
 _REFERENCE = examples("echo-responder") / "reference"
 
 
-@pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["walls", "none"])
-def test_a_run_without_walls_says_so(flags: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["sandbox", "none"])
+def test_a_run_without_sandbox_says_so(flags: tuple[str, ...], tmp_path: Path) -> None:
     program, trace = tmp_path / "robot.py", tmp_path / "trace.json"
     program.write_text("import os\nprint(len(os.listdir('/')) > 3)\n")
     ran = robomark("run", program, "--trace", trace, *flags)
     told = json.loads(trace.read_text())
-    assert (told["walls"] == _STAMP) == bool(flags)
-    assert ("NO WALLS" in ran.stderr) == bool(flags)
+    assert (told["sandbox"] == _STAMP) == bool(flags)
+    assert ("NO SANDBOX" in ran.stderr) == bool(flags)
     assert [text for _, text in told["printed"]] == ["True"] * len(flags)
 
 
-@pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["walls", "none"])
-def test_a_grade_without_walls_says_so(flags: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["sandbox", "none"])
+def test_a_grade_without_sandbox_says_so(flags: tuple[str, ...]) -> None:
     ran = robomark("grade", _REFERENCE, "-a", "echo-responder", *flags)
     assert ran.returncode == 0, ran.stderr
-    assert (f"walls: {_STAMP}\n" in ran.stdout) == bool(flags)
-    assert ("NO WALLS" in ran.stderr) == bool(flags)
+    assert (f"sandbox: {_STAMP}\n" in ran.stdout) == bool(flags)
+    assert ("NO SANDBOX" in ran.stderr) == bool(flags)
 
 
 @pytest.mark.long
-def test_a_worker_without_walls_says_so_in_every_grade(tmp_path: Path) -> None:
+def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None:
     """The variable that such a setting would have changes nothing for the next worker."""
     settings = settings_in(tmp_path)
     home = {"ROBOMARK_HOME": str(settings.home), "ROBOMARK_UNSAFE_NO_SANDBOX": "1", "ROBOMARK_NO_WALLS": "1"}
@@ -54,7 +54,7 @@ def test_a_worker_without_walls_says_so_in_every_grade(tmp_path: Path) -> None:
             worker.wait()
         assert submitted.returncode == 0, submitted.stderr
         shown = robomark("show", _grade_id(submitted.stdout), **home)
-        assert (f"walls: {_STAMP}\n" in shown.stdout) == bool(flags)
+        assert (f"sandbox: {_STAMP}\n" in shown.stdout) == bool(flags)
 
 
 def _grade_id(table: str) -> str:

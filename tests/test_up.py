@@ -16,7 +16,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import func, select
 
-from builders import accept_one, hand_in, settings_in
+from builders import accept_one, grading_request, settings_in
 from processes import COMMAND, alive, command_line, descendants, robomark, until
 from service.command_line import main
 from service.queue.broker import broker_answers
@@ -91,7 +91,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         assert tuple(job.phases) == phases.NAMES
         assert sorted(job.phases.values()) == list(job.phases.values())
         spinning = accept_batch(
-            store, "spinning", [hand_in("spinner", SPIN), hand_in("next", SPIN)], [], max_attempts=3
+            store, "spinning", [grading_request("spinner", SPIN), grading_request("next", SPIN)], [], max_attempts=3
         )
         until(lambda: _jobs(store, JobState.RUNNING))
         told = _metrics(address)
@@ -141,7 +141,7 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
                 if any(word in command_line(pid) for word in ("valkey", "service.queue.worker", "web.server")):
                     os.kill(pid, signal.SIGKILL)
             until(lambda: not any(map(alive, first)))
-            accept_batch(store, "spinning", [hand_in("spinner", SPIN)], [], max_attempts=3)
+            accept_batch(store, "spinning", [grading_request("spinner", SPIN)], [], max_attempts=3)
             until(lambda: _jobs(store, JobState.RUNNING))
             assert _get(f"{address}/health/live")[0] == 200
             below = descendants(up.pid)
@@ -172,7 +172,7 @@ def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
             "database": True,
             "broker": False,
             "workers": False,
-            "walls": False,
+            "sandbox": False,
         }
         assert _metrics(address)["robomark_workers",] == 0
         host, _, port = address.removeprefix("http://").partition(":")

@@ -1,6 +1,6 @@
-"""Reference responders as text: hand-ins that work, and files that an assignment may give.
+"""Reference responders as text: submissions that work, and files that an assignment may give.
 
-They are written as students write them and run inside the walls; nothing here imports one.
+They are written as students write them and run inside the sandbox; nothing here imports one.
 """
 
 from importlib import resources

@@ -1,6 +1,6 @@
 """Bubblewrap round a zygote, where it works: name spaces of its own, and only the folders that Python needs.
 
-It is an extra. What the walls promise they keep without it; with it names outside cannot be found out either, nor
+It is an extra. What the sandbox promises it keeps without it; with it names outside cannot be found out either, nor
 processes, nor the machine's name.
 """
 

@@ -1,4 +1,4 @@
-"""The worker's side of the walls: starts zygotes, has them fork children, and sees that every wall stands.
+"""The worker's side of the sandbox: starts zygotes, has them fork children, and sees that every layer stands.
 
 Nothing of the worker's reaches a zygote: it is a fresh process with a clean environment. Listening to a child and
 stopping it is ``running_child.py``'s.
@@ -35,7 +35,7 @@ from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutsi
 from sim.errors import HostError
 
 Role = Literal["robot", "responder"]
-Play = Literal["role", "battery"]
+Work = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
 _END_SECONDS = 0.5
@@ -47,8 +47,8 @@ _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
 _FOLDERS: dict[Role, tuple[str, str]] = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
 
 
-class WallsMissing(HostError):
-    """This machine cannot put up the walls that student code needs."""
+class SandboxMissing(HostError):
+    """This machine cannot put up the sandbox that student code needs."""
 
 
 class _ZygoteEnded(KilledFromOutside):
@@ -56,7 +56,7 @@ class _ZygoteEnded(KilledFromOutside):
 
 
 @dataclass(frozen=True, slots=True)
-class Walls:
+class Isolation:
     """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter.
 
     The doorkeeper and bubblewrap are added where they work, and done without where they do not.
@@ -69,9 +69,9 @@ class Walls:
 
 
 #: What every grading needs.
-FULL = Walls()
+FULL = Isolation()
 #: Limits on the process and nothing else: for development only.
-NONE = Walls(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
+NONE = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
 
 
 def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
@@ -89,7 +89,7 @@ class Zygote:
     def __init__(
         self,
         role: Role,
-        walls: Walls,
+        isolation: Isolation,
         folders: PrivateFolders,
         group: ControlGroup | None = None,
         without: tuple[str, ...] = (),
@@ -97,7 +97,7 @@ class Zygote:
         self._role = role
         self._group = group
         self._without = without
-        self._walls = walls
+        self._isolation = isolation
         self._folders = folders
         self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
         self._forks = 0
@@ -114,7 +114,7 @@ class Zygote:
         limits: ChildLimits,
         folder: Path | None = None,
         meter: JobMeter | None = None,
-        play: Play = "role",
+        work: Work = "role",
         blamed: bool = False,
     ) -> Child:
         """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
@@ -125,30 +125,30 @@ class Zygote:
         self._forks += 1
         for attempt in (1, 2):
             try:
-                return self._spawn(limits, folder, meter or JobMeter(), play, blamed)
+                return self._spawn(limits, folder, meter or JobMeter(), work, blamed)
             except (OSError, EOFError, _ZygoteEnded) as error:
                 self.close()
                 if attempt == 2:
                     raise HostError(f"the {self._role} zygote does not answer ({error})") from error
         raise AssertionError
 
-    def try_walls(self) -> str:
-        """Let a child try the short battery of escapes; which walls held. Raises WallsMissing if one did not."""
-        if not self._walls.landlock and not self._walls.seccomp:
+    def try_isolation(self) -> str:
+        """Let a child try the short battery of escapes; which layers held. Raises SandboxMissing if one did not."""
+        if not self._isolation.landlock and not self._isolation.seccomp:
             child = self.spawn(_BATTERY_LIMITS)
             child.close()
-            return child.walls
-        child = self.spawn(_BATTERY_LIMITS, play="battery")
+            return child.sandbox
+        child = self.spawn(_BATTERY_LIMITS, work="battery")
         try:
             told = child.receive(wire.BATTERY)
         except ChildStopped as stop:
-            raise _walls_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
+            raise _sandbox_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
             child.close()
-        if told["through"] and self._walls.landlock and self._walls.seccomp:
-            raise _walls_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
+        if told["through"] and self._isolation.landlock and self._isolation.seccomp:
+            raise _sandbox_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
         refused = told["tried"] - len(told["through"])
-        return f"{child.walls} (battery {told['version']}: {refused} of {told['tried']} refused)"
+        return f"{child.sandbox} (battery {told['version']}: {refused} of {told['tried']} refused)"
 
     def reap(self, pid: int) -> int:
         """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
@@ -178,7 +178,7 @@ class Zygote:
             self._folders_inside = -1
         self._forks = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, play: Play, blamed: bool) -> Child:
+    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: Work, blamed: bool) -> Child:
         self._start()
         descriptors = []
         if folder is not None:
@@ -189,15 +189,15 @@ class Zygote:
             data, received = self._ask(
                 {
                     "do": "spawn",
-                    "play": play,
+                    "work": work,
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "without": limits.without,
                     "file_size": _FILE_BYTES,
                     "folder": folder is not None,
-                    "landlock": self._walls.landlock,
-                    "seccomp": self._walls.seccomp,
-                    "doorkeeper": self._walls.doorkeeper,
+                    "landlock": self._isolation.landlock,
+                    "seccomp": self._isolation.seccomp,
+                    "doorkeeper": self._isolation.doorkeeper,
                 },
                 [theirs.fileno(), *descriptors],
             )
@@ -211,31 +211,34 @@ class Zygote:
         answer = json.loads(data)
         if "missing" in answer:
             ours.close()
-            raise _walls_missing(answer["missing"])
+            raise _sandbox_missing(answer["missing"])
         inside = answer["pid"]  # what the zygote calls it
         reap = functools.partial(self.reap, inside)
         child = Child(reap, _pid(received[0]), received[0], ours, limits, folder)
         try:
             _try_to_signal(received[0])
-            self._check_walls(child)
+            self._check_isolation(child)
         except BaseException:
             child.close()
             raise
         child.begin(meter, blamed, self._group.watch() if self._group is not None else None)
         return child
 
-    def _check_walls(self, child: Child) -> None:
-        """The child's first words, before any student code: every wall asked for must stand."""
+    def _check_isolation(self, child: Child) -> None:
+        """The child's first words, before any student code: every layer asked for must stand."""
         try:
-            standing = child.receive(wire.WALLS)
+            standing = child.receive(wire.SANDBOX)
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
         if standing["missing"] is not None:
-            raise _walls_missing(standing["missing"])
-        if bool(standing["landlock"]) != bool(self._walls.landlock) or standing["seccomp"] != self._walls.seccomp:
-            raise _walls_missing("a wall that was asked for does not stand")
+            raise _sandbox_missing(standing["missing"])
+        if (
+            bool(standing["landlock"]) != bool(self._isolation.landlock)
+            or standing["seccomp"] != self._isolation.seccomp
+        ):
+            raise _sandbox_missing("a layer that was asked for does not stand")
         self.without_doorkeeper = standing["without_doorkeeper"]
-        child.walls = stamp(standing, self.without_bubblewrap is None, self._group is not None)
+        child.sandbox = stamp(standing, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
         """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
@@ -243,7 +246,7 @@ class Zygote:
             return
         here = Path(__file__).resolve().parent
         roots = [_own_modules(self._role)]
-        if self._walls.bubblewrap:
+        if self._isolation.bubblewrap:
             wrapping = bubblewrap.wrapping([str(here), *roots], self._folders.path)
             self.without_bubblewrap = bubblewrap.why_not(wrapping)
             if self.without_bubblewrap is None and self._exec(wrapping, here, roots):
@@ -294,12 +297,12 @@ class Zygote:
         self._folders_inside = received[0]
         return True
 
-    def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
+    def _ask(self, spec: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
         if self._control is None:
             raise EOFError("it is not running")
         payload = array.array("i", descriptors or [])
         ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
-        self._control.sendmsg([json.dumps(order).encode()], ancillary)
+        self._control.sendmsg([json.dumps(spec).encode()], ancillary)
         return self._answer()
 
     def _answer(self) -> tuple[bytes, list[int]]:
@@ -319,8 +322,8 @@ class Zygote:
 class Sandboxes:
     """The zygotes of one worker: started when first needed, ended together, and all in one ``group`` if given."""
 
-    def __init__(self, walls: Walls = FULL, group: ControlGroup | None = None) -> None:
-        self._walls = walls
+    def __init__(self, isolation: Isolation = FULL, group: ControlGroup | None = None) -> None:
+        self._isolation = isolation
         self._group = group
         self._memory_limits: dict[Role, int] = {}  # of the newest child of each; one lives at a time
         self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
@@ -351,8 +354,8 @@ class Sandboxes:
             self._blamed = False
 
     def check(self, role: Role = "robot") -> str:
-        """Put up the walls round a child that tries to get out; say which hold. Raises WallsMissing if any does not."""
-        return self._zygote(role).try_walls()
+        """Let a child try to get out of its sandbox; say which layers hold. Raises SandboxMissing if any does not."""
+        return self._zygote(role).try_isolation()
 
     def why_no_bubblewrap(self, role: Role = "robot") -> str | None:
         """What keeps bubblewrap, an extra, from standing round children of ``role``; None if it does."""
@@ -364,7 +367,7 @@ class Sandboxes:
         now = time.time()
         if not 0 < self._forgets_until - now <= traces.HOLDS_SECONDS:
             zygote = self._zygote("robot")
-            zygote.try_walls()
+            zygote.try_isolation()
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
@@ -390,7 +393,7 @@ class Sandboxes:
             for other in [other for other in self._zygotes if other[0] == role and other[1] and packages]:
                 self._cpu_of_closed += self._zygotes[other].children_cpu_seconds
                 self._zygotes.pop(other).close()
-            self._zygotes[key] = Zygote(role, self._walls, self._folders, self._group, packages)
+            self._zygotes[key] = Zygote(role, self._isolation, self._folders, self._group, packages)
         return self._zygotes[key]
 
     @property
@@ -424,12 +427,12 @@ def _try_to_signal(pidfd: int) -> None:
     try:
         signal.pidfd_send_signal(pidfd, 0)
     except OSError as error:
-        raise _walls_missing(f"pidfd_send_signal: {error.strerror}") from None
+        raise _sandbox_missing(f"pidfd_send_signal: {error.strerror}") from None
 
 
-def _walls_missing(what: str) -> WallsMissing:
-    return WallsMissing(
-        f"this machine cannot wall in student code: {what}; "
+def _sandbox_missing(what: str) -> SandboxMissing:
+    return SandboxMissing(
+        f"this machine cannot enclose student code: {what}; "
         "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
     )
 

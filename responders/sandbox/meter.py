@@ -45,11 +45,11 @@ class Spent:
 
 
 class JobMeter:
-    """Counts what one job costs. ``pulse`` is called several times a second and may raise to end the job."""
+    """Counts what one job costs. ``heartbeat`` is called several times a second and may raise to end the job."""
 
-    def __init__(self, limits: JobLimits = JobLimits(), pulse: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, limits: JobLimits = JobLimits(), heartbeat: Callable[[], None] = lambda: None) -> None:
         self._limits = limits
-        self._pulse = pulse
+        self._heartbeat = heartbeat
         self._kept = 0
         self._cpu = self._sleep = 0.0  # of children that are gone
 
@@ -61,14 +61,14 @@ class JobMeter:
     def limits(self) -> JobLimits:
         return self._limits
 
-    def pulse(self) -> None:
+    def heartbeat(self) -> None:
         """Whatever it raises that is not ours to tell a user is the machine's fault, never a child's."""
         try:
-            self._pulse()
+            self._heartbeat()
         except RobomarkError:
             raise
         except Exception as error:
-            raise HostError(f"the job's pulse failed: {type(error).__name__}: {error}") from error
+            raise HostError(f"the job's heartbeat failed: {type(error).__name__}: {error}") from error
 
     def keep(self, size: int) -> None:
         """Pay for an object with ``size`` bytes of text, before it is kept. Raises ChildStopped."""

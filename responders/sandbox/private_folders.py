@@ -1,6 +1,6 @@
 """Folders of single trials, all in one folder of the worker's, and removed whatever was put into them.
 
-What a student's process may do in its own is decided by the walls; that it cannot grow is seen to while it runs.
+What a student's process may do in its own is decided by the sandbox; that it cannot grow is seen to while it runs.
 """
 
 from __future__ import annotations

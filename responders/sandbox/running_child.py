@@ -70,7 +70,7 @@ class Child:
         folder: Path | None,
     ) -> None:
         """``reap`` waits for the child's end and gives its wait status."""
-        self.walls = ""
+        self.sandbox = ""
         self._reap = reap
         self._folder = folder
         self._given = (0, 0) if folder is None else _content(folder, _MOST_GIVEN)
@@ -168,7 +168,7 @@ class Child:
                 data = self._socket.recv(wire.MOST)
             except TimeoutError:
                 self._waited += time.monotonic() - began
-                self._meter.pulse()
+                self._meter.heartbeat()
                 used = self._check_cpu()
                 self._check_sleep()
                 if used != last_cpu or self._runnable():
@@ -184,7 +184,7 @@ class Child:
             self._waited += now - began
             if now - self._checked > _POLL_SECONDS:
                 self._checked = now
-                self._meter.pulse()
+                self._meter.heartbeat()
                 self._check_cpu()
                 self._check_sleep()
             pieces.append(data)
@@ -227,7 +227,7 @@ class Child:
         return (int(run) + int(queued)) / 1e9
 
     def _check_folder(self) -> None:
-        """One flat look: the walls let no folder be made in it, and follow no link."""
+        """One flat look: the sandbox lets no folder be made in it, and follow no link."""
         if self._folder is None:
             return
         most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from service.commands.example_table import catalogue_table, examples_table, figures_table
 from service.grading.example_check import CheckedAssignment, check_examples
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
 from service.reports.readable import one_line, readable
 from sim.errors import AssignmentError, UsageError
@@ -96,12 +96,12 @@ def check(
     """Find every mistake in an assignment's files, and grade its examples: do they get what they must?"""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or give --all for the whole catalogue")
-    with Rig() as rig:
+    with TrialRunner() as runner:
         if assignment is not None:
-            checked = [check_examples(assignment, rig=rig)]
+            checked = [check_examples(assignment, runner=runner)]
             _print_checked(checked[0])
         else:
-            checked = [check_examples(name, rig=rig) for name in track(catalogue(), "grading", transient=True)]
+            checked = [check_examples(name, runner=runner) for name in track(catalogue(), "grading", transient=True)]
             _console().print(catalogue_table(checked))
     problems = [f"{each.assignment.id}: {problem}" for each in checked for problem in each.problems]
     if problems:

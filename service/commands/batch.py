@@ -22,67 +22,67 @@ from service.commands.batch_waiting import marks_awaited
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.report_files import write_batch
 from service.reports.written import prepare_folder
 from service.settings import Settings, load_settings
-from service.store import audit, batches, figures, intake, regrades
+from service.store import audit, batches, intake, metrics, regrades
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.models import JobState, Lane
 from sim.errors import Cancelled, HostError, UsageError
 
-batch_app = typer.Typer(help="Grade many hand-ins through the queue.", no_args_is_help=True)
+batch_app = typer.Typer(help="Grade many submissions through the queue.", no_args_is_help=True)
 
 
 @batch_app.command()
 def submit(
-    hand_ins: Annotated[
-        Path, typer.Argument(help="A folder or .zip with a hand-in for each student, or a .csv roster.")
+    grading_requests: Annotated[
+        Path, typer.Argument(help="A folder or .zip with a submission for each student, or a .csv roster.")
     ],
     assignment: Annotated[
         str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the marks and show them.")] = False,
     report: Annotated[
-        Path | None, typer.Option(help="Write a report for each hand-in into this folder; waits.")
+        Path | None, typer.Option(help="Write a report for each submission into this folder; waits.")
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Grade again what was handed in already.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Grade again what was submitted already.")] = False,
 ) -> None:
-    """Queue a hand-in for each student; bad ones are named and stop no other.
+    """Queue a submission for each student; bad ones are named and stop no other.
 
     A roster has the columns student, file and assignment, the last not needed with -a; files lie below it. A
-    student's newest hand-in replaces one that still waits, and the same one again changes nothing.
+    student's newest submission replaces one that still waits, and the same one again changes nothing.
 
     Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
     not be graded.
     """
     if wait or report is not None:
-        refused = submit_and_wait(hand_ins, assignment, report=report, again=again)
+        refused = submit_and_wait(grading_requests, assignment, report=report, again=again)
     else:
-        refused = _submit(hand_ins, assignment, again=again)
+        refused = _submit(grading_requests, assignment, again=again)
     if refused:
-        raise UsageError(f"{refused} of the hand-ins could not be taken in; the others were")
+        raise UsageError(f"{refused} of the submissions could not be taken in; the others were")
 
 
-def _submit(hand_ins: Path, assignment: str | None, *, again: bool) -> int:
+def _submit(grading_requests: Path, assignment: str | None, *, again: bool) -> int:
     settings = load_settings()
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
-        checked = _checked(hand_ins, assignment, console)
-        accepted = _accept(store, settings, hand_ins, checked, again=again, console=console)
+        checked = _checked(grading_requests, assignment, console)
+        accepted = _accept(store, settings, grading_requests, checked, again=again, console=console)
         if settings.broker_url:
-            _nudger(settings, store).grade(Lane.BATCH, _new(accepted))
+            _notifier(settings, store).grade(Lane.BATCH, _new(accepted))
     if accepted.batch is not None and not settings.broker_url:
         console.print("A worker grades them: robomark worker", highlight=False)
     return len(checked.problems) + len(accepted.refused)
 
 
-def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | None, again: bool = True) -> int:
-    """Queue hand-ins, grade them with the services that run or with our own, and show the marks.
+def submit_and_wait(grading_requests: Path, assignment: str | None, *, report: Path | None, again: bool = True) -> int:
+    """Queue submissions, grade them with the services that run or with our own, and show the marks.
 
-    Returns how many were refused. What was handed in already is graded ``again``, or shown as it is. Raises
+    Returns how many were refused. What was submitted already is graded ``again``, or shown as it is. Raises
     UsageError when none could be taken in, HostError when one could not be graded, Cancelled when one was
     cancelled meanwhile.
     """
@@ -92,8 +92,8 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
-        checked = _checked(hand_ins, assignment, console)
-        accepted = _accept(store, settings, hand_ins, checked, again=again, console=console)
+        checked = _checked(grading_requests, assignment, console)
+        accepted = _accept(store, settings, grading_requests, checked, again=again, console=console)
         try:
             lines = _wait(store, settings, accepted, console)
         except KeyboardInterrupt:
@@ -101,7 +101,7 @@ def submit_and_wait(hand_ins: Path, assignment: str | None, *, report: Path | No
             raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
         if report is not None:
             problems = (*checked.problems, *accepted.refused)
-            page = write_batch(store, f"Batch {hand_ins.name}", lines, problems, report)
+            page = write_batch(store, f"Batch {grading_requests.name}", lines, problems, report)
             console.print(f"report: {page}", highlight=False, soft_wrap=True)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
@@ -118,7 +118,7 @@ def list_batches() -> None:
     settings = load_settings()
     with open_store(settings) as store, store.reading() as session:
         lines = batches.list_batches(session)
-    table = Table("batch", "name", "taken in", "hand-ins", "refused", "state", box=None, pad_edge=False)
+    table = Table("batch", "name", "taken in", "submissions", "refused", "state", box=None, pad_edge=False)
     for line in lines:
         when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
         row = (line.id, line.name, when, str(line.jobs), str(len(line.problems)), summary(line))
@@ -136,7 +136,7 @@ def status(batch: BatchId) -> None:
         changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
         waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, line.id)
         history = audit.entries(session, "batch", line.id)
-        pace = figures.pace(session, line.id)
+        pace = metrics.pace(session, line.id)
     console = Console()
     console.print(Text(f"batch {line.id}: {line.name}: {summary(line)}"))
     if pace is not None:
@@ -158,11 +158,11 @@ batch_app.command()(regrade)
 batch_app.command()(publish)
 
 
-def _checked(hand_ins: Path, assignment: str | None, console: Console) -> Preflight:
-    checked = preflight(hand_ins, assignment)
+def _checked(grading_requests: Path, assignment: str | None, console: Console) -> Preflight:
+    checked = preflight(grading_requests, assignment)
     _print_problems(checked.problems, console)
-    if not checked.hand_ins:
-        raise UsageError(f"{hand_ins}: none of {len(checked.problems)} hand-ins can be taken in")
+    if not checked.grading_requests:
+        raise UsageError(f"{grading_requests}: none of {len(checked.problems)} submissions can be taken in")
     return checked
 
 
@@ -170,7 +170,7 @@ def _accept(
     store: Store, settings: Settings, path: Path, checked: Preflight, *, again: bool, console: Console
 ) -> intake.AcceptedNew:
     """Take in what passed, and say what was new of it."""
-    batch = (path.name, checked.hand_ins, checked.problems)
+    batch = (path.name, checked.grading_requests, checked.problems)
     if again:
         made = intake.accept_batch(store, *batch, max_attempts=settings.max_attempts)
         accepted = intake.AcceptedNew(made, (), made.refused)
@@ -180,10 +180,10 @@ def _accept(
     if accepted.known:
         table = Table("nothing new of", "why", box=None, pad_edge=False)
         for known in accepted.known:
-            table.add_row(Text(known.student), Text(f"already handed in as {known.job_id}{_hint(known)}"))
+            table.add_row(Text(known.student), Text(f"already submitted as {known.job_id}{_hint(known)}"))
         console.print(table)
     if accepted.batch is None and not accepted.known:
-        raise UsageError(f"{path}: none of {len(checked.hand_ins)} hand-ins can be taken in")
+        raise UsageError(f"{path}: none of {len(checked.grading_requests)} submissions can be taken in")
     if accepted.batch is None:
         console.print("nothing new; --again grades it again", highlight=False)
     else:
@@ -229,8 +229,8 @@ def _lines(store: Store, accepted: intake.AcceptedNew) -> list[JobLine]:
     return sorted(lines, key=lambda line: (line.student, line.id))
 
 
-def _nudger(settings: Settings, store: Store) -> Nudger:
-    return Nudger(make_celery(settings), store, settings)
+def _notifier(settings: Settings, store: Store) -> Notifier:
+    return Notifier(make_celery(settings), store, settings)
 
 
 def _print_problems(problems: Sequence[tuple[str, str]], console: Console) -> None:

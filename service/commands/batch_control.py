@@ -58,9 +58,9 @@ def retry(
         retried = batch_control.retry(store, batch_id, actor=audit.this_user())
     where = "all batches" if batch_id is None else f"batch {batch_id}"
     if retried.queued + retried.outdated == 0:
-        print(f"{where}: nothing changed, no hand-in is dead")
+        print(f"{where}: nothing changed, no submission is dead")
         return
-    outdated = f"; {retried.outdated} left, because a newer hand-in came" if retried.outdated else ""
+    outdated = f"; {retried.outdated} left, because a newer submission came" if retried.outdated else ""
     print(f"{where}: {retried.queued} queued again{outdated}")
 
 

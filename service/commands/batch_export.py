@@ -1,4 +1,4 @@
-"""``robomark batch export``: the marks of a batch as one document, or as a file for each hand-in.
+"""``robomark batch export``: the marks of a batch as one document, or as a file for each submission.
 
 What a document says is ``service.reports``'.
 """
@@ -44,7 +44,7 @@ class ExportFormat(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class _ForEach:
-    """A format with a document of its own for each hand-in."""
+    """A format with a document of its own for each submission."""
 
     suffix: str
     text: Callable[[Grade], str]
@@ -64,7 +64,7 @@ def export(
     """The marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON."""
     each = _FOR_EACH.get(form)
     if each is not None and output is None:
-        raise UsageError(f"{form.value} is a file for each hand-in; name a folder with --out")
+        raise UsageError(f"{form.value} is a file for each submission; name a folder with --out")
     with open_store(load_settings()) as store:
         with store.reading() as session:
             batch_id = batches.find_batch(session, batch)
@@ -94,7 +94,7 @@ def _exported(lines: Sequence[JobLine], *, published: bool) -> list[JobLine]:
 
 
 def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: Path) -> None:
-    """A file a hand-in, named after its student, and after its assignment where one student has several."""
+    """A file a submission, named after its student, and after its assignment where one student has several."""
     try:
         with for_the_user():
             folder.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from service.commands.batch_tables import changes_table
 from service.commands.batch_waiting import marks_awaited
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store import audit, batches, regrades
 from service.store.engine import Store, open_store
@@ -43,7 +43,7 @@ def regrade(
         console.print(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}", highlight=False)
         if not wait:
             if settings.broker_url:
-                Nudger(make_celery(settings), store, settings).grade(Lane.BATCH, made.jobs)
+                Notifier(make_celery(settings), store, settings).grade(Lane.BATCH, made.jobs)
             console.print(f"what changes, and why: robomark batch status {made.batch_id}", highlight=False)
             return
         with marks_awaited(store, settings, [made.batch_id], made.jobs, console):

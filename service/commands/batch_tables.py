@@ -29,7 +29,7 @@ def summary(line: BatchLine) -> str:
 
 
 def marks_table(lines: Sequence[JobLine]) -> Table:
-    """A row a hand-in: marks, accuracy, verdict, and what else is to be known of it."""
+    """A row a submission: marks, accuracy, verdict, and what else is to be known of it."""
     table = Table(box=None, pad_edge=False)
     for heading in ("student", "assignment"):
         table.add_column(heading, overflow="fold")
@@ -52,7 +52,7 @@ def marks_table(lines: Sequence[JobLine]) -> Table:
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
-    """A row a hand-in whose marks change, or that needs a look; the others are counted."""
+    """A row a submission whose marks change, or that needs a look; the others are counted."""
     table = Table(box=None, pad_edge=False)
     table.add_column("student", overflow="fold")
     for heading in ("before", "after"):

@@ -14,7 +14,7 @@ from responders.sandbox.manager import Sandboxes
 from service.commands.waiting import Waiting
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import batches
 from service.store.engine import Store
@@ -39,9 +39,9 @@ def marks_awaited(
                 sandboxes.check()
             embedded = services.enter_context(EmbeddedServices(settings, store))
             broker, keep_up = embedded.settings, embedded.ensure
-        nudger = Nudger(make_celery(broker), store, broker)
-        nudger.grade(Lane.BATCH, new)
-        waiting = [Waiting(store, nudger, batch_id, console, keep_up) for batch_id in unfinished]
+        notifier = Notifier(make_celery(broker), store, broker)
+        notifier.grade(Lane.BATCH, new)
+        waiting = [Waiting(store, notifier, batch_id, console, keep_up) for batch_id in unfinished]
         for each in waiting:
             each.for_marks()
         yield

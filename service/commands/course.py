@@ -1,6 +1,6 @@
-"""``robomark course``: when and how often students may hand in, and what single students are allowed beyond it.
+"""``robomark course``: when and how often students may submit, and what single students are allowed beyond it.
 
-What follows for a hand-in stands in ``store/policies.py``.
+What follows for a submission stands in ``store/policies.py``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from service.store.students import Students
 from sim.errors import UsageError
 from submissions.names import shown_name
 
-course_app = typer.Typer(help="When and how often students may hand in.", no_args_is_help=True)
+course_app = typer.Typer(help="When and how often students may submit.", no_args_is_help=True)
 
 Assignment = Annotated[
     str,
@@ -36,8 +36,10 @@ def policy(
     assignment: Assignment = "",
     due: Due = None,
     late_days: Annotated[int, typer.Option(min=0, max=365, help="So many days late is still marked.")] = 0,
-    attempts: Annotated[int | None, typer.Option(min=1, max=1000, help="Different hand-ins that are marked.")] = None,
-    cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two hand-ins.")] = 0.0,
+    attempts: Annotated[
+        int | None, typer.Option(min=1, max=1000, help="Different submissions that are marked.")
+    ] = None,
+    cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two submissions.")] = 0.0,
 ) -> None:
     """Set what holds from now on, in place of what held; without options show what holds."""
     allowed = Limits(_due(due), late_days, attempts, cool_down * 60)
@@ -52,7 +54,7 @@ def policy(
 
 @course_app.command()
 def extend(
-    student: Annotated[str, typer.Argument(help="The student's name, as handed in.")],
+    student: Annotated[str, typer.Argument(help="The student's name, as submitted.")],
     assignment: Assignment = "",
     due: Due = None,
     more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
@@ -71,7 +73,7 @@ def extend(
         audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} times more" if more_attempts else ""
-    print(f"{student}: {assignment or 'every assignment'} may be handed in{until}{more}")
+    print(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
 
 
 def _due(text: str | None) -> datetime | None:
@@ -92,7 +94,7 @@ def _show(store: Store) -> None:
     with store.transaction() as session:
         found = policies.policies(session, course_of(session, DEFAULT_COURSE, now(session)))
     if not found:
-        print("no policy: everything that is handed in is marked, whenever it comes")
+        print("no policy: everything that is submitted is marked, whenever it comes")
         return
     table = Table("assignment", "due", "late days", "attempts", "cool-down", box=None, pad_edge=False)
     for assignment, allowed in found.items():

@@ -1,4 +1,4 @@
-"""``robomark demo``: grades the example hand-ins through the queue, as a first look at the whole service."""
+"""``robomark demo``: grades the example submissions through the queue, as a first look at the whole service."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ _ASSIGNMENT = "shape-recognition"
 def demo(
     folder: Annotated[Path, typer.Option("--into", help="Where the reports go.")] = Path("robomark-demo"),
 ) -> None:
-    """Grade the example hand-ins of one assignment through a real worker, and say where the report is."""
+    """Grade the example submissions of one assignment through a real worker, and say where the report is."""
     submit_and_wait(examples(_ASSIGNMENT), _ASSIGNMENT, report=folder)

@@ -1,4 +1,4 @@
-"""``robomark grade``: grades hand-ins here and now, without queue or database."""
+"""``robomark grade``: grades submissions here and now, without queue or database."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rich.console import Console
 from responders.sandbox.manager import FULL, NONE
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
 from service.reports.gradescope import gradescope_text
 from service.reports.json_output import json_text
@@ -62,31 +62,31 @@ _PRINT: Mapping[Format, Callable[[Grade], None]] = MappingProxyType(
 
 
 def grade(
-    submissions: Annotated[list[Path], typer.Argument(help="Hand-ins: a .py file, a folder or a .zip each.")],
+    submissions: Annotated[list[Path], typer.Argument(help="Submissions: a .py file, a folder or a .zip each.")],
     assignment: Annotated[
         str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a report for each hand-in into this folder.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
     unsafe: Annotated[
-        bool, typer.Option("--unsafe-no-sandbox", help="Let hand-ins do anything on this machine; for development.")
+        bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Grade hand-ins now; exit status 0 when all were graded, whatever the marks."""
+    """Grade submissions now; exit status 0 when all were graded, whatever the marks."""
     if report is not None:
         prepare_folder(report)
     near = _like_others(submissions) if report is not None else {}
     secret = secret_here(load_settings())
     worst: RobomarkError | None = None
     if unsafe:
-        warn_of_no_walls()
-    with Rig(NONE if unsafe else FULL) as rig:
+        warn_of_no_sandbox()
+    with TrialRunner(NONE if unsafe else FULL) as runner:
         for path in submissions:
             try:
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
-                graded = grade_submission(submission, asked, secret=secret, rig=rig)
+                graded = grade_submission(submission, asked, secret=secret, runner=runner)
             except RobomarkError as error:
                 if len(submissions) == 1:
                     raise
@@ -99,11 +99,11 @@ def grade(
                 print(f"report: {written}", file=sys.stderr)
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
-        raise kind("not every hand-in could be graded")
+        raise kind("not every submission could be graded")
 
 
 def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
-    """The hand-ins whose reports would take each other's place in one folder, each with a sentence."""
+    """The submissions whose reports would take each other's place in one folder, each with a sentence."""
     names = {path: named_by(path) for path in paths}
     near = alike(names.values())
     times = Counter(map(named_by, paths))
@@ -114,13 +114,13 @@ def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
     return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
 
 
-def warn_of_no_walls() -> None:
+def warn_of_no_sandbox() -> None:
     """Said whenever student code is let loose."""
-    print("robomark: NO WALLS: these hand-ins can read and change everything that you can", file=sys.stderr)
+    print("robomark: NO SANDBOX: these submissions can read and change everything that you can", file=sys.stderr)
 
 
 def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission, Assignment]:
-    """A hand-in and what it is marked against: the assignment named, or else the one that the hand-in names.
+    """A submission and what it is marked against: the assignment named, or else the one that the submission names.
 
     Raises UsageError when either cannot be used.
     """
@@ -129,7 +129,9 @@ def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission
         return read_submission(path, asked=asked.parts), asked
     submission = read_submission(path)
     if submission.assignment is None:
-        raise UsageError(f"{path}: which assignment is this for? name it with -a, or in the hand-in's submission.toml")
+        raise UsageError(
+            f"{path}: which assignment is this for? name it with -a, or in the submission's submission.toml"
+        )
     try:
         asked = find_in_catalogue(submission.assignment)
     except UsageError as error:

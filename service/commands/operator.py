@@ -15,7 +15,7 @@ from rich.text import Text
 
 from responders.sandbox import control_group
 from service.commands.batch_tables import remarks
-from service.commands.grade import warn_of_no_walls
+from service.commands.grade import warn_of_no_sandbox
 from service.doctor import examine
 from service.home import for_the_user
 from service.queue.broker import EmbeddedBroker
@@ -36,13 +36,13 @@ database_app = typer.Typer(help="Look after the database.", no_args_is_help=True
 
 def worker(
     unsafe: Annotated[
-        bool, typer.Option("--unsafe-no-sandbox", help="Let hand-ins do anything on this machine; for development.")
+        bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
     """Grade what is queued until told to stop; starts the bundled broker if no other is named and none runs."""
     settings = load_settings()
     if unsafe:
-        warn_of_no_walls()
+        warn_of_no_sandbox()
     if settings.broker_url:
         status = run_worker(settings, unsafe=unsafe)
     else:

@@ -10,18 +10,18 @@ from typing import Annotated
 import typer
 
 from models import weights_bytes
-from responders.bridge import ProgramOrder, TrialOrder
+from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderOrder
+from responders.conversation import Code, ResponderSpec
 from responders.sandbox.manager import FULL, NONE
 from responders.sandbox.running_child import ChildLimits
-from service.commands.grade import warn_of_no_walls
+from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from service.grading.grade import TrialResult
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
-from service.reports.figure import png
 from service.reports.path_plot import draw_path
+from service.reports.plot_style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
 from sim.backgrounds import floor
@@ -100,24 +100,24 @@ def run(
     switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
     wanted = Flags(switches=frozenset(switches)).with_values(**values)
     if unsafe:
-        warn_of_no_walls()
+        warn_of_no_sandbox()
     notebook = _notebook(program)
     if notebook is not None:
         if responder is not None:
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
         last = LastRun(wanted, seed, seed if sheet is None else sheet)
         limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
-        with Rig(NONE if unsafe else FULL) as rig:
-            played = run_notebook(notebook, _files_beside(program), limits, last, rig)
-        show_notebook(played, _show)
-        if played.runs:
-            _keep(played.runs[-1].recording, program.name, seed, trace_file, picture)
+        with TrialRunner(NONE if unsafe else FULL) as runner:
+            executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
+        show_notebook(executed, _show)
+        if executed.runs:
+            _keep(executed.runs[-1].recording, program.name, seed, trace_file, picture)
         return
     flags, text = _program(program)
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
     chosen = setup(flags)
-    order = TrialOrder(
-        program=ProgramOrder(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
+    spec = TrialSpec(
+        program=ProgramSpec(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
         responder=_responder(responder),
         collaborative=chosen.collaborative or responder is not None,
         floor=floor(chosen.background, seed=seed if sheet is None else sheet),
@@ -132,8 +132,8 @@ def run(
     )
     for note in chosen.notes:
         typer.echo(f"note: {note}", err=True)
-    with Rig(NONE if unsafe else FULL) as rig:
-        recording = rig.run(order, chosen.obstacles)
+    with TrialRunner(NONE if unsafe else FULL) as runner:
+        recording = runner.run(spec, chosen.obstacles)
     _show(recording)
     _keep(recording, program.name, seed, trace_file, picture)
 
@@ -185,7 +185,7 @@ def _write(path: Path, data: bytes) -> None:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _responder(given: str | None) -> ResponderOrder | None:
+def _responder(given: str | None) -> ResponderSpec | None:
     """FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
     if given is None:
         return None
@@ -193,7 +193,7 @@ def _responder(given: str | None) -> ResponderOrder | None:
     if not path.exists() and ":" in given:
         file, _, name = given.rpartition(":")
         path = Path(file)
-    return ResponderOrder(Code(path.name, _source(path)), _files_beside(path), _RESPONDER, _OUTPUT_BYTES, name)
+    return ResponderSpec(Code(path.name, _source(path)), _files_beside(path), _RESPONDER, _OUTPUT_BYTES, name)
 
 
 def _files_beside(path: Path) -> dict[str, bytes]:

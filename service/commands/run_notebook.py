@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import typer
 
-from responders.bridge import TrialOrder
+from responders.bridge import TrialSpec
 from responders.channel import Channel
-from responders.notebook_play import Played, Staged
-from responders.notebook_process import NotebookOrder
+from responders.notebook_executor import ExecutedNotebook, PlannedRun
+from responders.notebook_process import NotebookSpec
 from responders.sandbox.running_child import ChildLimits
-from service.grading.notebook_stage import NotebookStage, Program, UnmarkedRuns, program_order
-from service.grading.rig import Rig
+from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
+from service.grading.trial_runner import TrialRunner
 from service.reports.readable import readable
 from sim.backgrounds import floor
 from sim.recording import Recording
@@ -43,16 +43,18 @@ class LastRun:
     sheet: int
 
 
-def run_notebook(notebook: Notebook, files: Mapping[str, bytes], limits: RunLimits, last: LastRun, rig: Rig) -> Played:
-    """Play the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
+def run_notebook(
+    notebook: Notebook, files: Mapping[str, bytes], limits: RunLimits, last: LastRun, runner: TrialRunner
+) -> ExecutedNotebook:
+    """Execute the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
 
     Raises UsageError for a flag of the command line that cannot be read.
     """
 
-    def marked_run(program: Program, flags: Flags, setup: Setup) -> Staged:
-        wanted = stage.simulator.apply(last.flags)
-        order = TrialOrder(
-            program=program_order(program, limits.program, limits.output_bytes),
+    def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
+        wanted = planner.simulator.apply(last.flags)
+        spec = TrialSpec(
+            program=program_spec(program, limits.program, limits.output_bytes),
             responder=None,
             collaborative=setup.collaborative or wanted.collaborative,
             floor=floor(wanted.background, seed=last.sheet),
@@ -65,26 +67,26 @@ def run_notebook(notebook: Notebook, files: Mapping[str, bytes], limits: RunLimi
             child_seed=last.seed,
             pen_down=setup.pen_down or wanted.pen_down,
         )
-        return Staged(order, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
+        return PlannedRun(spec, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
 
     found = sites(notebook)
     unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, last.sheet)
-    stage = NotebookStage(found[-1] if found else None, marked_run, unmarked, Staged())
+    planner = NotebookRuns(found[-1] if found else None, marked_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
-    order = NotebookOrder(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)
-    return rig.play(order, stage)
+    spec = NotebookSpec(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)
+    return runner.execute_notebook(spec, planner)
 
 
-def show_notebook(played: Played, show: Callable[[Recording], None]) -> None:
+def show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
     """What the cells printed, every run by ``show``, and what was left out."""
-    for line in played.output.split("\n") if played.output else ():
+    for line in executed.output.split("\n") if executed.output else ():
         typer.echo(readable(line, 400))
-    for run in played.runs:
+    for run in executed.runs:
         typer.echo(f"--- the robot, started by cell {run.cell} ---")
         show(run.recording)
-    for note in played.notes:
+    for note in executed.notes:
         typer.echo(f"note: {readable(note, 400)}", err=True)
-    if played.stopped is not None:
-        typer.echo(f"{played.stopped.place}: {played.stopped.verdict}: {played.stopped.message}", err=True)
-    if not played.runs:
+    if executed.stopped is not None:
+        typer.echo(f"{executed.stopped.place}: {executed.stopped.verdict}: {executed.stopped.message}", err=True)
+    if not executed.runs:
         typer.echo("note: no robot was started: no cell begins with %%sim_magic_preloaded", err=True)

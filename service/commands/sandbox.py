@@ -1,4 +1,4 @@
-"""``robomark sandbox``: which walls stand round student code on this machine, and what is missing."""
+"""``robomark sandbox``: which layers stand round student code on this machine, and what is missing."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import typer
 from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
 
-sandbox_app = typer.Typer(help="The walls round student code.", no_args_is_help=True)
+sandbox_app = typer.Typer(help="The sandbox round student code.", no_args_is_help=True)
 
 
 @sandbox_app.callback()
 def _group() -> None:
-    """The walls round student code."""
+    """The sandbox round student code."""
 
 
 @sandbox_app.command()
 def check() -> None:
-    """Put up the walls, try them, and say which stand; exit status 3 and the reason when one cannot."""
+    """Put up the sandbox, try it, and say which layers stand; exit status 3 and the reason when one cannot."""
     typer.echo(f"kernel: {platform.system()} {platform.release()} on {platform.machine()}")
     with Sandboxes() as sandboxes:
         typer.echo(f"robot programs: {sandboxes.check('robot')}")

@@ -1,6 +1,6 @@
 """``robomark up`` and ``robomark serve``: the whole service on this machine, or its web server alone.
 
-What they keep running is ``whole_service.py``'s and ``web``'s.
+What they keep running is ``supervisor.py``'s and ``web``'s.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from responders.sandbox.manager import Sandboxes
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
+from service.supervisor import Supervisor, alone_in
 from service.web.listening import address, listen
-from service.whole_service import WholeService, alone_in
 from sim.errors import HostError, RobomarkError
 
 _log = structlog.get_logger(__name__)
@@ -53,7 +53,7 @@ def up(
             sandboxes.check()
         store = held.enter_context(open_store(settings))
         try:
-            _keep_up(settings, store, WholeService(settings, store, workers, listening), where)
+            _keep_up(settings, store, Supervisor(settings, store, workers, listening), where)
         except KeyboardInterrupt:
             return
 
@@ -73,7 +73,7 @@ def serve(host: Host = "127.0.0.1", port: Port = 8470) -> None:
             return
 
 
-def _keep_up(settings: Settings, store: Store, service: WholeService, where: str) -> None:
+def _keep_up(settings: Settings, store: Store, service: Supervisor, where: str) -> None:
     with service:
         try:
             service.ensure()
@@ -91,7 +91,7 @@ def _keep_up(settings: Settings, store: Store, service: WholeService, where: str
             raise
 
 
-def _until_ready(service: WholeService) -> None:
+def _until_ready(service: Supervisor) -> None:
     while not service.ready:
         service.ensure()
         if sentence := service.short_lived():
@@ -99,7 +99,7 @@ def _until_ready(service: WholeService) -> None:
         time.sleep(_LOOK_SECONDS)
 
 
-def _ensure(service: WholeService) -> None:
+def _ensure(service: Supervisor) -> None:
     """Once up, nothing but Ctrl-C ends it: what cannot be started now is tried again."""
     try:
         service.ensure()

@@ -34,9 +34,9 @@ def verify(
         with store.reading() as session:
             job = session.get_one(Job, batches.find_job(session, grade))
             stored = grades.load(session, job.id)
-            hand_in = intake.load_hand_in(session, job.id)
+            grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
-    again = grade_submission(hand_in.submission, hand_in.assignment, secret=secret)
+    again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret)
     rows = list(zip(stored.trials, again.trials, strict=False))
     table = Table("scenario", "trial", "stored", "again", "", box=None, pad_edge=False)
     for before, after in rows:

@@ -15,13 +15,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 from sqlalchemy import select
 
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.store import batches
 from service.store.engine import Store
 from service.store.models import Batch, BatchState
 
 _LOOK_SECONDS = 0.25
-_SWEEP_SECONDS = 2.0
+_REAP_SECONDS = 2.0
 
 
 class _Rate(ProgressColumn):
@@ -45,7 +45,7 @@ class Waiting:
     """
 
     store: Store
-    nudger: Nudger
+    notifier: Notifier
     batch_id: str
     console: Console
     keep_up: Callable[[], None]
@@ -88,8 +88,8 @@ class Waiting:
                     self.console.print(f"batch {self.batch_id} {goes_on}", highlight=False, soft_wrap=True)
                     was_held = held
                 self.keep_up()
-                if time.monotonic() - swept >= _SWEEP_SECONDS:
-                    self.nudger.sweep()
+                if time.monotonic() - swept >= _REAP_SECONDS:
+                    self.notifier.catch_up()
                     swept = time.monotonic()
                 total, done, partial = count(self._look())
                 bars.update(bar, total=total, completed=min(done + partial, total))

@@ -1,4 +1,4 @@
-"""Grades the example hand-ins of an assignment and compares what they get with what they must get.
+"""Grades the example submissions of an assignment and compares what they get with what they must get.
 
 It is how an assignment is tested: the reference gets full marks, each wrong solution loses the right ones. It
 prints nothing.
@@ -13,7 +13,7 @@ from decimal import Decimal
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.outcome import fault_words
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment
@@ -60,7 +60,7 @@ class CheckedAssignment:
         return (*of_examples, *(problem for figure in self.figures for problem in _figure_problems(figure)))
 
 
-def check_examples(name_or_path: str, *, rig: Rig) -> CheckedAssignment:
+def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignment:
     """Grade every example of the assignment. An assignment without examples has none to be wrong.
 
     Raises AssignmentError for an assignment, or an ``expected.toml``, that cannot be used.
@@ -71,7 +71,7 @@ def check_examples(name_or_path: str, *, rig: Rig) -> CheckedAssignment:
     results: list[ExampleResult] = []
     figures: tuple[Figure, ...] = ()
     for name in names:
-        result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), rig)
+        result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), runner)
         results.append(result)
         if name == REFERENCE and graded is not None:
             figures = tuple(_figure(original, graded) for original in wanted.original)
@@ -91,12 +91,12 @@ def example_names(name_or_path: str) -> tuple[str, ...]:
 
 
 def _check_example(
-    name_or_path: str, name: str, assignment: Assignment, wanted: Expectation | None, rig: Rig
+    name_or_path: str, name: str, assignment: Assignment, wanted: Expectation | None, runner: TrialRunner
 ) -> tuple[ExampleResult, Grade | None]:
     begin = time.monotonic()
     try:
         submission = read_submission(examples(name_or_path) / name, asked=assignment.parts)
-        graded = grade(submission, assignment, rig=rig)
+        graded = grade(submission, assignment, runner=runner)
     except UsageError as error:
         return ExampleResult(name, None, (), time.monotonic() - begin, (f"{name}: {error}",)), None
     seconds = time.monotonic() - begin

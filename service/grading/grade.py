@@ -83,7 +83,7 @@ class AccuracyCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class Prediction:
     """One picture the robot sent, what it showed and what was answered."""
 
     image: Image
@@ -138,7 +138,7 @@ class CriterionResult:
     visibility: str = "visible"
     evidence: tuple[Evidence, ...] = ()
     accuracy: Accuracy | None = None
-    sights: tuple[Sight, ...] = ()
+    predictions: tuple[Prediction, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
     shown: Shown | None = None  # None where every trial is visible
     unjudged: str = ""  # why it could not be judged, for staff; empty if it was
@@ -166,7 +166,7 @@ class TrialResult:
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """The marks of one job. ``walls`` says which layers stood around the student's code."""
+    """The marks of one job. ``sandbox`` says which layers stood around the student's code."""
 
     assignment: str
     assignment_title: str
@@ -175,7 +175,7 @@ class Grade:
     student: str
     criteria: tuple[CriterionResult, ...]
     trials: tuple[TrialResult, ...]
-    walls: str
+    sandbox: str
     grader_version: str
     notes: tuple[str, ...] = ()
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from

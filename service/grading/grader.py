@@ -11,17 +11,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from responders.bridge import ProgramOrder, TrialOrder
+from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderOrder
+from responders.conversation import Code, ResponderSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from service.grading.findings import HandedIn, does_without, look_at, reads_program, responder_limits
 from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
-from service.grading.notebook_trial import Marking, NotebookHandIn, run_notebook_trial
-from service.grading.rig import Rig
+from service.grading.notebook_trial import Marking, NotebookToRun, run_notebook_trial
+from service.grading.static_analysis import SubmittedParts, analyse, does_without, reads_program, responder_limits
 from service.grading.training import with_models_answers
+from service.grading.trial_runner import TrialRunner
 from service.version import GRADER_VERSION
 from sim.backgrounds import Floor, floor, floor_from_picture
 from sim.chance import Stream
@@ -62,7 +62,7 @@ def _nobody(progress: Progress) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """Who plays: the sources to run, and the files in the responder's folder."""
+    """Who takes part: the sources to run, and the files in the responder's folder."""
 
     program: Source | None  # None where the assignment runs no robot
     flags: Flags
@@ -71,7 +71,7 @@ class _Parts:
     notes: tuple[str, ...]
     notebook: Notebook | None = None  # answers the robot, and runs its own program if ``marked_cell`` says which
     marked_cell: str | None = None
-    program_cell: int | None = None  # of a notebook that is not played: where the program is
+    program_cell: int | None = None  # of a notebook that is not executed: where the program is
 
 
 def grade(
@@ -80,29 +80,29 @@ def grade(
     *,
     secret: Secret = PUBLIC,
     observe: Observe | None = None,
-    rig: Rig | None = None,
+    runner: TrialRunner | None = None,
 ) -> Grade:
     """The marks of ``submission`` in the worlds of the installation that has this secret.
 
-    Without a ``rig`` one is made for this grading and closed afterwards.
+    Without a ``runner`` one is made for this grading and closed afterwards.
 
     Raises UsageError when a part is missing that the assignment asks for, HostError when this machine fails,
     and whatever ``observe`` raises.
     """
-    if rig is None:
-        with Rig() as own:
-            return grade(submission, assignment, secret=secret, observe=observe, rig=own)
+    if runner is None:
+        with TrialRunner() as own:
+            return grade(submission, assignment, secret=secret, observe=observe, runner=own)
     parts = _parts(submission, assignment)
     trials = tuple(assignment.trials(secret))
     own_seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
     run: dict[int, TrialResult] = {}
     if any(trial.scenario.visibility != "visible" for trial in trials):
-        rig.check_forgetting()
+        runner.check_forgetting()
     watch = _Watch(observe or _nobody, len(trials))
-    meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.pulse)
-    for number in _run_order(trials, own_seed):
+    meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.heartbeat)
+    for number in _run_spec(trials, own_seed):
         trial = trials[number]
-        order = _order(trial, parts, assignment, _floor(assignment.world, trial.seed), submission)
+        spec = _spec(trial, parts, assignment, _floor(assignment.world, trial.seed), submission)
         run[number] = TrialResult(
             trial.scenario.id,
             trial.index,
@@ -110,7 +110,7 @@ def grade(
             trial.light_noise,
             trial.motor_noise,
             trial.scenario.visibility,
-            _recording(order, parts, assignment, rig, meter),
+            _recording(spec, parts, assignment, runner, meter),
             trial.sweep,
             trial.place,
         )
@@ -118,10 +118,10 @@ def grade(
     results = [run[number] for number in range(len(trials))]
     if assignment.training is not None and parts.responder is not None:
         results = with_models_answers(
-            results, assignment, assignment.training, parts.responder, parts.files, own_seed, rig, meter
+            results, assignment, assignment.training, parts.responder, parts.files, own_seed, runner, meter
         )
-    findings = look_at(_handed_in(submission, parts, own_seed), assignment, results, rig, meter)
-    criteria = judge_within(bounds_for(results), assignment, tuple(results), findings, meter.pulse)
+    analysis = analyse(_submitted_parts(submission, parts, own_seed), assignment, results, runner, meter)
+    criteria = judge_within(bounds_for(results), assignment, tuple(results), analysis, meter.heartbeat)
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
@@ -130,14 +130,14 @@ def grade(
         student=submission.student,
         criteria=criteria,
         trials=tuple(results),
-        walls=results[0].recording.walls if results else findings.walls or "no student code was run",
+        sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code was run",
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results), *_unjudged_notes(criteria)),
         secret_sha256=secret.sha256,
     )
 
 
-def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
+def _run_spec(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
     """The numbers of the trials as they are run: visible ones first, and else in an order of each submission's own.
 
     So what counts processes or looks at a clock does not tell a trial again, and what is shown was there before the
@@ -164,13 +164,13 @@ def _unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()
 
 
-def _handed_in(submission: Submission, parts: _Parts, own_seed: int) -> HandedIn:
+def _submitted_parts(submission: Submission, parts: _Parts, own_seed: int) -> SubmittedParts:
     """What is looked at without driving; of a notebook what is no robot program stands for the responder."""
     responder = parts.responder
     if parts.notebook is not None:
         responder = Source(parts.notebook.name, python_of(parts.notebook))
     cells = parts.notebook.cells if parts.notebook is not None else ()
-    return HandedIn(parts.program, responder, parts.flags, parts.files, submission.files, cells, own_seed)
+    return SubmittedParts(parts.program, responder, parts.flags, parts.files, submission.files, cells, own_seed)
 
 
 def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
@@ -179,7 +179,7 @@ def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
 
 
 class _Watch:
-    """Turns the many pulses of a trial into one call of the observer a second."""
+    """Turns the many heartbeats of a trial into one call of the observer a second."""
 
     def __init__(self, observe: Callable[[Progress], None], trials: int) -> None:
         self._observe = observe
@@ -187,7 +187,7 @@ class _Watch:
         self._done = 0
         self._last = time.monotonic()
 
-    def pulse(self) -> None:
+    def heartbeat(self) -> None:
         if time.monotonic() - self._last >= _OBSERVE_SECONDS:
             self._tell()
 
@@ -216,7 +216,7 @@ def _parts(submission: Submission, assignment: Assignment) -> _Parts:
 
 
 def _notebook_parts(submission: Submission, notebook: Notebook, assignment: Assignment) -> _Parts:
-    """A notebook that has to answer the robot is played; of any other only the marked robot program is taken."""
+    """A notebook that has to answer the robot is executed; of any other only the marked robot program is taken."""
     files = {**assignment.given, **submission.files}
     asked = assignment.parts
     if asked.program == "none":
@@ -229,7 +229,7 @@ def _notebook_parts(submission: Submission, notebook: Notebook, assignment: Assi
     cell = program_of(notebook, site)
     flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
-        # A line that cannot be read is told by the play, which may come to another cell.
+        # A line that cannot be read is told by its execution, which may come to another cell.
         notes = tuple(note for note in notes if not note.startswith(_IGNORED))
         if cell is not None:
             again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
@@ -243,14 +243,14 @@ def _notebook_parts(submission: Submission, notebook: Notebook, assignment: Assi
     return _Parts(program, flags, responder, files, notes, program_cell=cell.number)
 
 
-def _part(what: str, usual: str, who: str, handed_in: Source | None, assignment: Assignment) -> Source | None:
+def _part(what: str, usual: str, who: str, submitted: Source | None, assignment: Assignment) -> Source | None:
     if who == "none":
         return None
     if who != "student":
         return Source(who, assignment.given_parts[who])
-    if handed_in is None:
-        raise UsageError(f"the hand-in has no {what}; {assignment.id} asks for {usual}")
-    return handed_in
+    if submitted is None:
+        raise UsageError(f"the submission has no {what}; {assignment.id} asks for {usual}")
+    return submitted
 
 
 def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ...]]:
@@ -283,13 +283,15 @@ def _own_floor(name: str, picture: bytes) -> Floor:
     return floor_from_picture(name, picture)
 
 
-def _recording(order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Rig, meter: JobMeter) -> Recording:
+def _recording(
+    spec: TrialSpec, parts: _Parts, assignment: Assignment, runner: TrialRunner, meter: JobMeter
+) -> Recording:
     limits, obstacles = assignment.limits, assignment.world.obstacles
     if parts.notebook is not None:
-        hand_in = NotebookHandIn(parts.notebook, parts.files, responder_limits(assignment), limits.output_bytes)
+        grading_request = NotebookToRun(parts.notebook, parts.files, responder_limits(assignment), limits.output_bytes)
         as_read = parts.marked_cell is not None and reads_program(assignment)
-        return run_notebook_trial(hand_in, Marking(order, obstacles, parts.marked_cell, as_read), rig, meter)
-    recording = rig.run(order, obstacles, meter)
+        return run_notebook_trial(grading_request, Marking(spec, obstacles, parts.marked_cell, as_read), runner, meter)
+    recording = runner.run(spec, obstacles, meter)
     if parts.program_cell is None:
         return recording
     faults = (
@@ -299,20 +301,20 @@ def _recording(order: TrialOrder, parts: _Parts, assignment: Assignment, rig: Ri
     return replace(recording, faults=tuple(faults))
 
 
-def _order(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor, submission: Submission) -> TrialOrder:
+def _spec(trial: Trial, parts: _Parts, assignment: Assignment, ground: Floor, submission: Submission) -> TrialSpec:
     limits = assignment.limits
     if parts.program is None:
         raise AssignmentError(f"Assignment {assignment.id} has scenarios and no robot program to run in them.")
     responder = None
     if parts.responder is not None and assignment.training is None:
-        responder = ResponderOrder(
+        responder = ResponderSpec(
             Code(parts.responder.name, parts.responder.text),
             parts.files,
             responder_limits(assignment),
             limits.output_bytes,
         )
-    return TrialOrder(
-        program=ProgramOrder(
+    return TrialSpec(
+        program=ProgramSpec(
             Code(parts.program.name, parts.program.text),
             parts.flags.preamble,
             ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, does_without(assignment, "program")),

@@ -23,22 +23,22 @@ class Slots:
         self._gate, self._running = folder / "gate.lock", folder / "slots.lock"
 
     @contextmanager
-    def beside_others(self, pulse: Callable[[], None]) -> Iterator[None]:
-        """Run unless somebody runs alone, or waits to; ``pulse`` is called while waiting."""
+    def beside_others(self, heartbeat: Callable[[], None]) -> Iterator[None]:
+        """Run unless somebody runs alone, or waits to; ``heartbeat`` is called while waiting."""
         with ExitStack() as running:
-            with _locked(self._gate, fcntl.LOCK_SH, pulse):
-                running.enter_context(_locked(self._running, fcntl.LOCK_SH, pulse))
+            with _locked(self._gate, fcntl.LOCK_SH, heartbeat):
+                running.enter_context(_locked(self._running, fcntl.LOCK_SH, heartbeat))
             yield
 
     @contextmanager
-    def alone(self, pulse: Callable[[], None]) -> Iterator[None]:
+    def alone(self, heartbeat: Callable[[], None]) -> Iterator[None]:
         """Run when nobody else does, and let nobody else begin."""
-        with _locked(self._gate, fcntl.LOCK_EX, pulse), _locked(self._running, fcntl.LOCK_EX, pulse):
+        with _locked(self._gate, fcntl.LOCK_EX, heartbeat), _locked(self._running, fcntl.LOCK_EX, heartbeat):
             yield
 
 
 @contextmanager
-def _locked(path: Path, how: int, pulse: Callable[[], None]) -> Iterator[None]:
+def _locked(path: Path, how: int, heartbeat: Callable[[], None]) -> Iterator[None]:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         file = path.open("a")
@@ -50,6 +50,6 @@ def _locked(path: Path, how: int, pulse: Callable[[], None]) -> Iterator[None]:
                 fcntl.flock(file, how | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                pulse()
+                heartbeat()
                 time.sleep(_POLL_SECONDS)
         yield

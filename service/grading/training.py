@@ -1,6 +1,6 @@
-"""Marking a hand-in that trains: its model is trained on some trials' pictures and names those of the others.
+"""Marking a submission that trains: its model is trained on some trials' pictures and names those of the others.
 
-The robot's runs come first and are recorded like any; here the hand-in's answers are added to the recordings, so
+The robot's runs come first and are recorded like any; here the submission's answers are added to the recordings, so
 that they are judged like a responder's.
 """
 
@@ -15,12 +15,12 @@ import numpy as np
 
 from responders.conversation import Code
 from responders.sandbox.meter import JobMeter
-from responders.training import Images, Named, TrainingOrder
-from service.grading.findings import responder_limits
+from responders.training import Images, Named, TrainingSpec
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
-from service.grading.judging.patches import grey_picture
-from service.grading.rig import Rig
+from service.grading.judging.label_patches import grey_picture
+from service.grading.static_analysis import responder_limits
+from service.grading.trial_runner import TrialRunner
 from sim.chance import Stream
 from sim.recording import Fault, Image, Message, Recording, Verdict
 from submissions.assignment import Assignment, Training
@@ -34,16 +34,16 @@ def with_models_answers(
     results: Sequence[TrialResult],
     assignment: Assignment,
     training: Training,
-    hand_in: Source,
+    grading_request: Source,
     files: Mapping[str, bytes],
     child_seed: int,
-    rig: Rig,
+    runner: TrialRunner,
     meter: JobMeter,
 ) -> list[TrialResult]:
-    """The trials, those that are tested on with the answers of the hand-in's model to their pictures.
+    """The trials, those that are tested on with the answers of the submission's model to their pictures.
 
     What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
-    machine fails, and whatever the meter's pulse raises.
+    machine fails, and whatever the meter's heartbeat raises.
     """
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
@@ -55,9 +55,9 @@ def with_models_answers(
     # Not in the order of the track: neighbours on it mostly show the same.
     chance = Stream(child_seed, "order of pictures")
     orders = [sorted(range(len(pictures)), key=chance.integer) for pictures in unseen]
-    named = rig.train(
-        TrainingOrder(
-            Code(hand_in.name, hand_in.text),
+    named = runner.train(
+        TrainingSpec(
+            Code(grading_request.name, grading_request.text),
             files,
             training.function,
             _arrays([pair for pair, _ in known], training),

@@ -1,6 +1,6 @@
 """The bundled Valkey on a Unix socket in the home: used where it runs, started where it does not, ending with us.
 
-At most one runs in a home, because the server itself holds the lock. What it keeps are nudges, which may be lost.
+At most one runs in a home, because the server itself holds the lock. What it keeps are notices, which may be lost.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ class EmbeddedBroker:
         data = self._settings.home / "broker"
         if self._begin(data, log, lock):
             return
-        # What it kept cannot be read, perhaps. It is only nudges; the sweeper gives them again.
+        # What it kept cannot be read, perhaps. It is only notices; the sweeper gives them again.
         aside = data.with_name("broker.unreadable")
         shutil.rmtree(aside, ignore_errors=True)
         data.replace(aside)

@@ -17,9 +17,9 @@ QUEUES = (Lane.INTERACTIVE.value, Lane.BATCH.value, PLOTS)
 GRADE_TASK = "robomark.grade"
 PLOT_TASK = "robomark.plot"
 
-#: The key under which the worker's command line tells its pool children that they are to do without walls; no
+#: The key under which the worker's command line tells its pool children that they are to do without the sandbox; no
 #: setting, variable or task can.
-NO_WALLS = "robomark_no_walls"
+NO_SANDBOX = "robomark_no_sandbox"
 
 #: A pool child is replaced when it has grown so far (KiB); one with its zygotes' parents is far below.
 _CHILD_KIB = 1_000_000

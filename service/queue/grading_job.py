@@ -1,4 +1,4 @@
-"""One job from claim to stored marks, and one job's plots: what a worker does when it is nudged.
+"""One job from claim to stored marks, and one job's plots: what a worker does when it is notified.
 
 Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
 """
@@ -15,7 +15,7 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from service.grading.grader import Progress, grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.queue.plotting import draw
 from service.settings import Settings
 from service.store import grades, intake, jobs
@@ -31,7 +31,7 @@ _PROGRESS_SECONDS = 2.0
 
 
 class Outcome(Enum):
-    """What came of a nudge."""
+    """What came of a notice."""
 
     NOTHING_DUE = "nothing due"
     GRADED = "graded"
@@ -40,7 +40,7 @@ class Outcome(Enum):
     HOST_FAULT = "host fault"  # ours; the job is tried again, or dead
 
 
-def grade_next(store: Store, settings: Settings, rig: Rig, worker: str) -> Outcome:
+def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> Outcome:
     """Claim the job whose turn it is, grade it and store its marks.
 
     Only trouble with the database itself raises: whatever else happens to a claimed job is written into its row.
@@ -50,13 +50,13 @@ def grade_next(store: Store, settings: Settings, rig: Rig, worker: str) -> Outco
         return Outcome.NOTHING_DUE
     with structlog.contextvars.bound_contextvars(job=claim.job_id, attempt=claim.attempt, worker=worker):
         try:
-            _grade(store, settings, rig, claim)
+            _grade(store, settings, runner, claim)
         except Cancelled as error:
             _log.info("job.stopped", reason=str(error))
             return Outcome.STOPPED
         except UsageError as error:
             reason = str(error)
-            _end(lambda: jobs.bury(store, claim, reason))
+            _end(lambda: jobs.give_up(store, claim, reason))
             return Outcome.UNUSABLE
         except Exception as error:
             # Whatever it was, it was not the student: their faults come back as verdicts.
@@ -74,20 +74,22 @@ def plot_next(store: Store, settings: Settings) -> str | None:
         return None
     with store.reading() as session:
         graded = grades.load(session, job_id)
-        hand_in = intake.load_hand_in(session, job_id)
-    files = draw(graded, hand_in.assignment)
+        grading_request = intake.load_grading_request(session, job_id)
+    files = draw(graded, grading_request.assignment)
     _persistent(lambda: jobs.finish_plots(store, job_id, files), settings.lease_seconds)
     return job_id
 
 
-def _grade(store: Store, settings: Settings, rig: Rig, claim: jobs.Claim) -> None:
-    if jobs.finish_with_copy(store, claim):
+def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Claim) -> None:
+    if jobs.finish_from_cache(store, claim):
         _log.info("job.copied")
         return
     watch = _Heartbeat(store, settings, claim)
     with store.reading() as session:
-        hand_in = intake.load_hand_in(session, claim.job_id)
-    graded = grade(hand_in.submission, hand_in.assignment, secret=secret_of(store), observe=watch, rig=rig)
+        grading_request = intake.load_grading_request(session, claim.job_id)
+    graded = grade(
+        grading_request.submission, grading_request.assignment, secret=secret_of(store), observe=watch, runner=runner
+    )
     graded_at = watch.now()
     for result in graded.criteria:
         if result.unjudged:
@@ -134,7 +136,7 @@ class _Heartbeat:
         try:
             jobs.heartbeat(self._store, self._claim, self._settings.lease_seconds, share)
         except DBAPIError as error:
-            # The next pulse tries again; should the lease run out meanwhile, the token tells.
+            # The next heartbeat tries again; should the lease run out meanwhile, the token tells.
             _log.warning("heartbeat.failed", error=str(error))
         else:
             self._kept = moment

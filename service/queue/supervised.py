@@ -18,7 +18,7 @@ from service.queue.processes import end_processes, keep_small, start_process
 from service.queue.tasks import WORKER_VARIABLE
 from service.queue.worker import alive_path, new_worker_name
 from service.settings import Settings
-from service.store import jobs, presence
+from service.store import jobs, workers
 from service.store.engine import Store
 
 #: One that ends sooner than this after its start is started again only after a wait, which doubles.
@@ -131,7 +131,7 @@ class SupervisedWorker:
         if not self._name:
             return 0
         given_back = jobs.release_worker(self._store, self._name)
-        presence.forget(self._store, self._name)
+        workers.forget(self._store, self._name)
         alive_path(self._settings, self._name).unlink(missing_ok=True)
         self._name = ""
         return given_back

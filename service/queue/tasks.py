@@ -1,6 +1,6 @@
-"""The two Celery tasks, and what a pool child keeps warm for them: the rig and the database.
+"""The two Celery tasks, and what a pool child keeps warm for them: the runner and the database.
 
-A task is a nudge and carries nothing; what to do is claimed in the database.
+A task is a notice and carries nothing; what to do is claimed in the database.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from celery import Task, current_app, shared_task, signals
 
 from responders.sandbox import control_group
 from responders.sandbox.manager import FULL, NONE
-from service.grading.rig import Rig
 from service.grading.slots import Slots
-from service.queue.canaries import Watch
-from service.queue.celery_app import GRADE_TASK, NO_WALLS, PLOT_TASK
+from service.grading.trial_runner import TrialRunner
+from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK
 from service.queue.grading_job import Outcome, grade_next, plot_next
 from service.queue.logs import configure_logging
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
+from service.queue.self_test import Watch
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
 
@@ -43,12 +43,12 @@ class PoolChild:
 
     settings: Settings
     store: Store
-    rig: Rig
+    runner: TrialRunner
     watch: Watch
 
     def close(self) -> None:
         self.watch.end()
-        self.rig.close()
+        self.runner.close()
         self.store.close()
 
 
@@ -68,12 +68,12 @@ class _Children:
     @cached_property
     def child(self) -> PoolChild:
         settings = load_settings()
-        unsafe = current_app.conf.get(NO_WALLS)
+        unsafe = current_app.conf.get(NO_SANDBOX)
         group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
-        store, rig = open_store(settings), Rig(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
-        watch = Watch(store, rig, worker_name(), settings.canary_seconds)
+        store, runner = open_store(settings), TrialRunner(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
+        watch = Watch(store, runner, worker_name(), settings.self_test_seconds)
         watch.keep_looking()
-        return PoolChild(settings, store, rig, watch)
+        return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
         """Close what there is; the next task makes it afresh."""
@@ -86,20 +86,20 @@ _children = _Children()
 
 
 @shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
-def grade_nudge(task: WarmTask) -> None:
+def grade_notice(task: WarmTask) -> None:
     """Grade the job whose turn it is, then ask for its plots."""
     child = task.child
     with child.watch.busy():
-        outcome = grade_next(child.store, child.settings, child.rig, worker_name())
+        outcome = grade_next(child.store, child.settings, child.runner, worker_name())
     if outcome is Outcome.GRADED:
-        Nudger(task.app, child.store, child.settings).plot()
+        Notifier(task.app, child.store, child.settings).plot()
     elif outcome is Outcome.HOST_FAULT:
         # Whatever broke may be something that was kept warm.
         _children.drop()
 
 
 @shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
-def plot_nudge(task: WarmTask) -> None:
+def plot_notice(task: WarmTask) -> None:
     """Draw the plots that have waited longest."""
     child = task.child
     try:
@@ -121,7 +121,7 @@ def _begin(**_: object) -> None:
         Path("/proc/self/oom_score_adj").write_text("300")
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
-        _children.child.rig.check_walls()
+        _children.child.runner.check_sandbox()
         _children.child.watch.look()
     except Exception:
         _log.exception("pool_child.cold")

@@ -19,15 +19,15 @@ from sqlalchemy.exc import DBAPIError
 from responders.sandbox import control_group
 from responders.sandbox.manager import FULL, NONE, Sandboxes
 from service.home import keep_private, open_home
-from service.queue.celery_app import NO_WALLS, QUEUES, make_celery
+from service.queue.celery_app import NO_SANDBOX, QUEUES, make_celery
 from service.queue.logs import configure_logging
 from service.queue.processes import run_file
 from service.queue.tasks import WORKER_VARIABLE
 from service.queue.worker_steps import add_steps
 from service.settings import Settings, load_settings
-from service.store import canaries, jobs, presence
+from service.store import jobs, self_tests, workers
 from service.store.engine import Store, open_store
-from service.store.presence import Worker
+from service.store.workers import WorkerDescription
 from service.version import GRADER_VERSION
 from sim.errors import HostError, UsageError
 
@@ -54,9 +54,9 @@ def alive_path(settings: Settings, name: str) -> Path:
 def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     """Work until told to stop; returns the exit status. ``settings.broker_url`` must name a broker.
 
-    ``unsafe`` does without the walls; every grade says so.
+    ``unsafe`` does without the sandbox; every grade says so.
 
-    Raises UsageError without one, HostError when the database cannot be used or the walls round student code cannot
+    Raises UsageError without one, HostError when the database cannot be used or the sandbox round student code cannot
     be put up.
     """
     if not settings.broker_url:
@@ -65,7 +65,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     undivided = control_group.divide()
     group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
     with Sandboxes(NONE if unsafe else FULL, group) as sandboxes:
-        walls = sandboxes.check()
+        sandbox = sandboxes.check()
     os.environ.update(settings.environment())
     name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
     # A responder's arithmetic is small; threads of the linear algebra library would only fight for the cores.
@@ -77,8 +77,8 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         # Shared: several workers of one home may live; whoever asks wants to know whether any does.
         fcntl.flock(lock, fcntl.LOCK_SH)
         app = make_celery(settings)
-        app.conf[NO_WALLS] = unsafe
-        described = Worker(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, walls)
+        app.conf[NO_SANDBOX] = unsafe
+        described = WorkerDescription(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, sandbox)
         add_steps(app, store, settings, described, alive_path(settings, name))
         arguments = ["worker", "--hostname", f"{name}@%h", "--queues", ",".join(QUEUES)]
         arguments += ["--pool", "prefork", "--without-gossip", "--without-mingle"]
@@ -97,7 +97,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
 
 def _in_quarantine(store: Store, name: str) -> bool:
     with store.reading() as session:
-        return canaries.is_in_quarantine(session, name)
+        return self_tests.is_in_quarantine(session, name)
 
 
 @contextmanager
@@ -122,7 +122,7 @@ def release_dead_workers(settings: Settings, store: Store) -> int:
         with suppress(OSError), run_file(path).open("a") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             given_back += jobs.release_worker(store, path.stem)
-            presence.forget(store, path.stem)
+            workers.forget(store, path.stem)
             path.unlink(missing_ok=True)
     return given_back
 
@@ -130,7 +130,7 @@ def release_dead_workers(settings: Settings, store: Store) -> int:
 def _give_back(store: Store, name: str) -> None:
     try:
         jobs.release_worker(store, name)
-        presence.forget(store, name)
+        workers.forget(store, name)
     except DBAPIError as error:
         _log.warning("worker.not_given_back", error=str(error))
 

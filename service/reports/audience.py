@@ -64,8 +64,12 @@ def _severity(trial: TrialResult) -> int:
 
 def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -> CriterionResult:
     evidence = tuple(replace(item, trial=new_index[item.trial]) for item in result.evidence if item.trial in new_index)
-    sights = tuple(replace(sight, trial=new_index[sight.trial]) for sight in result.sights if sight.trial in new_index)
-    kept = replace(result, evidence=evidence, sights=sights)
+    predictions = tuple(
+        replace(prediction, trial=new_index[prediction.trial])
+        for prediction in result.predictions
+        if prediction.trial in new_index
+    )
+    kept = replace(result, evidence=evidence, predictions=predictions)
     if len(evidence) == len(result.evidence):
         return replace(kept, shown=None)
     # A grade of before this was kept apart tells nothing.

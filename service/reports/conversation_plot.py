@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from service.grading.grade import TrialResult
-from service.reports.figure import (
+from service.reports.plot_style import (
     FAINT,
     FAULT,
     HEAD,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from service.reports.figure import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
+from service.reports.plot_style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
 from sim.backgrounds import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm

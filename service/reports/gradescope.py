@@ -34,7 +34,7 @@ def gradescope_document(grade: Grade) -> dict[str, Any]:
             "assignment_version": grade.assignment_version,
             "submission": grade.submission,
             "grader_version": grade.grader_version,
-            "walls": grade.walls,
+            "sandbox": grade.sandbox,
         },
     }
 
@@ -68,4 +68,4 @@ def _output(grade: Grade) -> str:
     lines = [words.happened, words.whose, words.next_step]
     for group in fault_groups(shown, limit=10):
         lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
-    return "\n".join([*lines, f"walls: {grade.walls}"])
+    return "\n".join([*lines, f"sandbox: {grade.sandbox}"])

@@ -77,7 +77,7 @@ def staff_report(grade: Grade, plots: Mapping[str, bytes], submission: Submissio
     return _page(grade, plots, submission, staff=True, withheld=False)
 
 
-def batch_index(rows: Sequence[BatchRow], title: str = "Batch", walls: str = "") -> str:
+def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "") -> str:
     """A page with one row a student: marks, verdict, and a link to the report."""
     graded = [row for row in rows if row.marks is not None]
     cells = [
@@ -92,7 +92,7 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", walls: str = "")
         }
         for row in rows
     ]
-    return _render("batch.html", title=title, rows=cells, graded=len(graded), walls=walls)
+    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox)
 
 
 def _page(

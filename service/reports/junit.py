@@ -56,6 +56,6 @@ def _properties(grade: Grade) -> list[tuple[str, str]]:
         ("verdict", grade.verdict.value),
         ("assignment_version", grade.assignment_version),
         ("submission", grade.submission),
-        ("walls", grade.walls),
+        ("sandbox", grade.sandbox),
         ("grader_version", grade.grader_version),
     ]

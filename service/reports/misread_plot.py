@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from service.grading.grade import Sight
-from service.reports.figure import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.grading.grade import Prediction
+from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.predictions_plot import focus_picture, is_right
 from service.reports.readable import one_line
-from service.reports.sights_plot import focus_picture, is_right
 
 MOST_MISREAD = 6
 _SIDE, _GAP, _ROW = 1.02, 0.16, 1.40  # inches
@@ -30,27 +30,32 @@ class Misread:
     """A picture that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
 
     number: int  # of the picture, from 1
-    sight: Sight
-    like_truth: Sight | None
-    like_answer: Sight | None
+    prediction: Prediction
+    like_truth: Prediction | None
+    like_answer: Prediction | None
 
 
-def misread(sights: Sequence[Sight]) -> tuple[Misread, ...]:
+def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
     """Every picture that was answered, and wrongly, in the order in which they were sent.
 
     The nearest ones are looked for only for the pictures that are drawn.
     """
     wrong = [
-        (number, sight)
-        for number, sight in enumerate(sights, start=1)
-        if sight.answer is not None and not is_right(sight)
+        (number, prediction)
+        for number, prediction in enumerate(predictions, start=1)
+        if prediction.answer is not None and not is_right(prediction)
     ]
-    greys = [(sight, _greys(sight)) for sight in sights if is_right(sight)] if wrong else []
+    greys = [(prediction, _greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
     drawn = (
-        Misread(number, sight, _nearest(sight, sight.truth, greys), _nearest(sight, sight.answer, greys))
-        for number, sight in wrong[:MOST_MISREAD]
+        Misread(
+            number,
+            prediction,
+            _nearest(prediction, prediction.truth, greys),
+            _nearest(prediction, prediction.answer, greys),
+        )
+        for number, prediction in wrong[:MOST_MISREAD]
     )
-    return (*drawn, *(Misread(number, sight, None, None) for number, sight in wrong[MOST_MISREAD:]))
+    return (*drawn, *(Misread(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
 
 
 def draw_misread(found: Sequence[Misread], pictures: int, title: str) -> Figure:
@@ -73,7 +78,7 @@ def draw_misread(found: Sequence[Misread], pictures: int, title: str) -> Figure:
 
 
 def _draw_row(axes: Axes, item: Misread, y: float) -> None:
-    _draw_picture(axes, item.sight, 0, y, FAULT, 1.8)
+    _draw_picture(axes, item.prediction, 0, y, FAULT, 1.8)
     for column, other in ((1, item.like_truth), (2, item.like_answer)):
         if other is None:
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE / 2, "none", FAINT, 8, ha="center")
@@ -82,9 +87,9 @@ def _draw_row(axes: Axes, item: Misread, y: float) -> None:
     lines = [
         (f"{item.number}. ✗ wrong", FAULT, True),
         ("truth:", FAINT, False),
-        (one_line(item.sight.truth, 40), INK, False),
+        (one_line(item.prediction.truth, 40), INK, False),
         ("answered:", FAINT, False),
-        (one_line(item.sight.answer or "", 40), INK, False),
+        (one_line(item.prediction.answer or "", 40), INK, False),
     ]
     line = 0
     for text, colour, bold in lines:
@@ -97,8 +102,8 @@ def _draw_row(axes: Axes, item: Misread, y: float) -> None:
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
 
 
-def _draw_picture(axes: Axes, sight: Sight, x: float, y: float, colour: str, width: float) -> None:
-    pixels = np.repeat(np.asarray(focus_picture(sight.image))[:, :, None], 3, axis=2)
+def _draw_picture(axes: Axes, prediction: Prediction, x: float, y: float, colour: str, width: float) -> None:
+    pixels = np.repeat(np.asarray(focus_picture(prediction.image))[:, :, None], 3, axis=2)
     axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
     axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=colour, linewidth=width))
 
@@ -109,11 +114,13 @@ def _write(
     axes.text(x, y, drawable(text), color=colour, font=font(size, bold=bold), ha=ha, va="center", parse_math=False)
 
 
-def _greys(sight: Sight) -> NDArray[np.float64]:
-    return np.asarray(focus_picture(sight.image), dtype=np.float64)
+def _greys(prediction: Prediction) -> NDArray[np.float64]:
+    return np.asarray(focus_picture(prediction.image), dtype=np.float64)
 
 
-def _nearest(sight: Sight, label: str | None, greys: Sequence[tuple[Sight, NDArray[np.float64]]]) -> Sight | None:
-    own = _greys(sight)
-    alike = [(sight, grey) for sight, grey in greys if sight.truth == label and grey.shape == own.shape]
+def _nearest(
+    prediction: Prediction, label: str | None, greys: Sequence[tuple[Prediction, NDArray[np.float64]]]
+) -> Prediction | None:
+    own = _greys(prediction)
+    alike = [(prediction, grey) for prediction, grey in greys if prediction.truth == label and grey.shape == own.shape]
     return min(alike, key=lambda pair: float(((pair[1] - own) ** 2).sum()), default=(None, own))[0]

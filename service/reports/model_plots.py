@@ -18,7 +18,7 @@ from models.evaluation import Answered, Evaluation
 from models.preprocessing import Grey
 from service.reports import curve_plot
 from service.reports.confusion_plot import Table, draw_table
-from service.reports.figure import (
+from service.reports.plot_style import (
     FAINT,
     FAULT,
     HEAD,

@@ -109,7 +109,7 @@ class Page:
     trials: tuple[TrialLine, ...]
     more_trials: int
     notes: tuple[str, ...]
-    weak_walls: bool
+    weak_sandbox: bool
 
 
 def page_of(grade: Grade, submission: Submission | None = None) -> Page:
@@ -134,7 +134,7 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
-        weak_walls=PROCESS_LIMITS in grade.walls,
+        weak_sandbox=PROCESS_LIMITS in grade.sandbox,
     )
 
 

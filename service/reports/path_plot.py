@@ -20,7 +20,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
-from service.reports.figure import (
+from service.reports.plot_style import (
     FAINT,
     FAULT,
     HEAD,

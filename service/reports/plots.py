@@ -18,19 +18,19 @@ from service.reports.audience import BEFORE_PUBLICATION, scenarios, student_view
 from service.reports.confusion_plot import draw_confusion
 from service.reports.conversation_plot import draw_conversation
 from service.reports.curve_plot import Curve, Panel, draw_curves
-from service.reports.figure import png
 from service.reports.misread_plot import draw_misread, misread
 from service.reports.path_plot import Picture, draw_path
+from service.reports.plot_style import png
+from service.reports.predictions_plot import chosen_predictions, draw_predictions, is_right
 from service.reports.readable import one_line
 from service.reports.sensor_plot import draw_sensors
-from service.reports.sights_plot import chosen_sights, draw_sights, is_right
 from service.reports.track_plot import draw_track, tracks, worst_track
 from sim.backgrounds import floor as floor_of
 from sim.errors import UsageError
 from sim.recording import Recording
 from submissions.sweep import CONDITIONS, Varied
 
-Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "sights"]
+Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "predictions"]
 _NO_PICTURES: Mapping[str, Picture] = MappingProxyType({})
 
 
@@ -83,12 +83,12 @@ def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
     if plot.kind == "curves":
         return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
     if plot.kind == "track":
-        worst = worst_track(result.sights, grade.trials)
+        worst = worst_track(result.predictions, grade.trials)
         floor = _floor(grade.trials[worst].recording, pictures)
-        return draw_track(result.sights, grade.trials, plot.title, floor)
+        return draw_track(result.predictions, grade.trials, plot.title, floor)
     if plot.kind == "misread":
-        return draw_misread(misread(result.sights), len(result.sights), plot.title)
-    return draw_sights(result.sights, plot.title)
+        return draw_misread(misread(result.predictions), len(result.predictions), plot.title)
+    return draw_predictions(result.predictions, plot.title)
 
 
 def _panel(curve: AccuracyCurve) -> Panel:
@@ -128,18 +128,22 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
             )  # fmt: skip
         yield from _along(grade, index, result, suffix)
-        if result.sights:
-            shown = len(chosen_sights(result.sights))
-            wrong = [sight for sight in result.sights if not is_right(sight)]
+        if result.predictions:
+            shown = len(chosen_predictions(result.predictions))
+            wrong = [prediction for prediction in result.predictions if not is_right(prediction)]
             told = "; ".join(
-                f"{one_line(sight.truth, 40)} answered as {one_line(sight.answer or 'nothing', 40)}"
-                for sight in wrong[:4]
+                f"{one_line(prediction.truth, 40)} answered as {one_line(prediction.answer or 'nothing', 40)}"
+                for prediction in wrong[:4]
             )
             yield Plot(
-                f"sights-{_slug(result.id)}{suffix}", "sights", index, "", _title(grade, "what the sensor saw"),
+                f"predictions-{_slug(result.id)}{suffix}",
+                "predictions",
+                index,
+                "",
+                _title(grade, "what the sensor saw"),
                 "What the left light sensor sent, whole and in the focus that a network is shown. "
                 "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
-                f"{shown} sensor pictures, {len(wrong)} of {len(result.sights)} answered wrongly"
+                f"{shown} sensor pictures, {len(wrong)} of {len(result.predictions)} answered wrongly"
                 + (f": {told}." if told else "."),
             )  # fmt: skip
 
@@ -158,22 +162,22 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
             f"How often pictures were named rightly as conditions got harder, for “{title}”.",
             f"Curves of accuracy. {told}.",
         )  # fmt: skip
-    on_track = tracks(result.sights, grade.trials)
+    on_track = tracks(result.predictions, grade.trials)
     if on_track:
-        right = sum(is_right(sight) for sight in result.sights)
+        right = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
             f"track-{_slug(result.id)}{suffix}", "track", index, "", _title(grade, "along the track"),
             "Where pictures were taken and whether they were named rightly: in the trial with most mistakes over the "
             "floor, and in all trials by the way driven.",
-            f"{right} of {len(result.sights)} pictures right along the track in {len(on_track)} trials.",
+            f"{right} of {len(result.predictions)} pictures right along the track in {len(on_track)} trials.",
         )  # fmt: skip
-    wrong = misread(result.sights)
+    wrong = misread(result.predictions)
     if wrong:
         yield Plot(
             f"misread-{_slug(result.id)}{suffix}", "misread", index, "", _title(grade, "what was misread"),
             "Pictures that were misread, each beside the nearest one of the same truth that was read rightly, and the "
             "nearest right one of what it was taken for.",
-            f"{len(wrong)} of {len(result.sights)} pictures were misread.",
+            f"{len(wrong)} of {len(result.predictions)} pictures were misread.",
         )  # fmt: skip
 
 
@@ -225,9 +229,9 @@ def _conversations(grade: Grade) -> Iterator[Plot]:
 
 def _hidden_classification(grade: Grade, result: CriterionResult) -> bool:
     return result.visibility not in BEFORE_PUBLICATION or any(
-        grade.trials[sight.trial].visibility not in BEFORE_PUBLICATION
-        for sight in result.sights
-        if 0 <= sight.trial < len(grade.trials)
+        grade.trials[prediction.trial].visibility not in BEFORE_PUBLICATION
+        for prediction in result.predictions
+        if 0 <= prediction.trial < len(grade.trials)
     )
 
 

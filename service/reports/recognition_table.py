@@ -1,6 +1,6 @@
 """What a report tells of recognition in figures: what became of the pictures, and each class's precision and recall.
 
-Plain texts for a template; everything was counted when the work was marked.
+Json texts for a template; everything was counted when the work was marked.
 """
 
 from __future__ import annotations

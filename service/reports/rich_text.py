@@ -30,7 +30,7 @@ def rich_report(grade: Grade) -> RenderableType:
     if grade.accuracy is not None:
         parts.append(Text(accuracy_words(grade)))
     parts += [Text(f"Note: {readable(note, 300)}", style="dim") for note in grade.notes[:20]]
-    parts.append(Text(f"walls: {one_line(grade.walls)}", style="dim"))
+    parts.append(Text(f"sandbox: {one_line(grade.sandbox)}", style="dim"))
     return Group(*parts)
 
 

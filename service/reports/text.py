@@ -34,7 +34,7 @@ def plain_text(grade: Grade) -> str:
         lines += ["", accuracy_words(grade)]
     for note in grade.notes[:20]:
         lines += _wrapped(f"Note: {readable(note, 300)}", indent=6)
-    lines += ["", f"walls: {one_line(grade.walls)}", ""]
+    lines += ["", f"sandbox: {one_line(grade.sandbox)}", ""]
     return "\n".join(line.rstrip() for line in lines)
 
 

@@ -59,7 +59,7 @@ def trace(recording: Recording) -> dict[str, Any]:
         "start": {"t": 0.0, **_pose(recording.start)},
         "end": {"t": _finite(recording.end_t), **_pose(recording.end)},
         "sha256": recording.sha256,
-        "walls": recording.walls,
+        "sandbox": recording.sandbox,
     }
 
 

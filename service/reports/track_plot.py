@@ -15,10 +15,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.intervals import wilson
-from service.grading.grade import Sight, TrialResult
+from service.grading.grade import Prediction, TrialResult
 from service.grading.judging.places import part_at
 from service.reports.curve_plot import Curve, draw_curve
-from service.reports.figure import (
+from service.reports.path_plot import Picture, View, draw_floor
+from service.reports.plot_style import (
     FAINT,
     FAULT,
     HEAD,
@@ -33,8 +34,7 @@ from service.reports.figure import (
     set_tick_type,
     write,
 )
-from service.reports.path_plot import Picture, View, draw_floor
-from service.reports.sights_plot import is_right
+from service.reports.predictions_plot import is_right
 from sim.recording import Recording
 
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.56
@@ -56,48 +56,50 @@ class Taken:
     answered: bool
 
 
-def tracks(sights: Sequence[Sight], trials: Sequence[TrialResult]) -> tuple[int, ...]:
+def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
     """The trials, by index, in which pictures were taken at places far enough apart to speak of a track."""
     found = []
-    for index in dict.fromkeys(sight.trial for sight in sights):
-        places = [part_at(trials[index].recording, "left", s.image.pose) for s in sights if s.trial == index]
+    for index in dict.fromkeys(prediction.trial for prediction in predictions):
+        places = [part_at(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
         if len(places) > 2 and max(math.dist(places[0], place) for place in places) >= _LEAST_WAY:
             found.append(index)
     return tuple(found)
 
 
-def taken(sights: Sequence[Sight], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
+def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
     """The pictures of one trial, in the order in which they were sent."""
     recording = trials[index].recording
     way = _way_driven(recording)
     return tuple(
         Taken(
-            *part_at(recording, "left", sight.image.pose),
-            way[min(max(sight.image.tick, 0), len(way) - 1)],
-            sight.image.pose.heading,
-            is_right(sight),
-            sight.answer is not None,
+            *part_at(recording, "left", prediction.image.pose),
+            way[min(max(prediction.image.tick, 0), len(way) - 1)],
+            prediction.image.pose.heading,
+            is_right(prediction),
+            prediction.answer is not None,
         )
-        for sight in sights
-        if sight.trial == index
+        for prediction in predictions
+        if prediction.trial == index
     )
 
 
-def worst_track(sights: Sequence[Sight], trials: Sequence[TrialResult]) -> int:
+def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> int:
     """Of the trials with a track the one with the smallest share of right pictures, the first of equals."""
 
     def share_right(index: int) -> float:
-        own = [is_right(sight) for sight in sights if sight.trial == index]
+        own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
         return sum(own) / len(own)
 
-    return min(tracks(sights, trials), key=share_right)
+    return min(tracks(predictions, trials), key=share_right)
 
 
-def draw_track(sights: Sequence[Sight], trials: Sequence[TrialResult], title: str, floor: Picture | None) -> Figure:
+def draw_track(
+    predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Picture | None
+) -> Figure:
     """The worst trial's pictures over its floor, and the share right along the way in all trials with a track."""
-    own = tracks(sights, trials)
-    by_trial = {index: taken(sights, trials, index) for index in own}
-    worst = worst_track(sights, trials)
+    own = tracks(predictions, trials)
+    by_trial = {index: taken(predictions, trials, index) for index in own}
+    worst = worst_track(predictions, trials)
     pictures = [item for items in by_trial.values() for item in items]
     right = sum(item.right for item in pictures)
     view = _view(by_trial[worst])

@@ -40,7 +40,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "error in the robot program",
             "Your robot program stopped with an error before it was done.",
             "The error is in your robot program.",
-            "Go to the line named below, mend it, and run the program once in the simulator before handing it in.",
+            "Go to the line named below, mend it, and run the program once in the simulator before submitting it.",
             "bad",
         ),
         Verdict.RESPONDER_ERROR: VerdictWords(

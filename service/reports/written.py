@@ -1,4 +1,4 @@
-"""Reports as files in a folder: one HTML page a hand-in. Making the page is ``html.py``'s."""
+"""Reports as files in a folder: one HTML page a submission. Making the page is ``html.py``'s."""
 
 from __future__ import annotations
 

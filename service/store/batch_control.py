@@ -30,7 +30,7 @@ class Controlled:
 
 @dataclass(frozen=True, slots=True)
 class Retried:
-    """How many dead jobs wait again, and how many stay dead because their student handed in anew."""
+    """How many dead jobs wait again, and how many stay dead because their student submitted anew."""
 
     queued: int
     outdated: int
@@ -91,7 +91,7 @@ def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retrie
         before = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
         at = now(session)
         values = {"state": JobState.QUEUED, "attempt": 0, "progress": 0.0, "error": None}
-        values |= {"due_at": at, "nudged_at": None, "finished_at": None}
+        values |= {"due_at": at, "notified_at": None, "finished_at": None}
         _change_jobs(session, (*dead, Job.submission_id.in_(of_newest)), values)
         left = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
         if before > left:
@@ -104,8 +104,8 @@ def _set(store: Store, batch_id: str, state: BatchState, action: str, actor: str
         before = _state(session, batch_id)
         _refuse_cancelled(before, batch_id)
         session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
-        # So that what goes on is nudged for at once.
-        _change_jobs(session, (Job.batch_id == batch_id, Job.state == JobState.QUEUED), {"nudged_at": None})
+        # So that what goes on is notified for at once.
+        _change_jobs(session, (Job.batch_id == batch_id, Job.state == JobState.QUEUED), {"notified_at": None})
         if before is not state:
             audit.note(session, actor, action, "batch", batch_id)
         return Controlled(before is not state, *_unfinished(session, batch_id))
@@ -121,7 +121,7 @@ def _state(session: Session, batch_id: str) -> BatchState:
 
 def _refuse_cancelled(state: BatchState, batch_id: str) -> None:
     if state is BatchState.CANCELLED:
-        raise UsageError(f"batch {batch_id} was cancelled; hand it in again to have the rest of it graded")
+        raise UsageError(f"batch {batch_id} was cancelled; submit it again to have the rest of it graded")
 
 
 def _unfinished(session: Session, batch_id: str) -> tuple[int, int]:

@@ -42,14 +42,14 @@ class JobLine:
     attempt: int  # the student's
     error: str | None
     plots: PlotState
-    walls: str | None  # what stood around the student's code
+    sandbox: str | None  # what stood around the student's code
     worker: str | None
     queued_at: datetime
     finished_at: datetime | None
     standing: Standing
     copied_from: str | None  # the identical grade that was run
     suspect: str | None  # why the grade is not to be trusted
-    staff_only: str | None  # the limit that the hand-in was over
+    staff_only: str | None  # the limit that the submission was over
     unjudged: int  # criteria that could not be judged
     surprises: int  # trials in which our own code stumbled over what a child sent
     days_late: int
@@ -71,7 +71,7 @@ class BatchLine:
     problems: tuple[tuple[str, str], ...]  # the rows that were refused: name, sentence
     jobs: int
     states: dict[JobState, int]
-    regrade_of: str | None  # the batch whose hand-ins these are
+    regrade_of: str | None  # the batch whose submissions these are
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def batch(session: Session, batch_id: str) -> BatchLine:
 
 
 def job_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """The job that stands for each hand-in of a batch, by student; of a batch of regrades its own jobs."""
+    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs."""
     which: tuple[ColumnElement[bool], ...]
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
         which = (Job.batch_id == batch_id, Job.suspect.is_(None))
@@ -207,7 +207,7 @@ def _line(
         attempt=attempt,
         error=job.error,
         plots=job.plots,
-        walls=job.walls,
+        sandbox=job.sandbox,
         worker=job.worker,
         queued_at=job.queued_at,
         finished_at=job.finished_at,

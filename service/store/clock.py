@@ -1,6 +1,6 @@
 """What to do when the clock was set back: moments in the future that nothing but a wrong clock can have written.
 
-A clock that was set forward needs no mending: leases run out early, and the workers are fenced.
+A clock that was set forward needs no correction: leases run out early, and the workers are fenced.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from service.store.models import Job, JobState, PlotState
 _TOLERANCE = timedelta(seconds=2)
 
 
-def mend(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
+def correct(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
     """Bring moments that lie too far ahead of ``at`` back to where they would be; doing it twice changes nothing.
 
     ``longest_wait`` is how long a job waits after an attempt that failed. A lease keeps its length, a job that never
@@ -37,9 +37,9 @@ def mend(session: Session, at: datetime, longest_wait: Callable[[int], timedelta
         latest = at + longest_wait(attempt) if attempt else at
         if due_at > latest + _TOLERANCE:
             held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
-            session.execute(update(Job).where(*held_back).values(due_at=latest, nudged_at=None))
-    nudged = (Job.state == JobState.QUEUED, Job.nudged_at > ahead)
-    session.execute(update(Job).where(*nudged).values(nudged_at=None))
+            session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
+    notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
+    session.execute(update(Job).where(*notified).values(notified_at=None))
     plots = (Job.plots == PlotState.DUE, Job.plots_due_at > ahead)
     written_later = or_(Job.finished_at > ahead, Job.started_at > ahead)
     session.execute(update(Job).where(*plots, written_later).values(plots_due_at=at))

@@ -14,7 +14,7 @@ from sqlalchemy import JSON, DateTime, Dialect, Numeric, String, Text, TypeDecor
 from sqlalchemy.dialects.postgresql import JSONB
 from sqlalchemy.types import TypeEngine
 
-from service.store.plain import Plain
+from service.store.codec import Json
 
 
 def storable(text: str) -> str:
@@ -22,7 +22,7 @@ def storable(text: str) -> str:
     return text.replace("\0", "\u2400").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
-def storable_json(value: Plain) -> Plain:
+def storable_json(value: Json) -> Json:
     """The same for every string inside a JSON value; refuses floats that JSON has no word for."""
     if isinstance(value, str):
         return storable(value)
@@ -94,5 +94,5 @@ class SafeJson(TypeDecorator[Any]):
             JSONB(none_as_null=True) if dialect.name == "postgresql" else JSON(none_as_null=True)
         )
 
-    def process_bind_param(self, value: Plain, dialect: Dialect) -> Plain:
+    def process_bind_param(self, value: Json, dialect: Dialect) -> Json:
         return storable_json(value)

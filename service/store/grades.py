@@ -21,13 +21,13 @@ from service.grading.grade import (
     CriterionResult,
     Evidence,
     Grade,
+    Prediction,
     Shown,
-    Sight,
     TrialResult,
 )
 from service.store import artifacts, recordings
+from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job, Submission, TrialRow
-from service.store.plain import from_plain, to_plain
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
 from submissions.seeds import PUBLIC
@@ -41,20 +41,24 @@ class Prepared:
 
     grade: Grade
     files: list[artifacts.File]
-    sights: list[list[dict[str, Any]]]  # a list a criterion
+    predictions: list[list[dict[str, Any]]]  # a list a criterion
 
 
 def prepare(grade: Grade) -> Prepared:
-    """Compress the recordings and point the sights at their pictures."""
+    """Compress the recordings and point the predictions at their pictures."""
     cap = recordings.cap_for(len(grade.trials))
     kept = [recordings.keep(trial.recording, cap) for trial in grade.trials]
     files = [artifacts.File(_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)]
     numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in kept]
-    sights = [
-        [plain for sight in result.sights if (plain := _plain_sight(sight, numbers[sight.trial])) is not None]
+    predictions = [
+        [
+            plain
+            for prediction in result.predictions
+            if (plain := _encoded_prediction(prediction, numbers[prediction.trial])) is not None
+        ]
         for result in grade.criteria
     ]
-    return Prepared(grade, files, sights)
+    return Prepared(grade, files, predictions)
 
 
 def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> None:
@@ -64,7 +68,7 @@ def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> N
     session.execute(delete(CriterionRow).where(CriterionRow.job_id == job_id))
     session.add_all(_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
     session.add_all(
-        _criterion_row(job_id, position, result, prepared.sights[position])
+        _criterion_row(job_id, position, result, prepared.predictions[position])
         for position, result in enumerate(grade.criteria)
     )
     artifacts.put(session, job_id, prepared.files, at)
@@ -93,7 +97,7 @@ def load(session: Session, job_id: str) -> Grade:
         student=student,
         criteria=tuple(_criterion(row, trials) for row in rows),
         trials=trials,
-        walls=job.walls or "",
+        sandbox=job.sandbox or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
@@ -118,12 +122,14 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         sha256=trial.recording.sha256,
         end_t=trial.recording.end_t,
         place=trial.place,
-        sweep=to_plain(trial.sweep),
+        sweep=encode(trial.sweep),
         surprise=next((fault.staff for fault in trial.recording.faults if fault.staff), None),
     )
 
 
-def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: list[dict[str, Any]]) -> CriterionRow:
+def _criterion_row(
+    job_id: str, position: int, result: CriterionResult, predictions: list[dict[str, Any]]
+) -> CriterionRow:
     accuracy = result.accuracy
     return CriterionRow(
         job_id=job_id,
@@ -134,30 +140,30 @@ def _criterion_row(job_id: str, position: int, result: CriterionResult, sights: 
         max_marks=result.max_marks,
         message=result.message,
         visibility=result.visibility,
-        evidence=to_plain(result.evidence),
+        evidence=encode(result.evidence),
         accuracy=accuracy and accuracy.value,
         accuracy_low=accuracy and accuracy.low,
         accuracy_high=accuracy and accuracy.high,
         accuracy_n=accuracy and accuracy.n,
-        labels=accuracy and to_plain(accuracy.labels),
-        confusion=accuracy and to_plain(accuracy.confusion),
-        counts=accuracy and to_plain(accuracy.counts),
-        confidence=accuracy and to_plain(accuracy.confidence),
-        curves=to_plain(result.curves),
+        labels=accuracy and encode(accuracy.labels),
+        confusion=accuracy and encode(accuracy.confusion),
+        counts=accuracy and encode(accuracy.counts),
+        confidence=accuracy and encode(accuracy.confidence),
+        curves=encode(result.curves),
         unjudged=result.unjudged or None,
-        sights=sights,
-        shown=result.shown and to_plain(result.shown),
+        predictions=predictions,
+        shown=result.shown and encode(result.shown),
         for_staff=result.for_staff,
     )
 
 
-def _plain_sight(sight: Sight, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
-    """A sight that names its picture by number in the recording; none if the picture was too much to keep."""
+def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
+    """A prediction that names its picture by number in the recording; none if the picture was too much to keep."""
     if not numbers:
         return None
-    where = numbers.get(sight.image)
-    plain = cast(dict[str, Any], to_plain(replace(sight, image=cast(Image, None))))
-    return plain | {"image": where if where is not None else to_plain(sight.image)}
+    where = numbers.get(prediction.image)
+    plain = cast(dict[str, Any], encode(replace(prediction, image=cast(Image, None))))
+    return plain | {"image": where if where is not None else encode(prediction.image)}
 
 
 def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
@@ -172,7 +178,7 @@ def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
             motor_noise=row.motor_noise,
             visibility=row.visibility,
             recording=_recording(files, job_id, row.position),
-            sweep=from_plain(tuple[tuple[str, float], ...], row.sweep),
+            sweep=decode(tuple[tuple[str, float], ...], row.sweep),
             place=row.place,
         )
         for row in rows
@@ -194,11 +200,11 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
         max_marks=row.max_marks,
         message=row.message,
         visibility=row.visibility,
-        evidence=from_plain(tuple[Evidence, ...], row.evidence),
+        evidence=decode(tuple[Evidence, ...], row.evidence),
         accuracy=_accuracy(row),
-        sights=tuple(_sight(plain, trials) for plain in row.sights),
-        curves=from_plain(tuple[AccuracyCurve, ...], row.curves),
-        shown=None if row.shown is None else from_plain(Shown, row.shown),
+        predictions=tuple(_prediction(plain, trials) for plain in row.predictions),
+        curves=decode(tuple[AccuracyCurve, ...], row.curves),
+        shown=None if row.shown is None else decode(Shown, row.shown),
         unjudged=row.unjudged or "",
         for_staff=row.for_staff,
     )
@@ -213,13 +219,13 @@ def _accuracy(row: CriterionRow) -> Accuracy | None:
         high=row.accuracy_high,
         n=row.accuracy_n,
         labels=tuple(row.labels or ()),
-        confusion=from_plain(tuple[tuple[str, str | None, int], ...], row.confusion or []),
-        counts=None if row.counts is None else from_plain(Counts, row.counts),
-        confidence=None if row.confidence is None else from_plain(Confidence, row.confidence),
+        confusion=decode(tuple[tuple[str, str | None, int], ...], row.confusion or []),
+        counts=None if row.counts is None else decode(Counts, row.counts),
+        confidence=None if row.confidence is None else decode(Confidence, row.confidence),
     )
 
 
-def _sight(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Sight:
+def _prediction(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
     where = plain["image"]
-    image = trials[plain["trial"]].recording.images[where] if isinstance(where, int) else from_plain(Image, where)
-    return Sight(image, plain["truth"], plain["answer"], plain["scenario"], plain["trial"])
+    image = trials[plain["trial"]].recording.images[where] if isinstance(where, int) else decode(Image, where)
+    return Prediction(image, plain["truth"], plain["answer"], plain["scenario"], plain["trial"])

@@ -1,6 +1,6 @@
-"""Takes hand-ins in: the student, the frozen assignment, the submission and its job, in one transaction.
+"""Takes submissions in: the student, the frozen assignment, the submission and its job, in one transaction.
 
-Publishes nothing: the row is the job, and the queue's nudge comes after the commit.
+Publishes nothing: the row is the job, and the queue's notice comes after the commit.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from datetime import datetime
 from sqlalchemy import Select, func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store import copies, models
+from service.store import models, result_cache
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
@@ -39,13 +39,13 @@ DEFAULT_COURSE = "default"
 
 
 @dataclass(frozen=True, slots=True)
-class HandIn:
+class GradingRequest:
     """One submission and what it is marked against; ``source`` is the name it came under."""
 
     submission: Submission
     assignment: Assignment
     source: str
-    handed_in_at: datetime | None = None  # by the student, where anybody said
+    submitted_at: datetime | None = None  # by the student, where anybody said
     written: str = ""  # the student, as the file or folder has it, where that is not the normal form
 
     @property
@@ -56,7 +56,7 @@ class HandIn:
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """A hand-in that is now a job."""
+    """A submission that is now a job."""
 
     job_id: str
     student: str
@@ -76,7 +76,7 @@ class AcceptedBatch:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A hand-in that changes nothing: the newest of its student is the same, for the same assignment."""
+    """A submission that changes nothing: the newest of its student is the same, for the same assignment."""
 
     job_id: str
     batch_id: str | None
@@ -95,36 +95,43 @@ class AcceptedNew:
 
 
 def accept(
-    store: Store, hand_in: HandIn, *, course: str = DEFAULT_COURSE, max_attempts: int, lane: Lane = Lane.INTERACTIVE
+    store: Store,
+    grading_request: GradingRequest,
+    *,
+    course: str = DEFAULT_COURSE,
+    max_attempts: int,
+    lane: Lane = Lane.INTERACTIVE,
 ) -> Accepted:
-    """Take in one hand-in that a person waits for; where an identical one has a grade, it has that grade at once.
+    """Take in one submission that a person waits for; where an identical one has a grade, it has that grade at once.
 
-    It is handed in now, unless it says when. Raises UsageError where its student cannot be told from another.
+    It is submitted now, unless it says when. Raises UsageError where its student cannot be told from another.
     """
-    (packed,) = _pack([hand_in])
+    (packed,) = _pack([grading_request])
     secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
-        packed = replace(packed, hand_in=replace(hand_in, handed_in_at=hand_in.handed_in_at or at))
+        packed = replace(
+            packed, grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or at)
+        )
         terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret)
-        enrolment_id = Students(session, terms.course_id).enrol(hand_in.student, at)
+        enrolment_id = Students(session, terms.course_id).enrol(grading_request.student, at)
         return _accept(session, _Item(packed, enrolment_id), terms)
 
 
 def accept_batch(
     store: Store,
     name: str,
-    hand_ins: Sequence[HandIn],
+    grading_requests: Sequence[GradingRequest],
     problems: Sequence[tuple[str, str]],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
 ) -> AcceptedBatch:
-    """Take in a whole batch or nothing of it, each hand-in to be graded anew whatever was handed in before.
+    """Take in a whole batch or nothing of it, each submission to be graded anew whatever was submitted before.
 
     ``problems`` are the rows that were refused: name, sentence. Raises UsageError when the course refuses the rest.
     """
-    packed = _pack(hand_ins)
+    packed = _pack(grading_requests)
     secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
@@ -138,19 +145,19 @@ def accept_batch(
 def accept_new(
     store: Store,
     name: str,
-    hand_ins: Sequence[HandIn],
+    grading_requests: Sequence[GradingRequest],
     problems: Sequence[tuple[str, str]],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
 ) -> AcceptedNew:
-    """Take in what is new of a batch, so that handing in the same batch twice changes nothing.
+    """Take in what is new of a batch, so that submitting the same batch twice changes nothing.
 
-    Not new is what has the bytes of the student's newest hand-in and is marked against the same version of the
-    assignment; but for what was cancelled, which comes in again. What is new and identical to a hand-in with a grade
+    Not new is what has the bytes of the student's newest submission and is marked against the same version of the
+    assignment; but for what was cancelled, which comes in again. What is new and identical to a submission with a grade
     has that grade at once.
     """
-    packed = _pack(hand_ins)
+    packed = _pack(grading_requests)
     secret = secret_of(store).sha256
     with store.transaction() as session:
         at = now(session)
@@ -162,7 +169,7 @@ def accept_new(
         return AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
 
 
-def load_hand_in(session: Session, job_id: str) -> HandIn:
+def load_grading_request(session: Session, job_id: str) -> GradingRequest:
     """What a job is about, rebuilt from the database alone.
 
     Raises UsageError for an unknown job, HostError where what was kept cannot be read.
@@ -178,14 +185,14 @@ def load_hand_in(session: Session, job_id: str) -> HandIn:
         raise UsageError(f"there is no job {job_id}")
     packed, source, content = found
     try:
-        return HandIn(unpack_submission(packed), assignment_from_bytes(content), source)
+        return GradingRequest(unpack_submission(packed), assignment_from_bytes(content), source)
     except (UsageError, ValueError, TypeError, KeyError) as error:
-        raise HostError(f"The hand-in of {job_id} cannot be read back: {error}") from error
+        raise HostError(f"The submission of {job_id} cannot be read back: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
 class _Packed:
-    hand_in: HandIn
+    grading_request: GradingRequest
     data: bytes
     frozen: Frozen
 
@@ -200,7 +207,7 @@ class _Item:
 
 @dataclass(frozen=True, slots=True)
 class _Terms:
-    """How hand-ins are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
+    """How submissions are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
 
     course_id: int
     lane: Lane
@@ -211,15 +218,15 @@ class _Terms:
     anew: bool = False
 
 
-def _pack(hand_ins: Sequence[HandIn]) -> list[_Packed]:
-    """What is stored of each hand-in; done before the transaction, and once for each assignment."""
+def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
+    """What is stored of each submission; done before the transaction, and once for each assignment."""
     frozen: dict[int, Frozen] = {}
     packed = []
-    for hand_in in hand_ins:
-        key = id(hand_in.assignment)
+    for grading_request in grading_requests:
+        key = id(grading_request.assignment)
         if key not in frozen:
-            frozen[key] = freeze(hand_in.assignment)
-        packed.append(_Packed(hand_in, pack_submission(hand_in.submission), frozen[key]))
+            frozen[key] = freeze(grading_request.assignment)
+        packed.append(_Packed(grading_request, pack_submission(grading_request.submission), frozen[key]))
     return packed
 
 
@@ -231,24 +238,24 @@ def _enrolled(
     items, refused = [], []
     for each in packed:
         try:
-            items.append(_Item(each, students.enrol(each.hand_in.student, terms.at)))
+            items.append(_Item(each, students.enrol(each.grading_request.student, terms.at)))
         except UsageError as error:
-            refused.append((each.hand_in.source, str(error)))
+            refused.append((each.grading_request.source, str(error)))
     return items, tuple(refused)
 
 
 def _known(session: Session, item: _Item) -> Known | None:
-    hand_in = item.packed.hand_in
+    grading_request = item.packed.grading_request
     newest = session.scalar(
         select(models.Submission)
         .where(
             models.Submission.enrolment_id == item.enrolment_id,
-            models.Submission.assignment == hand_in.assignment.id,
+            models.Submission.assignment == grading_request.assignment.id,
         )
         .order_by(models.Submission.attempt.desc())
         .limit(1)
     )
-    if newest is None or newest.sha256 != hand_in.submission.sha256:
+    if newest is None or newest.sha256 != grading_request.submission.sha256:
         return None
     query = (
         select(Job)
@@ -269,7 +276,7 @@ def _known(session: Session, item: _Item) -> Known | None:
     if job is None:
         return None
     other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
-    return Known(job.id, job.batch_id, hand_in.submission.student, job.state, other_grader)
+    return Known(job.id, job.batch_id, grading_request.submission.student, job.state, other_grader)
 
 
 def _accept_batch(
@@ -285,14 +292,14 @@ def _accept_batch(
 
 def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     packed, enrolment_id, at = item.packed, item.enrolment_id, terms.at
-    hand_in = packed.hand_in
-    submission, assignment = hand_in.submission, hand_in.assignment
+    grading_request = packed.grading_request
+    submission, assignment = grading_request.submission, grading_request.assignment
     version_id = keep(session, packed.frozen, at)
     of_student = (models.Submission.enrolment_id == enrolment_id, models.Submission.assignment == assignment.id)
     earlier = session.scalar(select(func.max(models.Submission.attempt)).where(*of_student)) or 0
     ruling = Ruling()
     if not terms.anew:
-        ruling = rule(session, enrolment_id, assignment.id, submission.sha256, hand_in.handed_in_at)
+        ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
     job_id = new_id()
     if not ruling.over:
         _supersede(session, select(models.Submission.id).where(*of_student), job_id, at)
@@ -302,11 +309,11 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         batch_id=terms.batch_id,
         attempt=earlier + 1,
         sha256=submission.sha256,
-        source=hand_in.source,
+        source=grading_request.source,
         size=len(packed.data),
         packed=packed.data,
         created_at=at,
-        handed_in_at=hand_in.handed_in_at,
+        submitted_at=grading_request.submitted_at,
         days_late=ruling.days_late,
         staff_only=ruling.over or None,
     )
@@ -323,17 +330,17 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         max_attempts=terms.max_attempts,
         due_at=at,
         queued_at=at,
-        fresh=terms.anew,
+        forced=terms.anew,
     )
     session.add(job)
     session.flush()
     source = (
         None
         if terms.anew
-        else copies.find(session, copies.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
+        else result_cache.find(session, result_cache.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
     )
     if source is not None:
-        session.execute(update(Job).where(Job.id == job_id).values(**copies.copy(session, source, job_id, at)))
+        session.execute(update(Job).where(Job.id == job_id).values(**result_cache.copy(session, source, job_id, at)))
     return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
 
 

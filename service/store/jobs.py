@@ -1,7 +1,7 @@
 """What may happen to a job: claimed, kept alive, finished, failed, given back, cancelled.
 
 A worker holds a job by its lease's token, and every change it makes is refused once the token is no longer the job's.
-Which job is due first stands in ``turns.py``; finding lost ones in ``sweep.py``.
+Which job is due first stands in ``scheduling.py``; finding lost ones in ``lease_reaper.py``.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, cast
 from sqlalchemy import CursorResult, Update, select, update
 from sqlalchemy.orm import Session
 
-from service.store import artifacts, canaries, copies, grades, phases
+from service.store import artifacts, grades, phases, result_cache, self_tests
 from service.store.engine import Store, now
 from service.store.installation import secret_of
 from service.store.models import UNFINISHED, Job, JobState, PlotState
-from service.store.turns import next_job
+from service.store.scheduling import next_job
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
 
@@ -57,7 +57,7 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Take the job whose turn it is; None when none is due."""
     with store.transaction() as session:
         at = now(session)
-        job_id = None if canaries.is_in_quarantine(session, worker) else next_job(session, at, worker)
+        job_id = None if self_tests.is_in_quarantine(session, worker) else next_job(session, at, worker)
         if job_id is None:
             return None
         begun = session.scalars(select(Job.attempt).where(Job.id == job_id)).one()
@@ -131,8 +131,8 @@ def finish(
             "grader_version": grade.grader_version,
             "grader_sha256": grader_sha256(),
             "secret_sha256": grade.secret_sha256,
-            "cache_key": copies.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
-            "walls": grade.walls,
+            "cache_key": result_cache.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
+            "sandbox": grade.sandbox,
             "notes": list(grade.notes),
             "plots": PlotState.DUE,
             "plots_due_at": at,
@@ -142,21 +142,23 @@ def finish(
         grades.insert(session, claim.job_id, prepared, at)
 
 
-def finish_with_copy(store: Store, claim: Claim) -> bool:
+def finish_from_cache(store: Store, claim: Claim) -> bool:
     """End the job with the grade of an identical one, where there is one and nobody asked for it to be run anew.
 
     Raises Fenced when the job is no longer this worker's.
     """
     secret = secret_of(store)
     with store.transaction() as session:
-        if session.scalar(select(Job.fresh).where(Job.id == claim.job_id)):
+        if session.scalar(select(Job.forced).where(Job.id == claim.job_id)):
             return False
-        source = copies.find(session, copies.cache_key(session, claim.job_id, grader_sha256(), secret.sha256))
+        source = result_cache.find(
+            session, result_cache.cache_key(session, claim.job_id, grader_sha256(), secret.sha256)
+        )
         if source is None:
             return False
         at = now(session)
         _guarded(session, claim, {"heartbeat_at": at})
-        _guarded(session, claim, copies.copy(session, source, claim.job_id, at))
+        _guarded(session, claim, result_cache.copy(session, source, claim.job_id, at))
         return True
 
 
@@ -173,7 +175,7 @@ def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
         return cast(JobState, values["state"])
 
 
-def bury(store: Store, claim: Claim, reason: str) -> None:
+def give_up(store: Store, claim: Claim, reason: str) -> None:
     """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
     with store.transaction() as session:
         _guarded(session, claim, _ended(JobState.DEAD, now(session)) | {"error": reason})
@@ -235,7 +237,7 @@ def after_fault(attempt: int, max_attempts: int, reason: str, retry: Retry, at: 
     if attempt >= max_attempts:
         times = "once" if attempt == 1 else f"{attempt} times"
         return _ended(JobState.DEAD, at) | {"error": f"Tried {times}, the last time: {reason}"}
-    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "nudged_at": None}
+    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "notified_at": None}
     return waiting | {"progress": 0.0, "error": reason, "due_at": at + retry.wait(attempt)}
 
 
@@ -244,7 +246,7 @@ def _ended(state: JobState, at: datetime) -> dict[str, Any]:
 
 
 def _given_back(at: datetime) -> dict[str, Any]:
-    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "nudged_at": None}
+    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "notified_at": None}
     return waiting | {"progress": 0.0, "due_at": at, "attempt": Job.attempt - 1}
 
 
@@ -254,7 +256,7 @@ def _held(claim: Claim) -> tuple[Any, ...]:
 
 def _refuse_quarantined(session: Session, claim: Claim) -> None:
     worker = session.scalar(select(Job.worker).where(*_held(claim)))
-    if worker is not None and canaries.is_in_quarantine(session, worker, lock=True):
+    if worker is not None and self_tests.is_in_quarantine(session, worker, lock=True):
         raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")
 
 

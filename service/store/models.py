@@ -1,4 +1,4 @@
-"""The tables: who, what was handed in, the jobs, and what came of them.
+"""The tables: who, what was submitted, the jobs, and what came of them.
 
 Only shapes and constraints; what is done with them stands in the modules beside this one.
 """
@@ -35,7 +35,7 @@ class JobState(StrEnum):
     RUNNING = "running"
     DONE = "done"  # has a grade
     DEAD = "dead"  # could not be graded; ``error`` says why
-    CANCELLED = "cancelled"  # by somebody, or because a newer hand-in came; ``error`` says which
+    CANCELLED = "cancelled"  # by somebody, or because a newer submission came; ``error`` says which
 
 
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
@@ -59,7 +59,7 @@ class BatchState(StrEnum):
 
 
 class Standing(StrEnum):
-    """What a job's grade is to its hand-in. Of one hand-in at most one grade stands."""
+    """What a job's grade is to its submission. Of one submission at most one grade stands."""
 
     STANDS = "stands"  # the one that reports and exports show
     PROPOSED = "proposed"  # of a regrade, until it is published
@@ -163,12 +163,12 @@ class Batch(Base):
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
     problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that preflight refused
-    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose hand-ins these are
+    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose submissions these are
     created_at: Mapped[datetime]
 
 
 class Submission(Base):
-    """What a student handed in; ``attempt`` counts within the student and the assignment."""
+    """What a student submitted; ``attempt`` counts within the student and the assignment."""
 
     __tablename__ = "submission"
     __table_args__ = (
@@ -181,18 +181,18 @@ class Submission(Base):
     assignment: Mapped[str]
     batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
     attempt: Mapped[int]
-    sha256: Mapped[str] = mapped_column(String(64), index=True)  # of what was handed in
+    sha256: Mapped[str] = mapped_column(String(64), index=True)  # of what was submitted
     source: Mapped[str]  # the name it came under
     size: Mapped[int]
     packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
     created_at: Mapped[datetime]
-    handed_in_at: Mapped[datetime | None]  # by the student; None where nobody said
+    submitted_at: Mapped[datetime | None]  # by the student; None where nobody said
     days_late: Mapped[int] = mapped_column(default=0)
-    staff_only: Mapped[str | None]  # the limit that this hand-in is over: it is marked, and shown to staff alone
+    staff_only: Mapped[str | None]  # the limit that this submission is over: it is marked, and shown to staff alone
 
 
 class Job(Base):
-    """One grading of one submission. The row is the job; the broker only nudges."""
+    """One grading of one submission. The row is the job; the broker only notices."""
 
     __tablename__ = "job"
     __table_args__ = (
@@ -225,7 +225,7 @@ class Job(Base):
     error: Mapped[str | None]  # a sentence, of the last fault of ours or the reason of death
 
     queued_at: Mapped[datetime]
-    nudged_at: Mapped[datetime | None]
+    notified_at: Mapped[datetime | None]
     started_at: Mapped[datetime | None]
     graded_at: Mapped[datetime | None]  # grading ended, results not yet stored
     finished_at: Mapped[datetime | None]  # results stored, or given up
@@ -234,7 +234,7 @@ class Job(Base):
     marks: Mapped[Decimal | None]
     max_marks: Mapped[Decimal | None]
     grader_version: Mapped[str | None]
-    walls: Mapped[str | None]
+    sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
 
     #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.
@@ -242,7 +242,7 @@ class Job(Base):
     grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all that decides over marks
     secret_sha256: Mapped[str | None] = mapped_column(String(64))  # of what its seeds depend on; None: of nothing
     cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # alike only where grades must be
-    fresh: Mapped[bool] = mapped_column(default=False)  # to be run even where an identical grade is there
+    forced: Mapped[bool] = mapped_column(default=False)  # to be run even where an identical grade is there
     copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that was run
     regrade_of: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that stood before
     standing: Mapped[Standing] = mapped_column(default=Standing.STANDS)
@@ -305,7 +305,7 @@ class CriterionRow(Base):
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
     curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
     unjudged: Mapped[str | None]  # why it could not be judged; staff have to look
-    sights: Mapped[Any]
+    predictions: Mapped[Any]
     shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} as of the visible trials alone
     for_staff: Mapped[str] = mapped_column(default="")  # where somebody should look, which no student is told
 
@@ -327,7 +327,7 @@ class Artifact(Base):
 
 
 class Policy(Base):
-    """When and how often a course's students may hand in; an empty ``assignment`` is for all that have none."""
+    """When and how often a course's students may submit; an empty ``assignment`` is for all that have none."""
 
     __tablename__ = "policy"
     __table_args__ = (Index(None, "course_id", "assignment", unique=True),)
@@ -363,15 +363,15 @@ class Worker(Base):
     grader_version: Mapped[str]
     grader_sha256: Mapped[str] = mapped_column(String(64))
     first_at: Mapped[datetime]
-    canary_at: Mapped[datetime]  # of the last known answer, right or wrong
+    self_tested_at: Mapped[datetime]  # of the last known answer, right or wrong
     quarantined_at: Mapped[datetime | None]
     reason: Mapped[str | None]
 
 
-class Canary(Base):
+class SelfTest(Base):
     """When a process of a worker last graded the known answer rightly; what it graded since is not vouched for."""
 
-    __tablename__ = "canary"
+    __tablename__ = "self_test"
     __table_args__ = (Index(None, "worker", "process", unique=True),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -380,16 +380,16 @@ class Canary(Base):
     right_at: Mapped[datetime]
 
 
-class Presence(Base):
+class Heartbeat(Base):
     """A worker that lives, or lived until lately: it says so every few seconds, and takes its row away at its end."""
 
-    __tablename__ = "presence"
+    __tablename__ = "heartbeat"
 
     worker: Mapped[str] = mapped_column(primary_key=True)
     host: Mapped[str]
     concurrency: Mapped[int]  # gradings at a time
     grader_version: Mapped[str]
-    walls: Mapped[str]  # what stands round student code there
+    sandbox: Mapped[str]  # what stands round student code there
     started_at: Mapped[datetime]
     seen_at: Mapped[datetime] = mapped_column(index=True)
 

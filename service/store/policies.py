@@ -1,6 +1,6 @@
-"""When and how often students may hand in: a course's policy, a student's extensions, and what follows from them.
+"""When and how often students may submit: a course's policy, a student's extensions, and what follows from them.
 
-What is over a limit is kept and marked all the same, but shown to staff alone; nothing here refuses a hand-in.
+What is over a limit is kept and marked all the same, but shown to staff alone; nothing here refuses a submission.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _NOT_THE_STUDENTS = (Verdict.ASSIGNMENT_ERROR.value, Verdict.HOST_ERROR.value)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one student may do. ``attempts`` counts different hand-ins; None is no limit, and no due date."""
+    """What one student may do. ``attempts`` counts different submissions; None is no limit, and no due date."""
 
     due_at: datetime | None = None
     late_days: int = 0
@@ -32,13 +32,13 @@ class Limits:
 
     @property
     def closed_at(self) -> datetime | None:
-        """After this moment a hand-in is over the limit."""
+        """After this moment a submission is over the limit."""
         return None if self.due_at is None else self.due_at + timedelta(days=self.late_days)
 
 
 @dataclass(frozen=True, slots=True)
 class Ruling:
-    """How many days late a hand-in is, and the limit that it is over, as a sentence; empty if it is over none."""
+    """How many days late a submission is, and the limit that it is over, as a sentence; empty if it is over none."""
 
     days_late: int = 0
     over: str = ""
@@ -63,31 +63,31 @@ def in_days(count: int) -> str:
     return "1 day" if count == 1 else f"{count} days"
 
 
-def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, handed_in_at: datetime | None) -> Ruling:
-    """What the policy says of a hand-in that comes in now; a moment of handing in that nobody knows is in time."""
+def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None) -> Ruling:
+    """What the policy says of a submission that comes in now; a moment of submitting that nobody knows is in time."""
     allowed = limits(session, enrolment_id, assignment)
     earlier = _counted(session, enrolment_id, assignment, sha256)
     if allowed.attempts is not None and len(earlier) >= allowed.attempts:
         return Ruling(over=f"attempt {len(earlier) + 1}, allowed: {allowed.attempts}")
-    if handed_in_at is None:
+    if submitted_at is None:
         return Ruling()
     days_late = 0
-    if allowed.due_at is not None and handed_in_at > allowed.due_at:
-        days_late = math.ceil((handed_in_at - allowed.due_at) / timedelta(days=1))
+    if allowed.due_at is not None and submitted_at > allowed.due_at:
+        days_late = math.ceil((submitted_at - allowed.due_at) / timedelta(days=1))
         if days_late > allowed.late_days:
             return Ruling(days_late, f"{in_days(days_late)} late, allowed: {allowed.late_days}")
-    since = [handed_in_at - when for when in earlier if when <= handed_in_at]
+    since = [submitted_at - when for when in earlier if when <= submitted_at]
     if since and min(since).total_seconds() < allowed.cool_down_seconds:
         minutes = math.floor(min(since).total_seconds() / 60)
         asked = math.ceil(allowed.cool_down_seconds / 60)
-        return Ruling(days_late, f"handed in {minutes} min after the one before, asked for: {asked} min")
+        return Ruling(days_late, f"submitted {minutes} min after the one before, asked for: {asked} min")
     return Ruling(days_late)
 
 
 def released(session: Session, job_id: str) -> frozenset[str]:
     """Which visibilities a student may see of a grade now.
 
-    ``after_due_date`` opens when nobody of the course may hand in any more, extensions and late days included; all
+    ``after_due_date`` opens when nobody of the course may submit any more, extensions and late days included; all
     but ``hidden`` opens when the grade is published.
     """
     job = session.get_one(Job, job_id)
@@ -159,11 +159,11 @@ def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> dat
 
 
 def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:
-    """When the different hand-ins came that count as attempts: begun, and not ended by a fault of ours."""
+    """When the different submissions came that count as attempts: begun, and not ended by a fault of ours."""
     submission = models.Submission
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
     query = (
-        select(func.coalesce(submission.handed_in_at, submission.created_at), submission.sha256)
+        select(func.coalesce(submission.submitted_at, submission.created_at), submission.sha256)
         .join(Job, Job.submission_id == submission.id)
         .where(
             submission.enrolment_id == enrolment_id,

@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from service.store.plain import arguments_from_plain, from_plain, to_plain
+from service.store.codec import decode, decoded_arguments, encode
 from sim.recording import Image, Recording, Ticks
 
 #: What one grade's recordings may take together, compressed; a flood of output must not fill the database.
@@ -25,6 +25,8 @@ _TEXT_KEPT = 2000
 
 _FLOATS = ("x", "y", "heading", "left_position", "right_position", "ultrasonic", "gyro")
 _INTEGERS = ("left_sums", "right_sums")
+#: What fields are called in recordings that earlier releases kept.
+_FORMERLY = {"walls": "sandbox"}
 _Bytes = NDArray[np.uint8]
 
 
@@ -68,12 +70,12 @@ def to_bytes(recording: Recording) -> bytes:
     """Everything in the recording, compressed."""
     ticks = recording.ticks
     words: dict[str, Any] = {
-        field.name: to_plain(getattr(recording, field.name))
+        field.name: encode(getattr(recording, field.name))
         for field in fields(recording)
         if field.name not in ("ticks", "images")
     }
     words["ticks"] = {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels}
-    words["images"] = [to_plain(replace(image, left=b"", right=b"")) for image in recording.images]
+    words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
     arrays: dict[str, NDArray[Any]] = {
         "words": _bytes_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
         "picture_sizes": np.array([[len(i.left), len(i.right)] for i in recording.images], np.int64),
@@ -99,7 +101,8 @@ def from_bytes(data: bytes) -> Recording:
             columns |= {name: _unshuffled(arrays[name], np.int64).copy() for name in _INTEGERS}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pictures)
-        return Recording(**arguments_from_plain(Recording, words), ticks=ticks, images=images)
+        words = {_FORMERLY.get(name, name): value for name, value in words.items()}
+        return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
 
@@ -109,7 +112,7 @@ def _with_pixels(images: list[Any], sizes: list[list[int]], pictures: bytes) -> 
     offset = 0
     for words, (left, right) in zip(images, sizes, strict=True):
         middle, end = offset + left, offset + left + right
-        image = from_plain(Image, words)
+        image = decode(Image, words)
         made.append(replace(image, left=pictures[offset:middle], right=pictures[middle:end]))
         offset = end
     return tuple(made)

@@ -35,7 +35,7 @@ from submissions.assignment import Assignment
 
 @dataclass(frozen=True, slots=True)
 class Regraded:
-    """A batch of regrades, and how many hand-ins were left out: for another assignment, or not graded yet."""
+    """A batch of regrades, and how many submissions were left out: for another assignment, or not graded yet."""
 
     batch_id: str
     jobs: int
@@ -85,7 +85,7 @@ class Published:
 
 
 def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> Regraded:
-    """Queue every hand-in of the batch that has a grade, or could not be given one, to be graded again.
+    """Queue every submission of the batch that has a grade, or could not be given one, to be graded again.
 
     Against ``assignment``, or without it the version that each was graded against. The grades that stand are not
     touched. Raises UsageError when there is nothing to grade again.
@@ -131,9 +131,9 @@ def changes(session: Session, batch_id: str) -> list[Change]:
 
 
 def publish(store: Store, batch_id: str, *, actor: str) -> Published:
-    """Let the newest regrade of each hand-in of the batch stand, and publish every grade that then stands.
+    """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
 
-    A grade that is suspect, or of a hand-in over a limit, is not published. Raises UsageError for an unknown batch.
+    A grade that is suspect, or of a submission over a limit, is not published. Raises UsageError for an unknown batch.
     """
     with store.transaction() as session:
         at = now(session)
@@ -167,7 +167,7 @@ def publish(store: Store, batch_id: str, *, actor: str) -> Published:
 
 
 def unpublished_regrades(session: Session, batch_id: str) -> int:
-    """How many hand-ins of a batch have a regrade that is done and does not stand yet."""
+    """How many submissions of a batch have a regrade that is done and does not stand yet."""
     ids = select(Job.submission_id).where(Job.batch_id == batch_id)
     proposed = (Job.standing == Standing.PROPOSED, Job.state == JobState.DONE, Job.suspect.is_(None))
     query = select(Job.submission_id).where(Job.submission_id.in_(ids), *proposed).distinct()
@@ -175,7 +175,7 @@ def unpublished_regrades(session: Session, batch_id: str) -> int:
 
 
 def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
-    """The jobs that stand for the hand-ins of a batch, with their assignment."""
+    """The jobs that stand for the submissions of a batch, with their assignment."""
     ids = select(Job.submission_id).where(Job.batch_id == batch_id)
     query = (
         select(Job, AssignmentVersion.assignment)
@@ -188,8 +188,8 @@ def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
 
 def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfinished: int) -> str:
     if assignment is not None and found and assignment.id not in found:
-        return f"batch {batch_id} has no hand-in for {assignment.id}, only for {', '.join(sorted(found))}"
-    waits = f": {unfinished} of its hand-ins are not graded yet" if unfinished else ""
+        return f"batch {batch_id} has no submission for {assignment.id}, only for {', '.join(sorted(found))}"
+    waits = f": {unfinished} of its submissions are not graded yet" if unfinished else ""
     return f"batch {batch_id} has nothing to grade again{waits}"
 
 
@@ -203,14 +203,14 @@ def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int
         max_attempts=max_attempts,
         due_at=at,
         queued_at=at,
-        fresh=True,
+        forced=True,
         regrade_of=job.id,
         standing=Standing.PROPOSED,
     )
 
 
 def _let_stand(jobs: Sequence[Job]) -> tuple[Job | None, bool]:
-    """The grade of one hand-in that stands from now on, and whether it took another's place.
+    """The grade of one submission that stands from now on, and whether it took another's place.
 
     What is older than the newest regrade gives way to it; one that is not graded yet stays a proposal.
     """

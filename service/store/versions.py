@@ -16,8 +16,8 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from service.store import models
+from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion
-from service.store.plain import from_plain, to_plain
 from submissions.assignment import Assignment
 
 
@@ -59,14 +59,14 @@ def keep(session: Session, frozen: Frozen, at: datetime) -> int:
 
 def assignment_to_bytes(assignment: Assignment) -> bytes:
     """All of an assignment, pictures and given files and secret included."""
-    text = json.dumps(to_plain(assignment), sort_keys=True, separators=(",", ":"))
+    text = json.dumps(encode(assignment), sort_keys=True, separators=(",", ":"))
     return zlib.compress(text.encode("ascii"), 6)
 
 
 def assignment_from_bytes(content: bytes) -> Assignment:
     """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
     try:
-        return from_plain(Assignment, json.loads(zlib.decompress(content)))
+        return decode(Assignment, json.loads(zlib.decompress(content)))
     except zlib.error as error:
         raise ValueError(f"not an assignment: {error}") from error
 

@@ -28,13 +28,13 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
 
     @app.get("/health/ready")
     def ready() -> JSONResponse:
-        """Whether hand-ins would be graded now: 200, or 503 with what is not well."""
+        """Whether submissions would be graded now: 200, or 503 with what is not well."""
         found = readiness(settings, store)
         return JSONResponse(found.plain(), status_code=200 if found.ready else 503)
 
     @app.get("/metrics")
     def metrics() -> Response:
-        """The figures of the whole service, for Prometheus."""
+        """The metrics of the whole service, for Prometheus."""
         try:
             return Response(metrics_text(store), media_type=CONTENT_TYPE_LATEST)
         except SQLAlchemyError:

@@ -1,4 +1,4 @@
-"""Whether the service can grade now: the database, the broker, and workers that were seen lately behind their walls.
+"""Whether the service can grade now: the database, the broker, and workers that were seen lately behind their sandbox.
 
 Says nothing that a stranger should not know: no address, no name, no text of an error.
 """
@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.queue.broker import broker_version
 from service.settings import Settings
-from service.store import presence
+from service.store import workers
 from service.store.engine import Store
 from service.store.migrate import current_revision, newest_revision
 from sim.errors import RobomarkError
@@ -51,7 +51,7 @@ def readiness(settings: Settings, store: Store) -> Readiness:
             "database": _guarded(lambda: _database(store)),
             "broker": _guarded(lambda: _broker(settings)),
             "workers": seen,
-            "walls": _guarded(lambda: _walls(store)),
+            "sandbox": _guarded(lambda: _sandbox(store)),
         }
     )
 
@@ -83,11 +83,11 @@ def _workers(store: Store) -> Check:
     return Check(True, f"{len(lately)} heard of lately, {slots} gradings at a time")
 
 
-def _walls(store: Store) -> Check:
-    standing = sorted({seen.worker.walls for seen in _lately(store)})
+def _sandbox(store: Store) -> Check:
+    standing = sorted({seen.worker.sandbox for seen in _lately(store)})
     return Check(bool(standing), "; ".join(standing) or "no worker says that they stand")
 
 
-def _lately(store: Store) -> list[presence.Seen]:
+def _lately(store: Store) -> list[workers.Seen]:
     with store.reading() as session:
-        return [seen for seen in presence.workers(session) if seen.lately]
+        return [seen for seen in workers.known_workers(session) if seen.lately]

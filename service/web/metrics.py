@@ -1,4 +1,4 @@
-"""The figures of the service as Prometheus reads them, taken from the database at each look.
+"""The metrics of the service as Prometheus reads them, taken from the database at each look.
 
 Counts that only grow are counters even here: they are sums over rows that are never deleted.
 """
@@ -12,7 +12,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from service.store.engine import Store
-from service.store.figures import Figures, look, quantile
+from service.store.metrics import ServiceMetrics, collect, quantile
 from service.store.models import JobState, Lane, PlotState
 from service.version import GRADER_VERSION
 
@@ -34,22 +34,22 @@ class _Figures(Collector):
 
     def collect(self) -> Iterable[Metric]:
         with self._store.reading() as session:
-            figures = look(session)
-        yield from _queue(figures)
-        yield from _endings(figures)
-        yield from _workers(figures)
-        yield from _times(figures)
+            metrics = collect(session)
+        yield from _queue(metrics)
+        yield from _endings(metrics)
+        yield from _workers(metrics)
+        yield from _times(metrics)
 
     def describe(self) -> Iterable[Metric]:
         """Nothing beforehand: the database need not be there when the collector is made."""
         return ()
 
 
-def _queue(figures: Figures) -> Iterator[Metric]:
+def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
     open_jobs = GaugeMetricFamily("robomark_jobs_open", "Jobs that have not ended.", labels=["lane", "state"])
     for lane in Lane:
         for state in _UNFINISHED:
-            open_jobs.add_metric([lane.value, state.value], figures.jobs.get((lane, state), 0))
+            open_jobs.add_metric([lane.value, state.value], metrics.jobs.get((lane, state), 0))
     yield open_jobs
     depth = GaugeMetricFamily("robomark_queue_depth", "Jobs that a worker could begin now.", labels=["lane"])
     oldest = GaugeMetricFamily(
@@ -58,51 +58,51 @@ def _queue(figures: Figures) -> Iterator[Metric]:
         labels=["lane"],
     )
     for lane in Lane:
-        depth.add_metric([lane.value], figures.claimable.get(lane, 0))
-        oldest.add_metric([lane.value], figures.oldest_seconds.get(lane, 0.0))
+        depth.add_metric([lane.value], metrics.claimable.get(lane, 0))
+        oldest.add_metric([lane.value], metrics.oldest_seconds.get(lane, 0.0))
     yield depth
     yield oldest
     plots = GaugeMetricFamily("robomark_plots", "Grades by the state of their plots.", labels=["state"])
     for plotted in (PlotState.DUE, PlotState.DONE, PlotState.FAILED):
-        plots.add_metric([plotted.value], figures.plots.get(plotted, 0))
+        plots.add_metric([plotted.value], metrics.plots.get(plotted, 0))
     yield plots
-    yield GaugeMetricFamily("robomark_batches_paused", "Batches that are held back.", figures.paused_batches)
+    yield GaugeMetricFamily("robomark_batches_paused", "Batches that are held back.", metrics.paused_batches)
 
 
-def _endings(figures: Figures) -> Iterator[Metric]:
+def _endings(metrics: ServiceMetrics) -> Iterator[Metric]:
     ended = CounterMetricFamily("robomark_jobs_ended", "Jobs that have ended.", labels=["lane", "state"])
     for lane in Lane:
         for state in _ENDED:
-            ended.add_metric([lane.value, state.value], figures.jobs.get((lane, state), 0))
+            ended.add_metric([lane.value, state.value], metrics.jobs.get((lane, state), 0))
     yield ended
     verdicts = CounterMetricFamily("robomark_verdicts", "Grades by verdict.", labels=["verdict"])
-    for verdict, count in sorted(figures.verdicts.items()):
+    for verdict, count in sorted(metrics.verdicts.items()):
         verdicts.add_metric([verdict], count)
     yield verdicts
     yield CounterMetricFamily(
-        "robomark_host_faults", "Attempts that failed through no fault of the student's.", figures.host_faults
+        "robomark_host_faults", "Attempts that failed through no fault of the student's.", metrics.host_faults
     )
     yield CounterMetricFamily(
-        "robomark_criteria_unjudged", "Criteria that could not be judged within their bounds.", figures.unjudged
+        "robomark_criteria_unjudged", "Criteria that could not be judged within their bounds.", metrics.unjudged
     )
     yield CounterMetricFamily(
-        "robomark_surprises", "Trials in which our own code stumbled over what a child sent.", figures.surprises
+        "robomark_surprises", "Trials in which our own code stumbled over what a child sent.", metrics.surprises
     )
 
 
-def _workers(figures: Figures) -> Iterator[Metric]:
-    lately = [seen for seen in figures.workers if seen.lately]
+def _workers(metrics: ServiceMetrics) -> Iterator[Metric]:
+    lately = [seen for seen in metrics.workers if seen.lately]
     yield GaugeMetricFamily("robomark_workers", "Workers heard of in the last 30 s.", len(lately))
     yield GaugeMetricFamily(
-        "robomark_workers_quarantined", "Workers that got a known answer wrong.", figures.quarantined
+        "robomark_workers_quarantined", "Workers that got a known answer wrong.", metrics.quarantined
     )
     silent = GaugeMetricFamily(
         "robomark_worker_silent_seconds", "Since the worker was last heard of.", labels=["worker", "host", "version"]
     )
     slots = GaugeMetricFamily("robomark_worker_slots", "Gradings at a time.", labels=["worker", "host"])
-    for seen in figures.workers:
+    for seen in metrics.workers:
         worker = seen.worker
-        silent.add_metric([worker.name, worker.host, worker.grader_version], figures.silent_seconds[worker.name])
+        silent.add_metric([worker.name, worker.host, worker.grader_version], metrics.silent_seconds[worker.name])
         slots.add_metric([worker.name, worker.host], worker.concurrency)
     yield silent
     yield slots
@@ -111,14 +111,14 @@ def _workers(figures: Figures) -> Iterator[Metric]:
     yield build
 
 
-def _times(figures: Figures) -> Iterator[Metric]:
+def _times(metrics: ServiceMetrics) -> Iterator[Metric]:
     times = GaugeMetricFamily(
         "robomark_phase_seconds",
         "How long each phase took in the jobs that ended within the last hour.",
         labels=["phase", "quantile"],
     )
     counts = GaugeMetricFamily("robomark_phase_jobs", "Over how many jobs.", labels=["phase"])
-    for phase, values in figures.times.items():
+    for phase, values in metrics.times.items():
         counts.add_metric([phase], len(values))
         for share in _QUANTILES:
             if values:

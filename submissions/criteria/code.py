@@ -1,4 +1,4 @@
-"""Criteria about the code that was handed in: what its text has, what its functions return, and checks in Python.
+"""Criteria about the code that was submitted: what its text has, what its functions return, and checks in Python.
 
 Only what is asked; the text is read and the functions are called by the service, inside the walls.
 """

@@ -176,5 +176,5 @@ def import_a_module_beside_the_key():
 
 
 @attack(LANDLOCK)
-def read_the_walls_own_source():
+def read_the_sandboxs_own_source():
     return contents(sys.modules["inside.lockdown"].__file__)

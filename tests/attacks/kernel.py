@@ -1,6 +1,6 @@
 """The kernel itself: calls that no student needs, foreign ways to call, and numbers that mean nothing yet.
 
-Calls that a machine refuses to everybody but root, or that could hurt it, are tried behind the full walls only.
+Calls that a machine refuses to everybody but root, or that could hurt it, are tried in the full sandbox only.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def poison_the_machines_memory():
 
 
 @attack(UNTRIED)
-def take_down_the_walls():
+def take_down_the_sandbox():
     """Another filter, or none, cannot be had; nor the powers that could."""
     allow_all = struct.pack("=HBBI", 6, 0, 0, 0x7FFF0000)
     buffer = ctypes.create_string_buffer(allow_all)
@@ -233,7 +233,7 @@ globals().update(
             perf_event_open=(bytes(128), 0, -1, -1, 0),
             init_module=(b"", 0, b""),
             finit_module=(0, b"", 0),
-            delete_module=(b"robomark_canary", 0),
+            delete_module=(b"robomark_self_test", 0),
             kexec_load=(0, 0, 0, 0),
             iopl=(3,),
             ioperm=(0, 1, 1),

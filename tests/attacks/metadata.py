@@ -1,6 +1,6 @@
 """What can be learnt without opening anything: names, sizes, times, and who else is there.
 
-A little of it remains; docs/walls.md names it.
+A little of it remains; docs/sandbox.md names it.
 """
 
 from __future__ import annotations

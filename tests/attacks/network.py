@@ -1,4 +1,4 @@
-"""The network, and the sockets of this machine: each kind by itself, since walls differ in what they know."""
+"""The network, and the sockets of this machine: each kind by itself, since layers differ in what they know."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the canaries.
+"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the self_test.
 
-Python's own refusals are switched off first, as any student could, so that only the kernel's walls are tried.
+Python's own refusals are switched off first, as any student could, so that only the kernel's layers are tried.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "eit
 #: By the doorkeeper alone; by nothing, as it is nowhere to be found.
 DOORKEEPER, NOWHERE = "doorkeeper", "nowhere"
 
-#: The numbers of system calls by name, and the canaries; filled before an attack runs.
+#: The numbers of system calls by name, and the self_test; filled before an attack runs.
 numbers: dict[str, int] = {}
 targets = SimpleNamespace()
 

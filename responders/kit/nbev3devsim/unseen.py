@@ -1,6 +1,6 @@
 """Stand-ins for what only shows something in a notebook (plots, progress bars, widgets): they take any call.
 
-Nobody sees a graded notebook, and drawing libraries are not within its walls.
+Nobody sees a graded notebook, and drawing libraries are not within its sandbox.
 """
 
 from __future__ import annotations

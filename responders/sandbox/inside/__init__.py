@@ -1,1 +1,1 @@
-"""What runs on the student's side of the walls. It imports the standard library only, and is trusted by nobody."""
+"""What runs on the student's side of the sandbox. It imports the standard library only, and is trusted by nobody."""

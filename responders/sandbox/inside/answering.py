@@ -24,12 +24,12 @@ _NOTED = ("parser", "agent", "logger")
 class Responder:
     """The student's module, and the calls inside it that the sequence diagram shows."""
 
-    def __init__(self, wire: Wire, grants: Grants, job: Frame) -> None:
+    def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
         self._wire = wire
         self._grants = grants
-        self._job = job
-        self._name: str = job["name"]
-        self._function: str | None = job["function"]
+        self._spec = spec
+        self._name: str = spec["name"]
+        self._function: str | None = spec["function"]
         self._units = 0
         self._namespace: dict[str, Any] = {}
         self._defines_msg = False
@@ -39,7 +39,7 @@ class Responder:
     def run(self) -> None:
         """Load the module, then answer until the worker closes the wire."""
         self._prepare()
-        self._wire.send({"do": "ready", "error": self._load(self._job["text"])})
+        self._wire.send({"do": "ready", "error": self._load(self._spec["text"])})
         self._serve()
 
     def _prepare(self) -> None:
@@ -49,7 +49,7 @@ class Responder:
         signal.signal(signal.SIGXCPU, self._busy)
         student_code.install_output(self._emit)
         determinism.install_clock(lambda: self._units, self._sleep)
-        determinism.install_chance(self._job["seed"])
+        determinism.install_chance(self._spec["seed"])
         refusals.install(self._grants, self._name, self._refused)
         model_files.install_version_notes(self._name, self._refused)
         # Last, so that no file of the student's stands in for a library's.

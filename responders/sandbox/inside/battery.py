@@ -1,4 +1,4 @@
-"""A short list of escapes that a child tries on its own walls when a worker starts; each must be refused.
+"""A short list of escapes that a child tries on its own sandbox when a worker starts; each must be refused.
 
 The long list is the tests'; this one is for the machine at hand, whose kernel the tests have never seen.
 """

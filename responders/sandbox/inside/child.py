@@ -35,24 +35,24 @@ _ENVIRONMENT = {
 
 
 def start(
-    order: dict[str, Any],
+    spec: dict[str, Any],
     descriptors: list[int],
     grants: lockdown.Grants,
     role: Callable[[Wire, lockdown.Grants], None],
     zygote: int,
     door: int,
 ) -> None:
-    """Never returns. ``descriptors`` are the wire and, if the order has a folder, the folder."""
+    """Never returns. ``descriptors`` are the wire and, if the spec has a folder, the folder."""
     try:
         _own_session()
         _first_to_go()
         _descriptors([descriptors[0], door, *descriptors[1:]])
-        _limits(order)
+        _limits(spec)
         wire = Wire(_WIRE)
-        wire.send(_walls(order, grants, zygote))
+        wire.send(_sandbox(spec, grants, zygote))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
-        role(wire, dataclasses.replace(grants, without=tuple(order["without"])))
+        role(wire, dataclasses.replace(grants, without=tuple(spec["without"])))
     finally:
         os._exit(0)
 
@@ -73,12 +73,12 @@ def _first_to_go() -> None:
         score.write("1000")
 
 
-def _own_user(order: dict[str, Any], grants: lockdown.Grants) -> bool:
+def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
     """Root makes each child somebody who owns nothing, where the interpreter can be read by such a user."""
     if not grants.open_to_others or not lockdown.may_change_user():
         return False
     user = _USERS + os.getpid() % _USERS_COUNT
-    if order["folder"]:
+    if spec["folder"]:
         for name in [".", *os.listdir()]:
             os.chown(name, user, user, follow_symlinks=False)
     lockdown.become(user)
@@ -107,16 +107,16 @@ def _descriptors(descriptors: list[int]) -> None:
     os.umask(0o077)
 
 
-def _limits(order: dict[str, Any]) -> None:
+def _limits(spec: dict[str, Any]) -> None:
     """Address space beyond what the zygote maps already, CPU as a backstop, small files, few descriptors."""
     with open("/proc/self/statm", "rb") as statm:
         mapped = int(statm.read().split()[0]) * resource.getpagesize()
-    memory = mapped + order["memory"]
+    memory = mapped + spec["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    seconds = int(order["cpu"]) + 2
+    seconds = int(spec["cpu"]) + 2
     # The worker is there long before the second limit: a SIGKILL that it did not send is never this one's.
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 60))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (order["file_size"], order["file_size"]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (spec["file_size"], spec["file_size"]))
     resource.setrlimit(resource.RLIMIT_NOFILE, (32, 32))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))
@@ -124,31 +124,31 @@ def _limits(order: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
-def _walls(order: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame:
-    """Put up the layers that the order names, try each, and say what stands; nothing of the student's has run yet."""
+def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame:
+    """Put up the layers that the spec names, try each, and say what stands; nothing of the student's has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
     memory = _own_memory()
     try:
-        own_user = _own_user(order, grants)
+        own_user = _own_user(spec, grants)
         _end_with(zygote)
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
-        if order["landlock"]:
-            landlock = _files(order, grants)
-        if order["doorkeeper"]:
+        if spec["landlock"]:
+            landlock = _files(spec, grants)
+        if spec["doorkeeper"]:
             without_doorkeeper = _ask_about_paths(memory)
-        if order["seccomp"]:
+        if spec["seccomp"]:
             lockdown.restrict_system_calls()
             _must_fail("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
             _must_fail("seccomp", lambda: os.kill(os.getppid(), 0))
             seccomp = True
-    except lockdown.WallMissing as wall:
-        missing = str(wall)
+    except lockdown.LayerMissing as layer:
+        missing = str(layer)
     os.closerange(_DOOR, 1 << 8)
     return {
-        "do": "walls",
+        "do": "sandbox",
         "landlock": landlock,
         "seccomp": seccomp,
         "own_user": own_user,
@@ -172,17 +172,17 @@ def _ask_about_paths(memory: int | None) -> str | None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:
         try:
             questions = lockdown.ask_about_paths()
-        except lockdown.WallMissing as wall:
-            return str(wall)
+        except lockdown.LayerMissing as layer:
+            return str(layer)
         doorkeeper.make_known(door, questions, memory)
         os.close(questions)
     _must_fail("doorkeeper", lambda: os.stat("/etc/passwd"))
     return None
 
 
-def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:
-    folder = os.open(".", os.O_PATH) if order["folder"] else None
-    version = lockdown.restrict_files(lockdown.Grants(grants.read, grants.list_only, folder), order["landlock"])
+def _files(spec: dict[str, Any], grants: lockdown.Grants) -> int:
+    folder = os.open(".", os.O_PATH) if spec["folder"] else None
+    version = lockdown.restrict_files(lockdown.Grants(grants.read, grants.list_only, folder), spec["landlock"])
     if folder is not None:
         os.close(folder)
     _must_fail("Landlock", lambda: os.open("/etc/passwd", os.O_RDONLY))
@@ -190,9 +190,9 @@ def _files(order: dict[str, Any], grants: lockdown.Grants) -> int:
     return version
 
 
-def _must_fail(wall: str, attempt: Callable[[], object]) -> None:
+def _must_fail(layer: str, attempt: Callable[[], object]) -> None:
     try:
         attempt()
     except OSError:
         return
-    raise lockdown.WallMissing(f"{wall}: it is in place and lets through what it must refuse")
+    raise lockdown.LayerMissing(f"{layer}: it is in place and lets through what it must refuse")

@@ -107,7 +107,7 @@ def _above(path: bytes) -> list[bytes]:
 def _serve(door: socket.socket, known: _Known) -> None:
     """Answer until the zygote and its children are gone."""
     lockdown.forbid_new_privileges()
-    with contextlib.suppress(lockdown.WallMissing):
+    with contextlib.suppress(lockdown.LayerMissing):
         # Not from the version that keeps signals in: that of its death has to reach the zygote.
         lockdown.restrict_files(lockdown.Grants(()), 5)
     guests: dict[int, _Guest] = {}

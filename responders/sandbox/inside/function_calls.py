@@ -15,13 +15,13 @@ from .frames import Frame, fits
 NO_RESPONDER = ""
 
 
-def returned(namespace: dict[str, Any], name: str, order: Frame) -> Frame:
-    """The answer to one ``call`` order; ``name`` is that of the student's file, for line numbers."""
-    function = namespace.get(order["function"])
+def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
+    """The answer to one ``call`` spec; ``name`` is that of the student's file, for line numbers."""
+    function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
     try:
-        value = function(*order["arguments"], **order["named"])
+        value = function(*spec["arguments"], **spec["named"])
         text = _as_json(value)
     except BaseException as error:
         return {"do": "returned", "kind": "error", "error": student_code.describe(error, name)}

@@ -1,4 +1,4 @@
-"""The kernel's walls, put up by a process round itself: Landlock for files, a seccomp filter for everything else.
+"""The kernel's layers, put up by a process round itself: Landlock for files, a seccomp filter for everything else.
 
 Both are needed: Landlock knows files but not the network, seccomp knows system calls but not files. There is no way
 back, and neither needs a privilege. Which calls are allowed is in ``system_calls.py``.
@@ -37,8 +37,8 @@ _NETWORK_RIGHTS = 0b11  # bind and connect TCP, from version 4
 _SCOPES = 0b11  # abstract sockets and signals, from version 6
 
 
-class WallMissing(Exception):
-    """A wall that cannot be put up here; the text names it and what the system said."""
+class LayerMissing(Exception):
+    """A layer that cannot be put up here; the text names it and what the system said."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,15 @@ def landlock_version() -> int:
 
 
 def forbid_new_privileges() -> None:
-    """No set-uid program can lift the walls."""
+    """No set-uid program can lift the sandbox."""
     if _libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
-        raise WallMissing(f"no_new_privs: {_last_error()}")
+        raise LayerMissing(f"no_new_privs: {_last_error()}")
 
 
 def drop_capabilities() -> None:
     """Root keeps its name and loses its powers: no mounts, no raw sockets, no pages taken from the machine."""
     if _libc.syscall(_SYS_CAPSET, _CAPABILITIES, bytes(24)) != 0:
-        raise WallMissing(f"capset: {_last_error()}")
+        raise LayerMissing(f"capset: {_last_error()}")
 
 
 def may_change_user() -> bool:
@@ -80,20 +80,20 @@ def may_change_user() -> bool:
 
 
 def become(user: int) -> None:
-    """Be ``user``, and in no group but its own. Raises WallMissing."""
+    """Be ``user``, and in no group but its own. Raises LayerMissing."""
     try:
         os.setgroups([])
         os.setresgid(user, user, user)
         os.setresuid(user, user, user)
     except OSError as error:
-        raise WallMissing(f"own user: {error.strerror}") from None
+        raise LayerMissing(f"own user: {error.strerror}") from None
 
 
 def restrict_files(grants: Grants, most: int = 99) -> int:
     """Let this process reach nothing but ``grants``; at most version ``most`` is used. The version in force."""
     version = min(landlock_version(), most)
     if version < 1:
-        raise WallMissing(
+        raise LayerMissing(
             "Landlock: the kernel does not have it or it is switched off (needs 5.13 with landlock in lsm=)"
         )
     rights = _FILE_RIGHTS[min(version, 5)]
@@ -107,7 +107,7 @@ def restrict_files(grants: Grants, most: int = 99) -> int:
             own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
             _add_rule(ruleset, grants.write, own & rights)
         if _libc.syscall(_SYS_LANDLOCK_RESTRICT_SELF, ruleset, 0) != 0:
-            raise WallMissing(f"Landlock: {_last_error()}")
+            raise LayerMissing(f"Landlock: {_last_error()}")
     finally:
         os.close(ruleset)
     return version
@@ -124,7 +124,7 @@ def _create_ruleset(rights: int, version: int) -> int:
             return int(ruleset)
         if ctypes.get_errno() != errno.EINVAL:
             break
-    raise WallMissing(f"Landlock: {_last_error()}")
+    raise LayerMissing(f"Landlock: {_last_error()}")
 
 
 def _allow_path(ruleset: int, path: str, rights: int) -> None:
@@ -142,7 +142,7 @@ def _allow_path(ruleset: int, path: str, rights: int) -> None:
 def _add_rule(ruleset: int, fd: int, rights: int) -> None:
     rule = struct.pack("=Qi", rights, fd)
     if _libc.syscall(_SYS_LANDLOCK_ADD_RULE, ruleset, 1, rule, 0) != 0:
-        raise WallMissing(f"Landlock: {_last_error()}")
+        raise LayerMissing(f"Landlock: {_last_error()}")
 
 
 def _last_error() -> str:
@@ -157,11 +157,11 @@ def restrict_system_calls() -> None:
 def ask_about_paths() -> int:
     """From now on every call that names a path waits for an answer; the descriptor from which they are answered.
 
-    Raises WallMissing where the kernel cannot, or somebody further out answers for this process already.
+    Raises LayerMissing where the kernel cannot, or somebody further out answers for this process already.
     """
     try:
         return _install(asking(), _NEW_LISTENER | _ANSWERED_BEFORE_SIGNALS)
-    except WallMissing:
+    except LayerMissing:
         return _install(asking(), _NEW_LISTENER)
 
 
@@ -170,7 +170,7 @@ def _install(code: bytes, flags: int) -> int:
     header = struct.pack("=H6xQ", len(code) // 8, ctypes.addressof(buffer))
     result = _libc.syscall(_SYS_SECCOMP, 1, flags, header)
     if result < 0:
-        raise WallMissing(f"seccomp: {_last_error()}")
+        raise LayerMissing(f"seccomp: {_last_error()}")
     return int(result)
 
 

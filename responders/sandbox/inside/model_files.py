@@ -1,4 +1,4 @@
-"""What loading students' models needs inside the walls: onnxruntime on one thread, and sentences for what goes wrong.
+"""What loading students' models needs inside the sandbox: onnxruntime on one thread, and sentences for what goes wrong.
 
 The files themselves are read by the libraries that wrote them; nothing here trusts one.
 """

@@ -1,4 +1,4 @@
-"""Plays a notebook from top to bottom in the responder's process, and answers the robots that its magics start.
+"""Executes a notebook from top to bottom in the responder's process, and answers the robots that its magics start.
 
 A cell that raises is told of and the next one is run. Which run is marked, and what becomes of it, is the worker's.
 """
@@ -24,11 +24,11 @@ _SHOWN = 2000
 _ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
 
 
-class Player(Responder):
+class RunRequester(Responder):
     """A notebook: its cells share one namespace, one clock and one file name; line numbers run on from cell to cell."""
 
-    def __init__(self, wire: Wire, grants: Grants, job: Frame) -> None:
-        super().__init__(wire, grants, job)
+    def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
+        super().__init__(wire, grants, spec)
         self._notes = 0
         self._muted = False
         self._robot_runs = False
@@ -47,16 +47,16 @@ class Player(Responder):
         unseen.install(shell)
         self._namespace.update(get_ipython=lambda: shell, display=unseen.display, In=[], Out={})
         builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
-        text = "".join(source + "\n" for source in self._job["cells"])
+        text = "".join(source + "\n" for source in self._spec["cells"])
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
         above = 0
-        for place, source in enumerate(self._job["cells"]):
+        for place, source in enumerate(self._spec["cells"]):
             self._wire.send({"do": "cell", "place": place})
-            error = self._play(source, above, shell)
+            error = self._execute(source, above, shell)
             if error is not None:
                 self._wire.send({"do": "raised", "error": error})
             above += source.count("\n") + 1
-        self._wire.send({"do": "played", "missing": self._missing()})
+        self._wire.send({"do": "executed", "missing": self._missing()})
         self._fix_msg()
         self._serve()
 
@@ -123,7 +123,7 @@ class Player(Responder):
         if frame["state"] is not None:
             roboSim.robot_state = frame["state"]
 
-    def _play(self, source: str, above: int, shell: Shell) -> Frame | None:
+    def _execute(self, source: str, above: int, shell: Shell) -> Frame | None:
         """Run one cell, ``above`` being the lines of all before it. The error that ended it, if any."""
         try:
             magic = cell_source.cell_magic(source)

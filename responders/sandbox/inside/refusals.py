@@ -1,4 +1,4 @@
-"""Turns what the walls refuse into an ordinary Python error with a sentence, and tells the worker where it happened.
+"""Turns what the sandbox refuses into an ordinary Python error with a sentence, and tells the worker where it happened.
 
 This is courtesy, not protection: the kernel refuses all the same.
 """

@@ -12,7 +12,7 @@ from . import model_files, source_reader  # noqa: F401
 from .answering import Responder
 from .frames import Wire
 from .lockdown import Grants
-from .notebook_role import Player
+from .notebook_role import RunRequester
 
 #: What answering takes.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
@@ -65,6 +65,6 @@ def _ask_the_machine() -> None:
 
 def run(wire: Wire, grants: Grants) -> None:
     """Receive a module or a notebook, run it, and answer."""
-    job = wire.receive()
-    player = Player if "cells" in job else Responder
-    player(wire, grants, job).run()
+    spec = wire.receive()
+    requester = RunRequester if "cells" in spec else Responder
+    requester(wire, grants, spec).run()

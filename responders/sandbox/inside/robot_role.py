@@ -29,8 +29,8 @@ def run(wire: Wire, grants: Grants) -> None:
     from brick_link import link
     from brick_preambles import PREAMBLES
 
-    job = wire.receive()
-    name: str = job["name"]
+    spec = wire.receive()
+    name: str = spec["name"]
 
     def stuck() -> None:
         _leave(wire, {"do": "stuck", "line": student_code.line_of(sys._getframe(), name)})
@@ -52,20 +52,20 @@ def run(wire: Wire, grants: Grants) -> None:
     link.connect(wire.send, wire.send_later, wire.receive, stuck)
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
-    determinism.install_chance(job["seed"])
+    determinism.install_chance(spec["seed"])
     refusals.install(grants, name, lambda what, line: wire.send({"do": "refused", "what": what, "line": line}))
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
-    wire.send({"do": "end", "error": _execute(job, PREAMBLES[job["preamble"]], module.__dict__)})
+    wire.send({"do": "end", "error": _execute(spec, PREAMBLES[spec["preamble"]], module.__dict__)})
     wire.receive()
 
 
-def _execute(job: Frame, preamble: str, namespace: dict[str, Any]) -> Frame | None:
+def _execute(spec: Frame, preamble: str, namespace: dict[str, Any]) -> Frame | None:
     """The error that ended the program, or None."""
-    name: str = job["name"]
+    name: str = spec["name"]
     try:
         exec(compile(preamble, "<preamble>", "exec", dont_inherit=True), namespace)
-        exec(student_code.compile_source(job["text"], name), namespace)
+        exec(student_code.compile_source(spec["text"], name), namespace)
     except SystemExit as ending:
         if ending.code in (None, 0):
             return None

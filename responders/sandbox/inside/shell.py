@@ -32,8 +32,8 @@ _NO_PACKAGES = (
 )
 
 
-class Player(Protocol):
-    """What the shell needs of the notebook that is being played."""
+class RunRequester(Protocol):
+    """What the shell needs of the notebook that is being executed."""
 
     @property
     def namespace(self) -> dict[str, Any]: ...
@@ -48,33 +48,33 @@ class Player(Protocol):
 class Shell:
     """The part of IPython's shell that notebooks of the course use."""
 
-    def __init__(self, player: Player) -> None:
-        self._player = player
+    def __init__(self, requester: RunRequester) -> None:
+        self._requester = requester
         self._lines: dict[str, Callable[[str], Any]] = {
             "cat": self._cat,
             "less": self._cat,
             "more": self._cat,
             "pycat": self._cat,
             "ls": self._ls,
-            "time": lambda line: self._player.run_python(python_source(line)),
+            "time": lambda line: self._requester.run_python(python_source(line)),
         }
         self._cells: dict[str, Callable[[str, str], Any]] = {
             "writefile": self._write,
             "file": self._write,
-            "time": lambda _, body: self._player.run_python(python_source(body)),
-            "capture": lambda _, body: self._player.muted(lambda: self._player.run_python(python_source(body))),
+            "time": lambda _, body: self._requester.run_python(python_source(body)),
+            "capture": lambda _, body: self._requester.muted(lambda: self._requester.run_python(python_source(body))),
         }
 
     @property
     def user_ns(self) -> dict[str, Any]:
-        return self._player.namespace
+        return self._requester.namespace
 
     def run_line_magic(self, magic_name: str, line: str, _stack_depth: int = 1) -> Any:
         """``%name line``; what cannot be done is noted."""
         name = str(magic_name).lstrip("%")
-        line = self._player.expand(str(line))
+        line = self._requester.expand(str(line))
         if name in _ROBOT:
-            return self._player.start_robot(name, line, None)
+            return self._requester.start_robot(name, line, None)
         data = _data_magics().get(name)
         if data is not None:
             return data(_words(line))
@@ -85,13 +85,13 @@ class Shell:
     def run_cell_magic(self, magic_name: str, line: str, cell: str) -> Any:
         """``%%name line`` and the rest of the cell."""
         name = str(magic_name).lstrip("%")
-        line, body = self._player.expand(str(line)), str(cell)
+        line, body = self._requester.expand(str(line)), str(cell)
         if name in _ROBOT:
-            return self._player.start_robot(name, line, body)
+            return self._requester.start_robot(name, line, body)
         if name in self._cells:
             return self._cells[name](line, body)
         if name in _DIAGRAMS:
-            return self._player.note(f"%%{name} was skipped: diagrams are not drawn here")
+            return self._requester.note(f"%%{name} was skipped: diagrams are not drawn here")
         return self._without(name, f"%%{name}")
 
     def magic(self, arg_s: str) -> Any:
@@ -100,7 +100,7 @@ class Shell:
 
     def system(self, cmd: str) -> None:
         """``!cmd``: refused."""
-        self._player.note(f"!{_short(cmd)} was refused: {refusals.PROGRAMS}")
+        self._requester.note(f"!{_short(cmd)} was refused: {refusals.PROGRAMS}")
 
     def getoutput(self, cmd: str, *_: Any, **__: Any) -> list[str]:
         """``x = !cmd``: refused, and nothing comes of it."""
@@ -114,11 +114,11 @@ class Shell:
 
     def _without(self, name: str, shown: str) -> None:
         if name in _PROGRAMS:
-            self._player.note(f"{_short(shown)} was refused: {refusals.PROGRAMS}")
+            self._requester.note(f"{_short(shown)} was refused: {refusals.PROGRAMS}")
         elif name in _PACKAGES:
-            self._player.note(f"{shown} was refused: {_NO_PACKAGES}")
+            self._requester.note(f"{shown} was refused: {_NO_PACKAGES}")
         elif name not in _WITHOUT_EFFECT:
-            self._player.note(f"{_short(shown)} was skipped: it is not known here")
+            self._requester.note(f"{_short(shown)} was skipped: it is not known here")
 
     def _cat(self, line: str) -> None:
         for name in _words(line):

@@ -1,4 +1,4 @@
-"""A process with the heavy imports loaded that forks one child an order; it never holds anything secret.
+"""A process with the heavy imports loaded that forks one child a spec; it never holds anything secret.
 
 It is exec'd with a clean environment, has one thread, and dies with its worker.
 """
@@ -23,7 +23,7 @@ _ENDED = (ctypes.c_char * 152)()  # the status and, from the eighth byte, what w
 
 
 def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
-    """Serve orders on descriptor 3 until the worker closes it.
+    """Serve specs on descriptor 3 until the worker closes it.
 
     ``folders`` is where children have theirs, ``without`` are modules that none of them may have.
     """
@@ -48,7 +48,7 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
     door = doorkeeper.start(allowed, control.fileno())
     role.preload(without)
-    plays = {"role": role.run, "battery": battery.run}
+    roles = {"role": role.run, "battery": battery.run}
     zygote = os.getpid()
     _one_thread()
     gc.collect()
@@ -57,18 +57,18 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     _reply(control, {"ready": True}, [inside])
     os.close(inside)
     while True:
-        order, descriptors = _receive(control)
-        if order is None:
+        spec, descriptors = _receive(control)
+        if spec is None:
             os._exit(0)
-        if order["do"] == "spawn":
+        if spec["do"] == "spawn":
             pid = os.fork()
             if pid == 0:
-                child.start(order, descriptors, allowed, plays[order["play"]], zygote, door.fileno())
+                child.start(spec, descriptors, allowed, roles[spec["work"]], zygote, door.fileno())
             _hand_over(control, pid)
             for fd in descriptors:
                 os.close(fd)
         else:
-            _reap(control, order["pid"])
+            _reap(control, spec["pid"])
 
 
 def _hand_over(control: socket.socket, pid: int) -> None:

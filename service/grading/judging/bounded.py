@@ -21,9 +21,9 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any, NoReturn
 
-from service.grading.findings import Findings
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
+from service.grading.static_analysis import StaticAnalysis
 from sim.errors import HostError
 from sim.recording import Image
 from submissions.assignment import Assignment
@@ -32,7 +32,7 @@ from submissions.criteria import Criterion, Ranking
 #: Characters that programs and responders wrote in all trials; to fork a worker costs as much as judging so many.
 _LITTLE = 100_000
 _A_TEXT = 20  # characters that a text counts for, beside its own
-_PULSE_MILLISECONDS = 200
+_HEARTBEAT_MILLISECONDS = 200
 _LONGEST_CAUSE = 300
 _FRAME = struct.Struct("<Q")
 _IMAGE = "IMG_DATA::"
@@ -65,12 +65,12 @@ def judge_within(
     bounds: Bounds,
     assignment: Assignment,
     trials: tuple[TrialResult, ...],
-    findings: Findings,
-    pulse: Callable[[], None] = lambda: None,
+    analysis: StaticAnalysis,
+    heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[CriterionResult, ...]:
     """As ``judge``; of a criterion that could not be judged its result tells so, and why.
 
-    Raises HostError as ``judge`` does, or when no process can be started, and whatever ``pulse`` raises.
+    Raises HostError as ``judge`` does, or when no process can be started, and whatever ``heartbeat`` raises.
     """
     refuse_spoilt(trials)
     left = in_turn(assignment)
@@ -79,12 +79,12 @@ def judge_within(
         # Whatever is wrong here is found out in a process.
         with suppress(Exception, _Late), _guarded():
             while left:
-                results[left[0].id] = judge_one(left[0], assignment, trials, findings, results)
+                results[left[0].id] = judge_one(left[0], assignment, trials, analysis, results)
                 del left[0]
     killed_at = ""
     while left:
-        judging = _Judging(bounds, assignment, trials, findings, results)
-        frames, status = _in_a_process(lambda: judging.frames(left), pulse)  # noqa: B023 - called at once
+        judging = _Judging(bounds, assignment, trials, analysis, results)
+        frames, status = _in_a_process(lambda: judging.frames(left), heartbeat)  # noqa: B023 - called at once
         for frame in frames:
             result: CriterionResult = _Unpickler(io.BytesIO(frame), trials).load()
             results[result.id] = result
@@ -143,7 +143,7 @@ class _Judging:
     bounds: Bounds
     assignment: Assignment
     trials: tuple[TrialResult, ...]
-    findings: Findings
+    analysis: StaticAnalysis
     results: dict[str, CriterionResult]
 
     def frames(self, criteria: Sequence[Criterion]) -> Iterator[bytes]:
@@ -159,7 +159,7 @@ class _Judging:
         if of is not None and of.unjudged:
             return _unjudged(criterion, f"{of.id}, which it ranks, could not be judged")
         try:
-            return judge_one(criterion, self.assignment, self.trials, self.findings, self.results)
+            return judge_one(criterion, self.assignment, self.trials, self.analysis, self.results)
         except MemoryError:
             return _unjudged(criterion, f"it took more than {self.bounds.memory_bytes >> 20} MB of memory")
         except Exception as error:
@@ -193,7 +193,7 @@ def _limit_memory(more: int) -> tuple[int, int]:
     return before
 
 
-def _in_a_process(work: Callable[[], Iterator[bytes]], pulse: Callable[[], None]) -> tuple[list[bytes], int]:
+def _in_a_process(work: Callable[[], Iterator[bytes]], heartbeat: Callable[[], None]) -> tuple[list[bytes], int]:
     """What ``work`` yielded in a forked process until that ended, and its wait status."""
     reader, writer = os.pipe()
     try:
@@ -207,7 +207,7 @@ def _in_a_process(work: Callable[[], Iterator[bytes]], pulse: Callable[[], None]
     os.close(writer)
     status = None
     try:
-        told = b"".join(_read(reader, pulse))
+        told = b"".join(_read(reader, heartbeat))
         _, status = os.waitpid(pid, 0)
     finally:
         os.close(reader)
@@ -229,16 +229,16 @@ def _work_and_leave(work: Callable[[], Iterator[bytes]], writer: int) -> NoRetur
         os._exit(0)
 
 
-def _read(reader: int, pulse: Callable[[], None]) -> Iterator[bytes]:
+def _read(reader: int, heartbeat: Callable[[], None]) -> Iterator[bytes]:
     poll = select.poll()
     poll.register(reader, select.POLLIN)
     while True:
-        if poll.poll(_PULSE_MILLISECONDS):
+        if poll.poll(_HEARTBEAT_MILLISECONDS):
             data = os.read(reader, 1 << 20)
             if not data:
                 return
             yield data
-        pulse()
+        heartbeat()
 
 
 def _frames(told: bytes) -> Iterator[bytes]:

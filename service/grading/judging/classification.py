@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from statistics import fmean
 
 from models.intervals import wilson
-from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Sight, TrialResult
+from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Prediction, TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.judging.labels import LabelFinder
-from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import Side, by_pattern
-from service.grading.judging.tally import Fate, Reply, reply_to
+from service.grading.judging.samples import Sample
+from service.grading.judging.tally import Reply, ReplyStatus, reply_to
 from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
@@ -33,9 +33,9 @@ _SAME_PLACE = 1.0
 class Classified:
     """What a recognition criterion found in its trials: each picture or, where it says so, each pattern."""
 
-    namings: tuple[Naming, ...]
+    samples: tuple[Sample, ...]
     accuracy: Accuracy
-    sights: tuple[Sight, ...]
+    predictions: tuple[Prediction, ...]
     evidence: tuple[Evidence, ...]
 
 
@@ -45,69 +45,69 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
     truths = [truth for told_truths in shown.values() for _, truth in told_truths]
     labels = nameable(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
-    pictures: list[Naming] = []
-    namings: list[Naming] = []
-    fates: Counter[Fate] = Counter()
+    pictures: list[Sample] = []
+    samples: list[Sample] = []
+    statuses: Counter[ReplyStatus] = Counter()
     duplicates = 0
     for index, trial in trials:
         recording = trial.recording
         replies = _replies(criterion, recording)
-        fates.update(reply.fate for reply in replies)
+        statuses.update(reply.status for reply in replies)
         duplicates += sum(reply.duplicates for reply in replies)
         own = []
         for number, truth in shown[index]:
             answer, words, confidence = _answer(criterion, replies[number], finder)
             image = recording.images[number]
-            own.append(Naming(index, image, finder.canonical(truth), answer, words, confidence))
+            own.append(Sample(index, image, finder.canonical(truth), answer, words, confidence))
         pictures += own
-        namings += _that_count(criterion, index, trial, own, finder)
+        samples += _that_count(criterion, index, trial, own, finder)
     by_index = dict(trials)
-    of_trial: dict[int, list[Naming]] = {index: [] for index in by_index}
-    for naming in namings:
-        of_trial[naming.trial].append(naming)
-    sights = tuple(
-        Sight(naming.image, naming.truth, naming.answer, by_index[naming.trial].scenario, naming.trial)
-        for naming in pictures
-        if naming.image is not None
+    of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
+    for sample in samples:
+        of_trial[sample.trial].append(sample)
+    predictions = tuple(
+        Prediction(sample.image, sample.truth, sample.answer, by_index[sample.trial].scenario, sample.trial)
+        for sample in pictures
+        if sample.image is not None
     )
-    missing = sum(naming.image is None for naming in namings)
+    missing = sum(sample.image is None for sample in samples)
     counts = Counts(
-        sum(fates.values()),
-        fates["answered"],
-        fates["late"],
-        fates["malformed"],
-        fates["unanswered"],
+        sum(statuses.values()),
+        statuses["answered"],
+        statuses["late"],
+        statuses["malformed"],
+        statuses["unanswered"],
         duplicates,
-        len(namings) - missing,
+        len(samples) - missing,
         missing,
         "pictures" if criterion.each_pattern is None else "patterns",
     )
     return Classified(
-        tuple(namings),
-        _accuracy(namings, labels, counts),
-        sights,
+        tuple(samples),
+        _accuracy(samples, labels, counts),
+        predictions,
         tuple(_evidence(index, own) for index, own in of_trial.items()),
     )
 
 
-def told(naming: Naming) -> str:
+def told(sample: Sample) -> str:
     """A sentence on one picture."""
-    if naming.image is None:
-        if naming.truth == NO_PICTURE:
-            return f"Expected a picture (IMG_DATA), but {naming.words}."
-        return f"Expected {quoted(naming.truth)}, but {naming.words}."
-    if naming.right:
-        return f"The picture showed {quoted(naming.truth)} and was named so."
-    return f"The picture showed {quoted(naming.truth)}, but {naming.words}."
+    if sample.image is None:
+        if sample.truth == NO_PICTURE:
+            return f"Expected a picture (IMG_DATA), but {sample.words}."
+        return f"Expected {quoted(sample.truth)}, but {sample.words}."
+    if sample.right:
+        return f"The picture showed {quoted(sample.truth)} and was named so."
+    return f"The picture showed {quoted(sample.truth)}, but {sample.words}."
 
 
 def _that_count(
     criterion: Recognition,
     index: int,
     trial: TrialResult,
-    own: list[Naming],
+    own: list[Sample],
     finder: LabelFinder,
-) -> Sequence[Naming]:
+) -> Sequence[Sample]:
     """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
     if criterion.each_pattern is None:
         counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
@@ -123,41 +123,41 @@ def _that_count(
         sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"
-        return [Naming(index, None, finder.canonical(truth), None, sent)]
+        return [Sample(index, None, finder.canonical(truth), None, sent)]
     words = f"the robot sent pictures of {len(counted)} patterns, and {criterion.patterns} were expected"
-    lacking = Naming(index, None, NO_PICTURE, None, words)
+    lacking = Sample(index, None, NO_PICTURE, None, words)
     return [*counted, *[lacking] * (criterion.patterns - len(counted))]
 
 
-def _accuracy(namings: Sequence[Naming], labels: tuple[str, ...], counts: Counts) -> Accuracy:
-    right = sum(naming.right for naming in namings)
-    count = len(namings)
+def _accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
+    right = sum(sample.right for sample in samples)
+    count = len(samples)
     low, high = wilson(right, count)
-    cells = Counter((naming.truth, naming.answer) for naming in namings)
+    cells = Counter((sample.truth, sample.answer) for sample in samples)
     confusion = tuple(
         (truth, answer, number)
         for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
     )
-    known = tuple(dict.fromkeys([*labels, *(naming.truth for naming in namings)]))
-    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(namings))
+    known = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
+    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(samples))
 
 
-def _confidence(namings: Sequence[Naming]) -> Confidence | None:
+def _confidence(samples: Sequence[Sample]) -> Confidence | None:
     """How sure the answers were that were right, and those that were wrong; None if no answer said."""
-    right = [naming.confidence for naming in namings if naming.right and naming.confidence is not None]
-    wrong = [naming.confidence for naming in namings if not naming.right and naming.confidence is not None]
+    right = [sample.confidence for sample in samples if sample.right and sample.confidence is not None]
+    wrong = [sample.confidence for sample in samples if not sample.right and sample.confidence is not None]
     if not right and not wrong:
         return None
     return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
 
 
-def _evidence(index: int, own: Sequence[Naming]) -> Evidence:
+def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
     """The first picture of the trial that was named wrongly, else its last."""
-    shown = next((naming for naming in own if not naming.right), own[-1])
+    shown = next((sample for sample in own if not sample.right), own[-1])
     image = shown.image
     return Evidence(
         trial=index,
-        passed=all(naming.right for naming in own),
+        passed=all(sample.right for sample in own),
         message=told(shown),
         t=image.t if image else None,
         pose=image.pose if image else None,
@@ -183,7 +183,7 @@ def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[
     """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
     if reply.text is None:
         return None, reply.words, None
-    if reply.fate == "late" and criterion.late == "wrong":
+    if reply.status == "late" and criterion.late == "wrong":
         return None, f"the answer came too late: {quoted(reply.text)}", None
     text, confidence = reply.text, None
     if criterion.answer_from == "reply":

@@ -12,8 +12,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.label_patches import decoded
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
-from service.grading.judging.patches import decoded
 from service.grading.judging.places import look_at, part_at
 from sim.backgrounds import floor, label_names, names
 from sim.recording import Image, Recording

@@ -1,6 +1,6 @@
 """Judging what functions return: values of called functions, and what an instructor's own check says of a trial.
 
-Values come from inside the walls and are compared here; a student's value is data and nothing more.
+Values come from inside the sandbox and are compared here; a student's value is data and nothing more.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
 
 def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
     if called is None:
-        return failed("Expected a responder to be handed in, but it was not.")
+        return failed("Expected a responder to be submitted, but it was not.")
     if called.fault is not None:
         return failed(f"Expected the responder to be loaded, but: {fault_words(called.fault)}.")
     scores: list[Fraction] = []

@@ -11,7 +11,6 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import Any
 
-from service.grading.findings import Findings
 from service.grading.grade import CriterionResult, Evidence, Shown, TrialResult
 from service.grading.judging.circuits import judge_circuits
 from service.grading.judging.collecting import judge_collects
@@ -40,6 +39,7 @@ from service.grading.judging.stopping import judge_stop_on
 from service.grading.judging.texts import judge_messages, judge_prints, judge_says
 from service.grading.judging.timing import judge_ranking, judge_timing
 from service.grading.judging.trial_words import early_end, place_words, shown_words
+from service.grading.static_analysis import StaticAnalysis
 from sim.errors import HostError
 from sim.recording import Verdict
 from submissions.assignment import Assignment
@@ -115,24 +115,24 @@ _JUDGES: Mapping[type, Callable[[Any, TrialResult], Outcome]] = MappingProxyType
     }
 )
 
-_NOTHING_FOUND = Findings()
+_NOTHING_FOUND = StaticAnalysis()
 
 _Indexed = SequenceOf[tuple[int, TrialResult]]
 
 
 def judge(
-    assignment: Assignment, trials: tuple[TrialResult, ...], findings: Findings = _NOTHING_FOUND
+    assignment: Assignment, trials: tuple[TrialResult, ...], analysis: StaticAnalysis = _NOTHING_FOUND
 ) -> tuple[CriterionResult, ...]:
     """One result for each criterion of the assignment, in its order.
 
-    ``findings`` is what is known of the hand-in beside the recordings. A trial that was cut short is judged by
+    ``analysis`` is what is known of the submission beside the recordings. A trial that was cut short is judged by
     what was reached. Raises HostError for a trial that this machine spoilt, because such a trial must be run
     again, not marked.
     """
     refuse_spoilt(trials)
     results: dict[str, CriterionResult] = {}
     for criterion in in_turn(assignment):
-        results[criterion.id] = judge_one(criterion, assignment, trials, findings, results)
+        results[criterion.id] = judge_one(criterion, assignment, trials, analysis, results)
     return tuple(results[criterion.id] for criterion in assignment.criteria)
 
 
@@ -151,12 +151,12 @@ def judge_one(
     criterion: Criterion,
     assignment: Assignment,
     trials: SequenceOf[TrialResult],
-    findings: Findings,
+    analysis: StaticAnalysis,
     results: Mapping[str, CriterionResult],
 ) -> CriterionResult:
     """The result of one criterion; ``results`` are those of the criteria before it in turn, by id."""
     if isinstance(criterion, SourceRules | Functions):
-        return _judged_once(criterion, findings, trials)
+        return _judged_once(criterion, analysis, trials)
     own = [
         (index, trial)
         for index, trial in enumerate(trials)
@@ -164,7 +164,7 @@ def judge_one(
     ]
     if isinstance(criterion, Classification | Robustness):
         return judge_recognition(criterion, assignment, own)
-    outcomes = [_outcome(criterion, place, trial, findings, results) for place, trial in own]
+    outcomes = [_outcome(criterion, place, trial, analysis, results) for place, trial in own]
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -181,14 +181,14 @@ def judge_one(
 
 
 def _judged_once(
-    criterion: SourceRules | Functions, findings: Findings, trials: SequenceOf[TrialResult]
+    criterion: SourceRules | Functions, analysis: StaticAnalysis, trials: SequenceOf[TrialResult]
 ) -> CriterionResult:
-    """For what is looked at once a hand-in: no trial is its evidence."""
+    """For what is looked at once a submission: no trial is its evidence."""
     if isinstance(criterion, SourceRules):
         driven = trials if criterion.part == "program" else ()
-        outcome = judge_source(criterion, findings.answers.get(criterion.id), findings.flags, driven)
+        outcome = judge_source(criterion, analysis.answers.get(criterion.id), analysis.flags, driven)
     else:
-        outcome = judge_functions(criterion, findings.called.get(criterion.id))
+        outcome = judge_functions(criterion, analysis.called.get(criterion.id))
     share = Fraction(outcome.passed) if criterion.over == "all" else outcome.score
     return CriterionResult(
         id=criterion.id,
@@ -205,11 +205,11 @@ def _outcome(
     criterion: Criterion,
     place: int,
     trial: TrialResult,
-    findings: Findings,
+    analysis: StaticAnalysis,
     results: Mapping[str, CriterionResult],
 ) -> Outcome:
     if isinstance(criterion, PythonCheck):
-        return findings.checks[criterion.id, place]
+        return analysis.checks[criterion.id, place]
     if isinstance(criterion, Ranking):
         return judge_ranking(criterion, place, results.get(criterion.of))
     return _JUDGES[type(criterion)](criterion, trial)

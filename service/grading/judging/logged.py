@@ -12,9 +12,9 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.measured import measured_only
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at
-from service.grading.judging.patches import GREYS, decoded
 from service.grading.judging.places import floor_share
 from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask

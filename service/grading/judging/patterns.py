@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
-from service.grading.judging.naming import Naming
 from service.grading.judging.outcome import listed
 from service.grading.judging.places import part_at
+from service.grading.judging.samples import Sample
 from sim.recording import Recording
 
 How = Literal["first", "any", "majority"]
@@ -23,9 +23,9 @@ _Place = tuple[float, float]
 
 
 def by_pattern(
-    pictures: Sequence[Naming], recording: Recording, how: How, apart: float, side: Side = "left"
-) -> list[Naming]:
-    """One naming for each pattern among a trial's ``pictures``, in the order in which the robot came to them.
+    pictures: Sequence[Sample], recording: Recording, how: How, apart: float, side: Side = "left"
+) -> list[Sample]:
+    """One sample for each pattern among a trial's ``pictures``, in the order in which the robot came to them.
 
     Pictures of the same truth are of one pattern if the sensor of that ``side`` was at most ``apart`` mm from where it
     took the first of them.
@@ -42,10 +42,10 @@ class _Groups:
     """Pictures by pattern. The floor is cut into squares, so that only neighbours have to be compared."""
 
     apart: float
-    found: list[list[Naming]] = field(default_factory=list)
+    found: list[list[Sample]] = field(default_factory=list)
     _near: dict[tuple[str, int, int], list[tuple[int, _Place]]] = field(default_factory=dict)
 
-    def add(self, picture: Naming, place: _Place) -> None:
+    def add(self, picture: Sample, place: _Place) -> None:
         own = (picture.truth, *self._square(place))
         numbers = [number for number, first in self._neighbours(own) if math.dist(first, place) <= self.apart]
         if numbers:
@@ -63,21 +63,21 @@ class _Groups:
             yield from self._near.get((truth, column + right, row + up), ())
 
 
-def _one(group: Sequence[Naming], how: How) -> Naming:
+def _one(group: Sequence[Sample], how: How) -> Sample:
     if len(group) == 1:
         return group[0]
     match how:
         case "first":
             return group[0]
         case "any":
-            return next((naming for naming in group if naming.right), group[0])
+            return next((sample for sample in group if sample.right), group[0])
         case "majority":
             return _majority(group)
 
 
-def _majority(group: Sequence[Naming]) -> Naming:
+def _majority(group: Sequence[Sample]) -> Sample:
     """The picture whose answer was given most often; silence counts only if nothing was answered."""
-    counts = Counter(naming.answer for naming in group if naming.answer is not None).most_common()
+    counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
         return group[0]
     most = counts[0][1]
@@ -85,5 +85,5 @@ def _majority(group: Sequence[Naming]) -> Naming:
     if len(leaders) > 1:
         words = f"{listed(leaders)} were answered equally often for its {len(group)} pictures"
         return replace(group[0], answer=None, words=words)
-    chosen = next(naming for naming in group if naming.answer == leaders[0])
+    chosen = next(sample for sample in group if sample.answer == leaders[0])
     return replace(chosen, words=f"it was taken for {listed(leaders)} {most} times in {len(group)} pictures")

@@ -12,7 +12,7 @@ from fractions import Fraction
 from service.grading.grade import AccuracyCurve, Counts, CriterionResult, Shown, TrialResult
 from service.grading.judging.classification import Classified, classify, told
 from service.grading.judging.marks import earned, share_of_accuracy, share_of_steps
-from service.grading.judging.naming import Naming
+from service.grading.judging.samples import Sample
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, range_above, share_of_robustness
 from service.grading.judging.trial_words import early_end, place_words, shown_words
 from submissions.assignment import Assignment
@@ -44,9 +44,9 @@ def _judged(
         trials = [(index, trial) for index, trial in trials if index in levels]
     found = classify(criterion, assignment, trials)
     by_index = dict(trials)
-    curves = curves_of(found.namings, by_index)
+    curves = curves_of(found.samples, by_index)
     if isinstance(criterion, Robustness):
-        curve = curve_along(criterion.along, found.namings, by_index)
+        curve = curve_along(criterion.along, found.samples, by_index)
         share = share_of_robustness(criterion, curve)
         curves = (replace(curve, asked=criterion.level), *(other for other in curves if other.along != criterion.along))
         words = _robustness_words(criterion, curve)
@@ -58,11 +58,11 @@ def _judged(
         title=criterion.title,
         marks=earned(criterion.marks, share),
         max_marks=criterion.marks,
-        message=_tally(criterion, found) + words + _first_wrong(found.namings, by_index),
+        message=_tally(criterion, found) + words + _first_wrong(found.samples, by_index),
         visibility=criterion.visibility,
         evidence=found.evidence,
         accuracy=found.accuracy,
-        sights=found.sights,
+        predictions=found.predictions,
         curves=curves,
     )
 
@@ -83,7 +83,7 @@ def _share(criterion: Classification, found: Classified) -> Fraction:
 
 
 def _right(found: Classified) -> int:
-    return sum(naming.right for naming in found.namings)
+    return sum(sample.right for sample in found.samples)
 
 
 def _tally(criterion: Recognition, found: Classified) -> str:
@@ -135,9 +135,9 @@ def _robustness_words(criterion: Robustness, curve: AccuracyCurve) -> str:
     return f"{words} It is at least {criterion.level:g} {where} {about.unit}."
 
 
-def _first_wrong(namings: Sequence[Naming], trials: dict[int, TrialResult]) -> str:
+def _first_wrong(samples: Sequence[Sample], trials: dict[int, TrialResult]) -> str:
     """Where the first picture was named wrongly."""
-    first = next((naming for naming in namings if not naming.right), None)
+    first = next((sample for sample in samples if not sample.right), None)
     if first is None:
         return ""
     trial = trials[first.trial]

@@ -19,7 +19,7 @@ from submissions.magics import Flags
 
 #: What makes the robot speak.
 SPEECH = ("say()", "speak()")
-#: More that is wrong would bury the first.
+#: More that is wrong would give_up the first.
 _MOST_TOLD = 4
 _UNREADABLE = "it cannot be read"
 
@@ -79,7 +79,7 @@ def judge_source(
     """``trials`` are those that the program was driven in."""
     whose = "your program" if criterion.part == "program" else "your responder"
     if answers is None:
-        return failed(f"Expected {whose} to be handed in, but it was not.")
+        return failed(f"Expected {whose} to be submitted, but it was not.")
     if answers.error:
         return failed(f"Expected {whose} to be readable as Python, but: {answers.error}.")
     wrong: list[str] = []

@@ -11,29 +11,29 @@ from itertools import pairwise
 
 from models.intervals import wilson
 from service.grading.grade import AccuracyCurve, Level, TrialResult
-from service.grading.judging.naming import Naming
+from service.grading.judging.samples import Sample
 from submissions.criteria.classification import Robustness
 from submissions.sweep import CONDITIONS
 
 _NOISES = ("light_noise", "motor_noise")
 
 
-def curves_of(namings: Iterable[Naming], trials: Mapping[int, TrialResult]) -> tuple[AccuracyCurve, ...]:
+def curves_of(samples: Iterable[Sample], trials: Mapping[int, TrialResult]) -> tuple[AccuracyCurve, ...]:
     """A curve for every condition that the trials (by index in the grade) were swept over, in a fixed order."""
-    namings = tuple(namings)
+    samples = tuple(samples)
     return tuple(
-        curve for condition in CONDITIONS if len((curve := curve_along(condition, namings, trials)).levels) > 1
+        curve for condition in CONDITIONS if len((curve := curve_along(condition, samples, trials)).levels) > 1
     )
 
 
-def curve_along(condition: str, namings: Iterable[Naming], trials: Mapping[int, TrialResult]) -> AccuracyCurve:
+def curve_along(condition: str, samples: Iterable[Sample], trials: Mapping[int, TrialResult]) -> AccuracyCurve:
     """The accuracy at each level of ``condition``; trials that were not swept over it are left out."""
     levels = levels_along(condition, trials)
     counts: dict[float, tuple[int, int]] = {}
-    for naming in namings:
-        if naming.trial in levels:
-            right, count = counts.get(levels[naming.trial], (0, 0))
-            counts[levels[naming.trial]] = right + naming.right, count + 1
+    for sample in samples:
+        if sample.trial in levels:
+            right, count = counts.get(levels[sample.trial], (0, 0))
+            counts[levels[sample.trial]] = right + sample.right, count + 1
     levels_of_curve = (Level(at, right, count, *wilson(right, count)) for at, (right, count) in sorted(counts.items()))
     return AccuracyCurve(condition, tuple(levels_of_curve))
 

@@ -13,15 +13,15 @@ from typing import Literal
 from service.grading.judging.answers import Answers
 from sim.recording import Message, Recording, Verdict
 
-Fate = Literal["answered", "late", "malformed", "unanswered"]
-_BEST_FIRST: tuple[Fate, ...] = ("answered", "late", "malformed", "unanswered")
+ReplyStatus = Literal["answered", "late", "malformed", "unanswered"]
+_BEST_FIRST: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unanswered")
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
     """What came back to one picture. ``text`` is the answer that counts; ``words`` say why there is none."""
 
-    fate: Fate
+    status: ReplyStatus
     text: str | None
     words: str
     duplicates: int = 0  # answers beyond the one that counts
@@ -36,19 +36,19 @@ def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
     image = recording.images[number]
     following = recording.images[number + 1].t if number + 1 < len(recording.images) else None
     came = answers.all_to(image.message)
-    fates = [(_fate(message, following), message) for message in came]
-    arrived = [pair for pair in fates if pair[0] != "unanswered"]
+    statuses = [(_status(message, following), message) for message in came]
+    arrived = [pair for pair in statuses if pair[0] != "unanswered"]
     if not arrived:
         return _silence(recording, answers, image.message, came)
-    fate, message = min(arrived, key=lambda pair: _BEST_FIRST.index(pair[0]))
+    status, message = min(arrived, key=lambda pair: _BEST_FIRST.index(pair[0]))
     text = message.text
     duplicates = len(arrived) - 1
-    if fate == "malformed":
-        return Reply(fate, None, "the answer begins with JSON:: but is not JSON", duplicates)
-    return Reply(fate, text, "", duplicates)
+    if status == "malformed":
+        return Reply(status, None, "the answer begins with JSON:: but is not JSON", duplicates)
+    return Reply(status, text, "", duplicates)
 
 
-def _fate(message: Message, following: float | None) -> Fate:
+def _status(message: Message, following: float | None) -> ReplyStatus:
     if message.note == "malformed":
         return "malformed"
     if message.delivered is None:

@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, Subquery, and_, case, func, not_, or_, sel
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store.models import Batch, BatchState, Job, JobState, Lane
-from service.store.presence import another_lives
+from service.store.workers import another_lives
 
 #: Shares are counted over the jobs begun in this time, so that nobody who was served long ago waits for it.
 SHARE_WINDOW = timedelta(seconds=60)

@@ -27,7 +27,7 @@ _GRACE_SECONDS = 5.0
 _SHORT_LIVES = 3
 
 
-class WholeService:
+class Supervisor:
     """Broker (unless the settings name one), workers, and a web server on a socket that listens (unless None)."""
 
     def __init__(self, settings: Settings, store: Store, workers: int, listening: socket.socket | None) -> None:

@@ -26,26 +26,35 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
-from builders import hand_in
+from builders import grading_request
 from postgresql_server import PostgresqlServer
 from processes import children, command_line, descendants
 from service.grading.grader import grade
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.queue.processes import end_processes, start_process
 from service.queue.tasks import WORKER_VARIABLE
 from service.queue.worker import new_worker_name
 from service.settings import Settings
 from service.store.engine import Store
-from service.store.intake import HandIn, accept_batch, load_hand_in
-from service.store.models import UNFINISHED, CriterionRow, Job, JobState, Lane, Presence, TrialRow
+from service.store.intake import GradingRequest, accept_batch, load_grading_request
+from service.store.models import UNFINISHED, CriterionRow, Heartbeat, Job, JobState, Lane, TrialRow
 from sim.errors import HostError
 
-#: Behaviours that differ; every hand-in is one of them, with a text of its own so that none is a copy of another.
+#: Behaviours that differ; every submission is one of them, with a text of its own so that none is a copy of another.
 _VARIANTS = 12
-_MOMENTS = ("due_at", "lease_until", "heartbeat_at", "queued_at", "nudged_at", "started_at", "graded_at", "finished_at")
+_MOMENTS = (
+    "due_at",
+    "lease_until",
+    "heartbeat_at",
+    "queued_at",
+    "notified_at",
+    "started_at",
+    "graded_at",
+    "finished_at",
+)
 _STEP = timedelta(hours=1)
 
 
@@ -53,7 +62,7 @@ def _program(variant: int, number: int) -> str:
     # Every fourth computes for a while, so that something can be done to it meanwhile.
     work = "sum(range(40_000_000))\n" if variant % 4 == 0 else ""
     return (
-        f"# hand-in {number}\n"
+        f"# submission {number}\n"
         "from ev3dev2.motor import MoveTank, SpeedPercent, OUTPUT_B, OUTPUT_C\n"
         "tank = MoveTank(OUTPUT_B, OUTPUT_C)\n"
         f"tank.on_for_rotations(SpeedPercent({20 + variant}), SpeedPercent(20), 0.5)\n"
@@ -62,15 +71,15 @@ def _program(variant: int, number: int) -> str:
     )
 
 
-def some_hand_ins(count: int) -> list[HandIn]:
-    """Short hand-ins of many students, each with a text of its own."""
-    return [hand_in(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
+def some_requests(count: int) -> list[GradingRequest]:
+    """Short submissions of many students, each with a text of its own."""
+    return [grading_request(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
 
 
 def quiet_hashes() -> list[tuple[str, ...]]:
     """The hash chains of the trials of each variant, as a run without a queue gives them."""
-    with Rig() as rig:
-        graded = [grade(each.submission, each.assignment, rig=rig) for each in some_hand_ins(_VARIANTS)]
+    with TrialRunner() as runner:
+        graded = [grade(each.submission, each.assignment, runner=runner) for each in some_requests(_VARIANTS)]
     return [tuple(trial.recording.sha256 for trial in each.trials) for each in graded]
 
 
@@ -84,19 +93,19 @@ class Tally:
     differing: int  # jobs whose hashes are not those of the quiet run
     most_attempts: int
     seconds: float
-    plagues: Mapping[str, int]
+    injected: Mapping[str, int]
 
     def sentence(self) -> str:
         """For a reader."""
         states = ", ".join(f"{count} {state.value}" for state, count in self.states.items())
-        plagues = ", ".join(f"{count} x {name}" for name, count in self.plagues.items())
+        injected = ", ".join(f"{count} x {name}" for name, count in self.injected.items())
         return (
             f"{states}; {self.doubled} doubled, {self.differing} with other hashes; most attempts for one "
-            f"{self.most_attempts}; {self.seconds:.0f} s; {plagues}"
+            f"{self.most_attempts}; {self.seconds:.0f} s; {injected}"
         )
 
 
-class Havoc:
+class FaultInjector:
     """A broker, workers and a database, and ways to harm them. ``ensure`` starts again what has ended."""
 
     def __init__(
@@ -143,7 +152,7 @@ class Havoc:
         end_processes([worker for worker in self._workers if worker is not None], 0)
         self._broker.stop()
 
-    def plagues(self) -> Mapping[str, Callable[[], None]]:
+    def injected(self) -> Mapping[str, Callable[[], None]]:
         """By name, all that can be done to this service."""
         common: dict[str, Callable[[], None]] = {
             "worker killed": self._kill_worker,
@@ -163,7 +172,7 @@ class Havoc:
 
     def strike(self, name: str) -> None:
         """Do it."""
-        self.plagues()[name]()
+        self.injected()[name]()
         self.done[name] += 1
 
     def _new_worker(self, place: int) -> subprocess.Popen[bytes]:
@@ -229,8 +238,8 @@ class Havoc:
                         setattr(job, name, moment - step)
                 if job.plots_due_at is not None:
                     job.plots_due_at -= step
-            for presence in session.scalars(select(Presence).with_for_update()):
-                presence.seen_at -= step
+            for heartbeat in session.scalars(select(Heartbeat).with_for_update()):
+                heartbeat.seen_at -= step
 
         with suppress(DBAPIError), self.store.transaction() as session:
             change(session)
@@ -257,37 +266,39 @@ class Havoc:
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """So many hand-ins, and a plague every so often until all have ended."""
+    """So many submissions, and a injected fault every so often until all have ended."""
 
-    hand_ins: int
-    #: Seconds from one plague to the next, at least and at most; each kind comes before any comes again.
+    grading_requests: int
+    #: Seconds from one injected fault to the next, at least and at most; each kind comes before any comes again.
     pause: tuple[float, float]
     seed: int = 1
     patience_seconds: float = 300.0
     tell: Callable[[str], None] = field(default=lambda _: None)
 
-    def run(self, havoc: Havoc, quiet: Sequence[tuple[str, ...]]) -> Tally:
-        """Hand in, do harm, wait for all to end, and count."""
+    def run(self, injector: FaultInjector, quiet: Sequence[tuple[str, ...]]) -> Tally:
+        """Submit, do harm, wait for all to end, and count."""
         chance = random.Random(self.seed)
-        names = list(havoc.plagues())
-        batch = accept_batch(havoc.store, "chaos", some_hand_ins(self.hand_ins), [], max_attempts=20).id
-        havoc.ensure()
-        Nudger(make_celery(havoc.settings), havoc.store, havoc.settings).grade(Lane.BATCH, self.hand_ins)
+        names = list(injector.injected())
+        batch = accept_batch(injector.store, "chaos", some_requests(self.grading_requests), [], max_attempts=20).id
+        injector.ensure()
+        Notifier(make_celery(injector.settings), injector.store, injector.settings).grade(
+            Lane.BATCH, self.grading_requests
+        )
         begun = time.monotonic()
         next_at = begun
         coming: list[str] = []
-        while (left := _unfinished(havoc.store, batch)) != 0:
-            havoc.ensure()
+        while (left := _unfinished(injector.store, batch)) != 0:
+            injector.ensure()
             moment = time.monotonic()
             assert moment - begun < self.patience_seconds, f"{left} have not ended after {moment - begun:.0f} s"
-            if moment >= next_at and left is not None and _begun(havoc.store, batch):
+            if moment >= next_at and left is not None and _begun(injector.store, batch):
                 coming = coming or chance.sample(names, len(names))
                 name = coming.pop()
                 self.tell(f"{moment - begun:4.0f} s, {left:4} left: {name}")
-                havoc.strike(name)
+                injector.strike(name)
                 next_at = time.monotonic() + chance.uniform(*self.pause)
             time.sleep(0.1)
-        return _tally(havoc, batch, quiet, time.monotonic() - begun)
+        return _tally(injector, batch, quiet, time.monotonic() - begun)
 
 
 @contextmanager
@@ -304,15 +315,15 @@ def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _tally(havoc: Havoc, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float) -> Tally:
-    with havoc.store.reading() as session:
+def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float) -> Tally:
+    with injector.store.reading() as session:
         jobs = session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)).all()
         doubled = differing = 0
-        criteria = len(load_hand_in(session, jobs[0].id).assignment.criteria)
+        criteria = len(load_grading_request(session, jobs[0].id).assignment.criteria)
         for job in jobs:
             if job.state is not JobState.DONE:
                 continue
-            variant = int(load_hand_in(session, job.id).submission.student.partition("-")[2]) % len(quiet)
+            variant = int(load_grading_request(session, job.id).submission.student.partition("-")[2]) % len(quiet)
             trials = session.scalars(
                 select(TrialRow).where(TrialRow.job_id == job.id).order_by(TrialRow.position)
             ).all()
@@ -326,7 +337,7 @@ def _tally(havoc: Havoc, batch: str, quiet: Sequence[tuple[str, ...]], seconds: 
             differing=differing,
             most_attempts=max(job.attempt for job in jobs),
             seconds=seconds,
-            plagues=dict(havoc.done),
+            injected=dict(injector.done),
         )
 
 

@@ -1,4 +1,4 @@
-"""Grades that need not be run again: the same hand-in, assignment, seeds and grader give the same marks.
+"""Grades that need not be run again: the same submission, assignment, seeds and grader give the same marks.
 
 A copy has rows of its own and names the grade that was run. What may be copied is decided here, when is not.
 """
@@ -47,7 +47,7 @@ def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: 
 def find(session: Session, key: str) -> str | None:
     """The newest grade that may be copied for this key; None where it has to be run.
 
-    Never one without walls, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
+    Never one without the sandbox, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
     """
     distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
     cut = exists().where(
@@ -61,9 +61,9 @@ def find(session: Session, key: str) -> str | None:
             Job.state == JobState.DONE,
             Job.suspect.is_(None),
             Job.copied_from.is_(None),
-            # The key fixes the walls' policy; these say that both layers stood.
-            Job.walls.contains("Landlock"),
-            Job.walls.contains("seccomp"),
+            # The key fixes the sandbox's policy; these say that both layers stood.
+            Job.sandbox.contains("Landlock"),
+            Job.sandbox.contains("seccomp"),
             ~distrusted,
             ~cut,
             ~unjudged,
@@ -80,7 +80,7 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
         _copy_rows(session, table, source_id, job_id)
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    of_grade = ("verdict", "marks", "max_marks", "walls", "grader_version")
+    of_grade = ("verdict", "marks", "max_marks", "sandbox", "grader_version")
     names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
@@ -101,7 +101,7 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
 
 
 def _notes(session: Session, source: Job, job_id: str) -> list[str]:
-    """What was noted when this hand-in was read, then what the grading noted: another's folder may have their name."""
+    """What was noted when this submission was read, then by the grading: another's folder may have their name."""
     packed = select(Submission.packed).join(Job, Job.submission_id == Submission.id)
     theirs, own = (
         unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)

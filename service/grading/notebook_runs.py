@@ -1,6 +1,6 @@
 """What the magics of a notebook come to: runs with their own flags, and the one run that is marked.
 
-It decides only; the cells are played and the robots run by ``responders``.
+It decides only; the cells are executed and the robots run by ``responders``.
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from responders.bridge import ProgramOrder, TrialOrder
+from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
 from responders.conversation import Code
-from responders.notebook_play import MagicCall, Staged
+from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
 from sim.backgrounds import floor
 from sim.chance import Stream
@@ -36,7 +36,7 @@ class Program:
 
 
 #: From the program, the flags of the magic that starts it and the simulator's set-up to the marked run.
-MarkedRun = Callable[[Program, Flags, Setup], Staged]
+MarkedRun = Callable[[Program, Flags, Setup], PlannedRun]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ class UnmarkedRuns:
     sheet: int = 0
 
 
-class NotebookStage:
-    """Follows the magics of one play, in the order in which they are called."""
+class NotebookRuns:
+    """Follows the magics of one execution, in the order in which they are called."""
 
-    def __init__(self, marked: Site | None, marked_run: MarkedRun, unmarked: UnmarkedRuns, last: Staged) -> None:
+    def __init__(self, marked: Site | None, marked_run: MarkedRun, unmarked: UnmarkedRuns, last: PlannedRun) -> None:
         """``marked`` is where the marked run starts; ``last`` what is run after all cells, if anything."""
         self._marked = marked
         self._marked_run = marked_run
@@ -66,7 +66,7 @@ class NotebookStage:
         #: Where robots were started, in order.
         self.started: list[Site] = []
 
-    def call(self, call: MagicCall) -> Staged:
+    def call(self, call: MagicCall) -> PlannedRun:
         """What one magic comes to."""
         here = Site(call.cell, call.line or 0)
         marked = here == self._marked and not self.marked_ran
@@ -74,30 +74,30 @@ class NotebookStage:
             flags = parse_flags(call.name, call.arguments)
         except UsageError as error:
             if not (marked and call.body is not None):
-                return Staged(notes=(f"{error}; nothing was run",))
+                return PlannedRun(notes=(f"{error}; nothing was run",))
             return self._start(here, marked, *self._load(call, Flags()), (f"the magic line is ignored: {error}",))
         if call.body is None and call.name != "sim_magic":
-            return Staged(notes=(f"%{call.name} in a single line does nothing, as in the simulator",))
+            return PlannedRun(notes=(f"%{call.name} in a single line does nothing, as in the simulator",))
         if "F" in flags.switches:
             self._program = Program(call.cell, _REFRESHED, Flags())
-            return Staged()
+            return PlannedRun()
         if call.body is not None:
             self._load(call, flags)
         try:
             setup = self.simulator.apply(flags)
         except UsageError as error:
             if not marked:
-                return Staged(notes=(f"{error}; nothing was run",))
+                return PlannedRun(notes=(f"{error}; nothing was run",))
             return self._start(here, marked, Flags(), self.simulator.apply(Flags()), (f"a flag is ignored: {error}",))
         if not marked and "R" not in flags.switches:
-            return Staged(notes=setup.notes)
+            return PlannedRun(notes=setup.notes)
         return self._start(here, marked, flags, setup, ())
 
     def ran(self, recording: Recording) -> None:
         """The robot stays where it has come to."""
         self.simulator.leave_at(recording.end)
 
-    def last(self) -> Staged:
+    def last(self) -> PlannedRun:
         return self._last
 
     def _load(self, call: MagicCall, flags: Flags) -> tuple[Flags, Setup]:
@@ -105,25 +105,32 @@ class NotebookStage:
         self._program = Program(call.cell, text, flags)
         return flags, self.simulator.apply(Flags())
 
-    def _start(self, here: Site, marked: bool, flags: Flags, setup: Setup, notes: tuple[str, ...]) -> Staged:
+    def _start(self, here: Site, marked: bool, flags: Flags, setup: Setup, notes: tuple[str, ...]) -> PlannedRun:
         if self._program is None:
-            return Staged(notes=("no robot program has been loaded; nothing was run",))
+            return PlannedRun(notes=("no robot program has been loaded; nothing was run",))
         self.started.append(here)
         if marked:
             self.marked_ran = True
-            staged = self._marked_run(self._program, flags, setup)
-            return Staged(
-                staged.order, staged.obstacles, self._program.cell, True, staged.needs_responder, notes + staged.notes
+            planned = self._marked_run(self._program, flags, setup)
+            return PlannedRun(
+                planned.spec,
+                planned.obstacles,
+                self._program.cell,
+                True,
+                planned.needs_responder,
+                notes + planned.notes,
             )
         self._count += 1
-        return Staged(self._own(self._program, setup), setup.obstacles, self._program.cell, notes=notes + setup.notes)
+        return PlannedRun(
+            self._own(self._program, setup), setup.obstacles, self._program.cell, notes=notes + setup.notes
+        )
 
-    def _own(self, program: Program, setup: Setup) -> TrialOrder:
+    def _own(self, program: Program, setup: Setup) -> TrialSpec:
         """A run as its own flags have it."""
         own = self._unmarked
         seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
-        return TrialOrder(
-            program=program_order(program, own.limits, own.output_bytes),
+        return TrialSpec(
+            program=program_spec(program, own.limits, own.output_bytes),
             responder=None,
             collaborative=setup.collaborative,
             floor=floor(setup.background, seed=own.sheet),
@@ -138,6 +145,6 @@ class NotebookStage:
         )
 
 
-def program_order(program: Program, limits: ChildLimits, output_bytes: int) -> ProgramOrder:
+def program_spec(program: Program, limits: ChildLimits, output_bytes: int) -> ProgramSpec:
     """The program of a cell as the bridge takes it."""
-    return ProgramOrder(Code(f"cell {program.cell}", program.text), program.flags.preamble, limits, output_bytes)
+    return ProgramSpec(Code(f"cell {program.cell}", program.text), program.flags.preamble, limits, output_bytes)

@@ -1,6 +1,6 @@
-"""Finds jobs that were lost: leases that ran out, nudges that never came. Any number may sweep at any time.
+"""Finds jobs that were lost: leases that ran out, notices that never came. Any number may sweep at any time.
 
-Publishes nothing; it says how many nudges are wanting.
+Publishes nothing; it says how many notices are wanting.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store.clock import mend
+from service.store.clock import correct
 from service.store.engine import Store, now
 from service.store.jobs import Retry, after_fault
 from service.store.models import Job, JobState, Lane, PlotState
-from service.store.turns import claimable
+from service.store.scheduling import claimable
 
 #: Databases bound how many values one statement may carry.
 _AT_ONCE = 500
@@ -24,17 +24,17 @@ _AT_ONCE = 500
 
 @dataclass(frozen=True, slots=True)
 class Wanting:
-    """How many nudges should be on their way, and how many of those may have been lost."""
+    """How many notices should be on their way, and how many of those may have been lost."""
 
     due: int
     stale: int
 
 
-def take_back_lost(store: Store, retry: Retry) -> int:
+def requeue_lost(store: Store, retry: Retry) -> int:
     """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
     with store.transaction() as session:
         at = now(session)
-        mend(session, at, retry.wait)
+        correct(session, at, retry.wait)
         lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
         query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
         rows = session.execute(query.with_for_update(skip_locked=True)).all()
@@ -46,36 +46,36 @@ def take_back_lost(store: Store, retry: Retry) -> int:
         return len(rows)
 
 
-def wanting_nudges(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
-    """By lane, the jobs that could be claimed, and those whose nudge is missing or older than ``older_seconds``."""
+def wanting_notices(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
+    """By lane, the jobs that could be claimed, and those whose notice is missing or older than ``older_seconds``."""
     with store.reading() as session:
         at = now(session)
         query = select(Job.lane, func.count()).where(*claimable(at)).group_by(Job.lane)
-        stale = or_(Job.nudged_at.is_(None), Job.nudged_at < at - timedelta(seconds=older_seconds))
+        stale = or_(Job.notified_at.is_(None), Job.notified_at < at - timedelta(seconds=older_seconds))
         all_due = dict(session.execute(query).all())
         all_stale = dict(session.execute(query.where(stale)).all())
         return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
 
 
-def note_nudges(store: Store, lane: Lane, count: int) -> Sequence[str]:
-    """Remember that the ``count`` longest unnudged jobs of a lane were nudged now. Returns their ids."""
+def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
+    """Remember that the ``count`` longest unannounced jobs of a lane were notified now. Returns their ids."""
     with store.transaction() as session:
         at = now(session)
         oldest = (
             select(Job.id)
             .where(*claimable(at), Job.lane == lane)
-            .order_by(func.coalesce(Job.nudged_at, Job.queued_at), Job.id)
+            .order_by(func.coalesce(Job.notified_at, Job.queued_at), Job.id)
             .limit(count)
         )
         ids = session.scalars(oldest).all()
-        _set_nudged(session, ids, at)
+        _set_notified(session, ids, at)
         return ids
 
 
-def forget_nudges(store: Store, ids: Sequence[str]) -> None:
-    """These were not nudged after all."""
+def forget_notices(store: Store, ids: Sequence[str]) -> None:
+    """These were not notified after all."""
     with store.transaction() as session:
-        _set_nudged(session, ids, None)
+        _set_notified(session, ids, None)
 
 
 def due_plots(store: Store) -> int:
@@ -85,8 +85,8 @@ def due_plots(store: Store) -> int:
         return session.scalar(select(func.count()).select_from(Job).where(*due)) or 0
 
 
-def _set_nudged(session: Session, ids: Sequence[str], at: datetime | None) -> None:
+def _set_notified(session: Session, ids: Sequence[str], at: datetime | None) -> None:
     for start in range(0, len(ids), _AT_ONCE):
         some = (Job.id.in_(ids[start : start + _AT_ONCE]), Job.state == JobState.QUEUED)
         options = {"synchronize_session": False}
-        session.execute(update(Job).where(*some).values(nudged_at=at), execution_options=options)
+        session.execute(update(Job).where(*some).values(notified_at=at), execution_options=options)

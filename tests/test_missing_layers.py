@@ -68,10 +68,10 @@ _CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED
         pytest.param(_CAPSET, errno.EPERM, "capset", id="capabilities-denied"),
     ],
 )
-def test_a_missing_wall_is_named(number: int, error: int, words: str) -> None:
+def test_a_missing_layer_is_named(number: int, error: int, words: str) -> None:
     ran = _run(_CHECK, number, error)
     assert ran.returncode == 3
-    assert ran.stdout.startswith(f"WallsMissing: this machine cannot wall in student code: {words}:"), ran.stdout
+    assert ran.stdout.startswith(f"SandboxMissing: this machine cannot wall in student code: {words}:"), ran.stdout
     assert "Linux 5.13" in ran.stdout
     assert "Traceback" not in ran.stderr
 

@@ -25,7 +25,7 @@ from models import weights_bytes
 from models.networks import read
 from models.shapes import TASK
 
-FOLDER = Path(__file__).parent / "model_handins"
+FOLDER = Path(__file__).parent / "model_submissions"
 #: What the hostile pickle would make, if it could.
 TRACE = "/tmp/robomark-hostile-pickle-was-here"
 
@@ -111,7 +111,7 @@ def _small(kind: type[Any], inputs: int) -> bytes:
 
 
 def _huge() -> bytes:
-    """Plain weights whose first layer says that it has 2 GB, and has next to nothing."""
+    """Json weights whose first layer says that it has 2 GB, and has next to nothing."""
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (250_000_000,)})
     file = io.BytesIO()
@@ -154,7 +154,7 @@ def _convolution() -> bytes:
     return bytes(model.SerializeToString())
 
 
-def hand_ins() -> dict[str, dict[str, bytes]]:
+def grading_requests() -> dict[str, dict[str, bytes]]:
     """Every folder by name: its files and their bytes."""
     network = read(weights_bytes("shapes"))
 
@@ -183,7 +183,7 @@ def hand_ins() -> dict[str, dict[str, bytes]]:
 
 
 if __name__ == "__main__":
-    for name, files in hand_ins().items():
+    for name, files in grading_requests().items():
         (FOLDER / name).mkdir(parents=True, exist_ok=True)
         for file, data in files.items():
             (FOLDER / name / file).write_bytes(data)

@@ -1,6 +1,6 @@
 """What a worker keeps warm between trials: cameras over floors, arenas, and the zygotes of student code.
 
-A rig holds no result and no state that one trial could leave for the next.
+A runner holds no result and no state that one trial could leave for the next.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
 
-from responders.bridge import TrialOrder
+from responders.bridge import TrialSpec
 from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, call_functions
-from responders.notebook_play import Played, Stage, never_ran, play_notebook
-from responders.notebook_process import NotebookOrder
+from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
+from responders.notebook_process import NotebookSpec
 from responders.sandbox.control_group import ControlGroup
-from responders.sandbox.manager import FULL, Sandboxes, Walls
+from responders.sandbox.manager import FULL, Isolation, Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.running_child import ChildLimits, KilledFromOutside
-from responders.training import Named, TrainingOrder, train_and_name
+from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
 from service.grading.slots import Slots
 from sim.arena import Arena
@@ -36,50 +36,54 @@ _MOST_ARENAS = 4
 Result = TypeVar("Result")
 
 
-class Rig:
+class TrialRunner:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
 
     ``slots`` are those of the machine's graders; without them there is no other. A ``meter`` counts what one job costs.
-    All student code runs in ``group``, where there is one, which is closed with the rig.
+    All student code runs in ``group``, where there is one, which is closed with the runner.
     """
 
-    def __init__(self, walls: Walls = FULL, slots: Slots | None = None, group: ControlGroup | None = None) -> None:
+    def __init__(
+        self, isolation: Isolation = FULL, slots: Slots | None = None, group: ControlGroup | None = None
+    ) -> None:
         remove_left_overs()
         self._slots = slots
-        self._sandboxes = Sandboxes(walls, group)
-        self._forgets = walls.seccomp
+        self._sandboxes = Sandboxes(isolation, group)
+        self._forgets = isolation.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
 
     def run(
         self,
-        order: TrialOrder,
+        spec: TrialSpec,
         obstacles: tuple[Rectangle, ...] = (),
         meter: JobMeter | None = None,
     ) -> Recording:
-        """One trial. Raises HostError when the machine fails, and whatever the meter's pulse raises."""
+        """One trial. Raises HostError when the machine fails, and whatever the meter's heartbeat raises."""
         meter = meter or JobMeter()
-        ground = self._ground(order, obstacles)
-        return self.undisturbed(lambda: run_trial(order, *ground, self._sandboxes, meter), meter)
+        ground = self._ground(spec, obstacles)
+        return self.undisturbed(lambda: run_trial(spec, *ground, self._sandboxes, meter), meter)
 
-    def play(self, order: NotebookOrder, stage: Stage, meter: JobMeter | None = None) -> Played:
-        """A notebook from top to bottom, with all its runs; ``stage`` serves for one play, so ``undisturbed`` is apart.
+    def execute_notebook(
+        self, spec: NotebookSpec, planner: RunPlanner, meter: JobMeter | None = None
+    ) -> ExecutedNotebook:
+        """A notebook from top to bottom, with all its runs; ``planner`` serves one, so ``undisturbed`` is apart.
 
         Raises as ``run`` does.
         """
-        return play_notebook(order, stage, self._ground, self._sandboxes, meter or JobMeter())
+        return execute_notebook(spec, planner, self._ground, self._sandboxes, meter or JobMeter())
 
-    def never_ran(self, order: TrialOrder, obstacles: tuple[Rectangle, ...], fault: Fault, walls: str) -> Recording:
+    def never_ran(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], fault: Fault, sandbox: str) -> Recording:
         """The recording of a run that did not come about because of ``fault``."""
-        return never_ran(order, *self._ground(order, obstacles), fault, walls)
+        return never_ran(spec, *self._ground(spec, obstacles), fault, sandbox)
 
-    def _ground(self, order: TrialOrder, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
-        return self._arena(obstacles), self._cameras.camera(order.floor.picture)
+    def _ground(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
+        return self._arena(obstacles), self._cameras.camera(spec.floor.picture)
 
-    def train(self, order: TrainingOrder, meter: JobMeter | None = None) -> tuple[Named, ...]:
-        """A hand-in's model, trained and asked. Raises as ``run`` does."""
+    def train(self, spec: TrainingSpec, meter: JobMeter | None = None) -> tuple[Named, ...]:
+        """A submission's model, trained and asked. Raises as ``run`` does."""
         meter = meter or JobMeter()
-        return self.undisturbed(lambda: train_and_name(order, self._sandboxes, meter), meter)
+        return self.undisturbed(lambda: train_and_name(spec, self._sandboxes, meter), meter)
 
     def call(
         self,
@@ -97,8 +101,8 @@ class Rig:
             lambda: call_functions(code, files, calls, limits, output_bytes, self._sandboxes, seed, meter), meter
         )
 
-    def check_walls(self) -> str:
-        """Which walls stand round student code here. Raises WallsMissing when one cannot be put up."""
+    def check_sandbox(self) -> str:
+        """Which layers stand round student code here. Raises SandboxMissing when one cannot be put up."""
         return self._sandboxes.check()
 
     def check_forgetting(self) -> None:
@@ -118,7 +122,7 @@ class Rig:
         while self._arenas:
             self._arenas.popitem()[1].close()
 
-    def __enter__(self) -> Rig:
+    def __enter__(self) -> TrialRunner:
         return self
 
     def __exit__(
@@ -133,7 +137,7 @@ class Rig:
         """
         before = meter.spent
         try:
-            with self._slots.beside_others(meter.pulse) if self._slots is not None else nullcontext():
+            with self._slots.beside_others(meter.heartbeat) if self._slots is not None else nullcontext():
                 return work()
         except KilledFromOutside as killed:
             _log.warning("the trial is run again, alone: %s", killed)
@@ -148,7 +152,7 @@ class Rig:
             return work()
 
     def _alone(self, meter: JobMeter) -> AbstractContextManager[None]:
-        return self._slots.alone(meter.pulse) if self._slots is not None else nullcontext()
+        return self._slots.alone(meter.heartbeat) if self._slots is not None else nullcontext()
 
     def _arena(self, obstacles: tuple[Rectangle, ...]) -> Arena:
         arena = self._arenas.pop(obstacles, None) or Arena(obstacles)

@@ -1,4 +1,4 @@
-"""What the walls cost and how exactly they hold: from the fork of a child to its end, beside what they should take.
+"""What the sandbox costs and how exactly it holds: from the fork of a child to its end, beside what they should take.
 
 Times are real ones, medians and 95th percentiles; on a busy machine they say more about the machine.
 """
@@ -62,20 +62,20 @@ def measure() -> list[Measurement]:
         stalled = _stall_overshoot(sandboxes)
         output = _output_overshoot(sandboxes, folder)
     return [
-        Measurement("walls: fork to locked, robot", _spread(light), "10 ms, p95 15 ms"),
-        Measurement("walls: fork to locked, responder with scikit-learn", _spread(heavy), "15 ms, p95 25 ms"),
-        Measurement("walls: fork to first answer, responder", _spread(answers), "20 ms, p95 30 ms"),
-        Measurement("walls: Landlock and the filter alone", _spread(alone), "5 ms"),
-        Measurement("walls: message and answer", _spread(turns), "0.2 ms"),
-        Measurement("walls: kill and reap, responder", _spread(ends), "p95 15 ms"),
-        Measurement("walls: zygote with scikit-learn, cold start", f"{cold:.2f} s", "5 s"),
+        Measurement("sandbox: fork to locked, robot", _spread(light), "10 ms, p95 15 ms"),
+        Measurement("sandbox: fork to locked, responder with scikit-learn", _spread(heavy), "15 ms, p95 25 ms"),
+        Measurement("sandbox: fork to first answer, responder", _spread(answers), "20 ms, p95 30 ms"),
+        Measurement("sandbox: Landlock and the filter alone", _spread(alone), "5 ms"),
+        Measurement("sandbox: message and answer", _spread(turns), "0.2 ms"),
+        Measurement("sandbox: kill and reap, responder", _spread(ends), "p95 15 ms"),
+        Measurement("sandbox: zygote with scikit-learn, cold start", f"{cold:.2f} s", "5 s"),
         Measurement(
-            "walls: idle responder of ten, its own and its share", f"{dirty:.1f} MB, {share:.1f} MB", "5 MB, 20 MB"
+            "sandbox: idle responder of ten, its own and its share", f"{dirty:.1f} MB, {share:.1f} MB", "5 MB, 20 MB"
         ),
-        Measurement("walls: CPU beyond the limit", f"{cpu * 1000:.0f} ms", "100 ms"),
-        Measurement("walls: waiting beyond the limit", f"{stalled * 1000:.0f} ms", "100 ms"),
-        Measurement("walls: output beyond the limit", f"{output / 1024:.0f} KiB", "128 KiB"),
-        Measurement("walls: worker killed, until nothing is left", f"{_until_nothing_left() * 1000:.0f} ms", "1 s"),
+        Measurement("sandbox: CPU beyond the limit", f"{cpu * 1000:.0f} ms", "100 ms"),
+        Measurement("sandbox: waiting beyond the limit", f"{stalled * 1000:.0f} ms", "100 ms"),
+        Measurement("sandbox: output beyond the limit", f"{output / 1024:.0f} KiB", "128 KiB"),
+        Measurement("sandbox: worker killed, until nothing is left", f"{_until_nothing_left() * 1000:.0f} ms", "1 s"),
     ]
 
 

@@ -1,6 +1,6 @@
 """Secrets put where a worker has them: none shows up in anything that comes back, and no student sees another's.
 
-Each search is shown to work: without walls, or in the process that has the secret, it finds it.
+Each search is shown to work: without the sandbox, or in the process that has the secret, it finds it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import pytest
 from attacks import memory
 from battery import attack_text, attacks, scrambled
 from running import run_program
-from service.grading.rig import Rig
+from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording
 
 #: A sentence that stands in one of the grader's own files.
@@ -65,7 +65,7 @@ def _everything(recording: Recording) -> bytes:
 @pytest.fixture
 def paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Where the secrets lie that are in files; the one in the environment is set before any process starts."""
-    monkeypatch.setenv("ROBOMARK_CANARY", _SECRETS["environment"])
+    monkeypatch.setenv("ROBOMARK_SELF_TEST", _SECRETS["environment"])
     secret = tmp_path / "secret"
     secret.write_text(_SECRETS["file"])
     secret.chmod(0o600)
@@ -75,7 +75,7 @@ def paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.parametrize("secret", [_SECRETS["file"], _SECRETS["environment"], _OF_THE_PACKAGE])
-def test_the_search_finds_what_no_wall_hides(secret: str, paths: list[str]) -> None:
+def test_the_search_finds_what_no_sandbox_hides(secret: str, paths: list[str]) -> None:
     """Run outside, as a program of its own."""
     ran = subprocess.run(
         [sys.executable, "-I", "-c", _search(paths, secret) + "\ntell()"], capture_output=True, text=True, check=False
@@ -87,8 +87,8 @@ def test_the_search_finds_what_no_wall_hides(secret: str, paths: list[str]) -> N
 def test_no_secret_is_in_anything_that_comes_back(paths: list[str]) -> None:
     search = _search(paths, *_SECRETS.values(), _OF_THE_PACKAGE)
     responder = search + "\ndef responder(text):\n    tell()\n    return str(dict(os.environ))\n"
-    with Rig() as rig:
-        recording = run_program(rig, search + '\nprint("PY::hello")\ntell()\n', responder=responder)
+    with TrialRunner() as runner:
+        recording = run_program(runner, search + '\nprint("PY::hello")\ntell()\n', responder=responder)
         assert len(recording.messages) == 2, recording.faults
         assert recording.faults == ()
         came_back = _everything(recording)
@@ -121,15 +121,15 @@ tell()
     )
     write = 'open("left.txt", "w").write(mark)\n'
     answer = "def responder(text): return text\n"
-    with Rig() as rig:
+    with TrialRunner() as runner:
         for _ in range(2):
             if role == "program":
-                first = run_program(rig, _search([], _LAST) + leave + "tell()\n")
-                second = run_program(rig, look)
+                first = run_program(runner, _search([], _LAST) + leave + "tell()\n")
+                second = run_program(runner, look)
                 said = [line.text for line in second.printed]
             else:
-                first = run_program(rig, "pass", responder=_search([], _LAST) + leave + write + "tell()\n" + answer)
-                second = run_program(rig, 'print("PY::x")', responder=look + answer)
+                first = run_program(runner, "pass", responder=_search([], _LAST) + leave + write + "tell()\n" + answer)
+                second = run_program(runner, 'print("PY::x")', responder=look + answer)
                 said = second.responder_output.splitlines()
                 assert said.pop(2) == "seen []"
             assert _LAST.encode() in _everything(first)

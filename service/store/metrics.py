@@ -12,7 +12,7 @@ from datetime import timedelta
 from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
-from service.store import phases, presence
+from service.store import phases, workers
 from service.store.engine import now
 from service.store.models import (
     UNFINISHED,
@@ -26,7 +26,7 @@ from service.store.models import (
     TrialRow,
     Worker,
 )
-from service.store.turns import claimable
+from service.store.scheduling import claimable
 
 #: Times are told of the jobs that ended in this time, the newest of them.
 TIMES_OVER = timedelta(hours=1)
@@ -35,7 +35,7 @@ PACE_OVER = timedelta(minutes=5)
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class ServiceMetrics:
     """One look at the whole service."""
 
     jobs: Mapping[tuple[Lane, JobState], int]
@@ -47,14 +47,14 @@ class Figures:
     surprises: int  # trials in which our own code stumbled over what a child sent
     plots: Mapping[PlotState, int]
     paused_batches: int
-    workers: Sequence[presence.Seen]
+    workers: Sequence[workers.Seen]
     silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
     quarantined: int
     times: Mapping[str, Sequence[float]]  # seconds by span, sorted
 
 
-def look(session: Session) -> Figures:
-    """All figures at one moment."""
+def collect(session: Session) -> ServiceMetrics:
+    """All metrics at one moment."""
     at = now(session)
     by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
     waiting = select(Job.lane, func.count(), func.min(Job.queued_at)).where(*claimable(at)).group_by(Job.lane)
@@ -68,8 +68,8 @@ def look(session: Session) -> Figures:
     quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
     unjudged = select(func.count()).select_from(CriterionRow).where(CriterionRow.unjudged.is_not(None))
     surprises = select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None))
-    seen = presence.workers(session)
-    return Figures(
+    seen = workers.known_workers(session)
+    return ServiceMetrics(
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
         claimable={lane: count for lane, count, _ in rows},
         oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},

@@ -1,4 +1,4 @@
-"""What the course teaches works behind the walls: learning, saved models, tables, pictures, ``eval``, late imports."""
+"""What is taught works inside the sandbox: learning, saved models, tables, pictures, ``eval``, late imports."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PIL import Image
 from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
-from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.manager import Isolation, Sandboxes
 
 _DATA = """
 import numpy as np
@@ -44,7 +44,7 @@ _MODELS = {
 
 @pytest.fixture(scope="module", params=["bare", "bubblewrap"])
 def sandboxes(request: pytest.FixtureRequest) -> Iterator[Sandboxes]:
-    with Sandboxes(Walls(bubblewrap=request.param == "bubblewrap")) as made:
+    with Sandboxes(Isolation(bubblewrap=request.param == "bubblewrap")) as made:
         reason = made.why_no_bubblewrap("responder")
         if request.param == "bubblewrap" and reason is not None:
             pytest.skip(f"bubblewrap does not work here: {reason}")
@@ -59,7 +59,7 @@ def empty(sandboxes: Sandboxes) -> Iterator[Path]:
 
 @pytest.fixture
 def folder(empty: Path) -> Path:
-    """What a hand-in brings: models saved in several ways, a table and pictures."""
+    """What a submission brings: models saved in several ways, a table and pictures."""
     chance = np.random.default_rng(1)
     values = chance.normal(size=(60, 4))
     model = RandomForestClassifier(5, n_jobs=2, random_state=1).fit(values, values[:, 0] > 0)

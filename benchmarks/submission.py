@@ -1,4 +1,4 @@
-"""One short hand-in through the embedded services, from handing it in to marks and to plots in the database."""
+"""One short submission through the embedded services, from submitting it to marks and to plots in the database."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.measurement import Measurement
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.nudges import Nudger
+from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store import intake
 from service.store.engine import Store, open_store
@@ -28,24 +28,24 @@ def measure() -> list[Measurement]:
     with tempfile.TemporaryDirectory() as folder:
         settings = load_settings(home=Path(folder))
         with open_store(settings) as store, EmbeddedServices(settings, store) as services:
-            nudger = Nudger(make_celery(services.settings), store, services.settings)
-            runs = [_once(store, nudger, f"student {number}") for number in range(_TIMES + 1)][1:]
+            notifier = Notifier(make_celery(services.settings), store, services.settings)
+            runs = [_once(store, notifier, f"student {number}") for number in range(_TIMES + 1)][1:]
     marks, plots = (sorted(times)[_TIMES // 2] for times in zip(*runs, strict=True))
     return [
-        Measurement("one short hand-in, embedded, to marks in the database", f"{marks:.2f} s", "1 s", "0.4 s"),
+        Measurement("one short submission, embedded, to marks in the database", f"{marks:.2f} s", "1 s", "0.4 s"),
         Measurement("the same, to plots", f"{plots:.2f} s", "4 s", "2 s"),
     ]
 
 
-def _once(store: Store, nudger: Nudger, student: str) -> tuple[float, float]:
+def _once(store: Store, notifier: Notifier, student: str) -> tuple[float, float]:
     """Seconds until the marks are committed, and until the plots are."""
     assignment = find_assignment(_ASSIGNMENT)
     start = time.perf_counter()
     submission = read_submission(examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
     # A file of its own, or it would be a copy of the one before, which is not run again.
     submission = replace(submission, files={**submission.files, "student.txt": student.encode()})
-    job = intake.accept(store, intake.HandIn(submission, assignment, student), max_attempts=3).job_id
-    nudger.grade(Lane.INTERACTIVE)
+    job = intake.accept(store, intake.GradingRequest(submission, assignment, student), max_attempts=3).job_id
+    notifier.grade(Lane.INTERACTIVE)
     marks = None
     while True:
         with store.reading() as session:
@@ -56,5 +56,5 @@ def _once(store: Store, nudger: Nudger, student: str) -> tuple[float, float]:
         if marks is not None and plots is PlotState.DONE:
             return marks, time.perf_counter() - start
         if state is JobState.DEAD or time.perf_counter() - start > 120:
-            raise RuntimeError(f"the hand-in is {state} after {time.perf_counter() - start:.0f} s")
+            raise RuntimeError(f"the submission is {state} after {time.perf_counter() - start:.0f} s")
         time.sleep(0.01)

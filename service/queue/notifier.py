@@ -1,6 +1,6 @@
-"""Tells workers through the broker that there is work. A nudge that is lost, doubled or late does no harm.
+"""Tells workers through the broker that there is work. A notice that is lost, doubled or late does no harm.
 
-Nothing here fails when the broker does: the sweeper nudges again.
+Nothing here fails when the broker does: the lease reaper notifies again.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.jobs import Retry
+from service.store.lease_reaper import due_plots, forget_notices, note_notices, requeue_lost, wanting_notices
 from service.store.models import Lane
-from service.store.sweep import due_plots, forget_nudges, note_nudges, take_back_lost, wanting_nudges
 
 _log = structlog.get_logger(__name__)
 #: What a broker that is not there can raise.
@@ -27,41 +27,41 @@ _AWAY = (BrokerError, RedisError, OSError)
 
 
 @dataclass(frozen=True, slots=True)
-class Nudger:
-    """Publishes nudges, and sweeps up after those that were lost."""
+class Notifier:
+    """Publishes notices, and catches up on those that were lost."""
 
     app: Celery
     store: Store
     settings: Settings
 
     def grade(self, lane: Lane, count: int = 1) -> None:
-        """Nudge for ``count`` jobs of a lane that were just taken in."""
+        """Notify for ``count`` jobs of a lane that were just taken in."""
         if count <= 0:
             return
-        # Noted first: a claim passes over a row that is being written to, and the nudge would have been for nothing.
-        noted = note_nudges(self.store, lane, count)
+        # Noted first: a claim passes over a row that is being written to, and the notice would have been for nothing.
+        noted = note_notices(self.store, lane, count)
         if not self._publish(GRADE_TASK, lane.value, count):
-            forget_nudges(self.store, noted)
+            forget_notices(self.store, noted)
 
     def plot(self, count: int = 1) -> None:
-        """Nudge for the plots of ``count`` jobs."""
+        """Notify for the plots of ``count`` jobs."""
         self._publish(PLOT_TASK, PLOTS, count)
 
-    def sweep(self) -> None:
-        """Take back lost jobs, and nudge for what is due and not nudged for.
+    def catch_up(self) -> None:
+        """Take back lost jobs, and notice for what is due and not notified for.
 
-        No more nudges are published than there are due jobs without one in the broker's queue, so that a day
+        No more notices are published than there are due jobs without one in the broker's queue, so that a day
         without a worker leaves no heap of them.
         """
-        take_back_lost(self.store, Retry(self.settings.backoff_seconds))
-        for lane, wanting in wanting_nudges(self.store, self.settings.nudge_seconds).items():
+        requeue_lost(self.store, Retry(self.settings.backoff_seconds))
+        for lane, wanting in wanting_notices(self.store, self.settings.notify_seconds).items():
             self.grade(lane, min(wanting.stale, self._lacking(lane.value, wanting.due)))
         waiting = due_plots(self.store)
         if waiting:
             self.plot(self._lacking(PLOTS, waiting))
 
     def waiting(self) -> int:
-        """How many nudges lie in the broker; 0 when it is away."""
+        """How many notices lie in the broker; 0 when it is away."""
         return sum(self._depths(QUEUES) or ())
 
     def _lacking(self, queue: str, due: int) -> int:
@@ -84,6 +84,6 @@ class Nudger:
                 for _ in range(count):
                     self.app.send_task(task, queue=queue, producer=producer, ignore_result=True)
         except _AWAY as error:
-            _log.warning("nudge.failed", task=task, count=count, error=str(error))
+            _log.warning("notify.failed", task=task, count=count, error=str(error))
             return False
         return True

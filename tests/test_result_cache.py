@@ -1,4 +1,4 @@
-"""An identical hand-in is not run again: it has the earlier grade, marked as a copy, where that can be trusted."""
+"""An identical submission is not run again: it has the earlier grade, marked as a copy, where that can be trusted."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import pytest
 from sqlalchemy import update
 
 import report_builders
-from builders import comparable, echo, hand_in
+from builders import comparable, echo, grading_request
 from service.commands.batch_tables import remarks
 from service.grading.grade import Grade
-from service.store import artifacts, batches, canaries, figures, grades, jobs
+from service.store import artifacts, batches, grades, jobs, metrics, self_tests
 from service.store.engine import Store
 from service.store.installation import secret_of
-from service.store.intake import Accepted, HandIn, accept, accept_batch
+from service.store.intake import Accepted, GradingRequest, accept, accept_batch
 from service.store.models import Job, JobState, PlotState, Standing
 from sim.recording import Verdict
 from submissions.seeds import Secret
 
-WALLS = "Landlock 7, seccomp, process limits, policy 0"
-GRADE = replace(report_builders.shape_grade(), walls=WALLS)
+SANDBOX = "Landlock 7, seccomp, process limits, policy 0"
+GRADE = replace(report_builders.shape_grade(), sandbox=SANDBOX)
 
 
-def _accept(store: Store, student: str = "ada", like: HandIn | None = None) -> Accepted:
-    taken = like or hand_in()
+def _accept(store: Store, student: str = "ada", like: GradingRequest | None = None) -> Accepted:
+    taken = like or grading_request()
     submission = replace(taken.submission, student=student)
     return accept(store, replace(taken, submission=submission), max_attempts=3)
 
@@ -43,7 +43,7 @@ def _job(store: Store, job_id: str) -> Job:
         return session.get_one(Job, job_id)
 
 
-def test_an_identical_hand_in_has_the_grade_at_once_and_says_whose(store: Store) -> None:
+def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Store) -> None:
     _accept(store, "ada")
     first = _grade_next(store)
     jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"picture")])
@@ -62,8 +62,8 @@ def test_an_identical_hand_in_has_the_grade_at_once_and_says_whose(store: Store)
 
 
 def test_a_copy_tells_how_its_own_files_were_read_and_not_anothers(store: Store) -> None:
-    def of(student: str) -> HandIn:
-        taken = hand_in()
+    def of(student: str) -> GradingRequest:
+        taken = grading_request()
         return replace(taken, submission=replace(taken.submission, notes=(f"read from the folder {student} King",)))
 
     _accept(store, "ada", of("Ada"))
@@ -78,11 +78,11 @@ def test_what_waits_is_copied_when_its_turn_comes(store: Store) -> None:
     first = _grade_next(store)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    assert jobs.finish_with_copy(store, claim)
+    assert jobs.finish_from_cache(store, claim)
     assert {first, claim.job_id} == set(ids)
     assert (_job(store, claim.job_id).copied_from, _job(store, claim.job_id).plots) == (first, PlotState.DUE)
     with pytest.raises(jobs.Fenced):
-        jobs.finish_with_copy(store, claim)
+        jobs.finish_from_cache(store, claim)
 
 
 def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None:
@@ -92,7 +92,7 @@ def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None
     with store.reading() as session:
         assert grades.load(session, first).criteria[0].unjudged == criteria[0].unjudged
         line = batches.job_line(session, first)
-        assert figures.look(session).unjudged == 1
+        assert metrics.collect(session).unjudged == 1
     assert "1 criteria not judged" in remarks(line)
     assert _accept(store, "bob").copied_from is None
 
@@ -100,18 +100,18 @@ def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None
 def test_what_is_asked_for_anew_is_run(store: Store) -> None:
     _accept(store, "ada")
     _grade_next(store)
-    accept_batch(store, "again", [hand_in("ada")], [], max_attempts=3)
+    accept_batch(store, "again", [grading_request("ada")], [], max_attempts=3)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    assert not jobs.finish_with_copy(store, claim)
+    assert not jobs.finish_from_cache(store, claim)
 
 
 @pytest.mark.parametrize(
     "other",
-    [hand_in("bob", "print('other')\n"), hand_in("bob", assignment=replace(echo(), title="Another"))],
+    [grading_request("bob", "print('other')\n"), grading_request("bob", assignment=replace(echo(), title="Another"))],
     ids=["other bytes", "other assignment"],
 )
-def test_only_the_identical_is_copied(store: Store, other: HandIn) -> None:
+def test_only_the_identical_is_copied(store: Store, other: GradingRequest) -> None:
     _accept(store, "ada")
     _grade_next(store)
     assert _accept(store, "bob", other).copied_from is None
@@ -124,8 +124,8 @@ def _cut(verdict: Verdict) -> Grade:
 
 @pytest.mark.parametrize(
     "grade",
-    [replace(GRADE, walls="process limits only"), _cut(Verdict.CPU_LIMIT), _cut(Verdict.STALLED)],
-    ids=["without walls", "cut by the machine", "stalled"],
+    [replace(GRADE, sandbox="process limits only"), _cut(Verdict.CPU_LIMIT), _cut(Verdict.STALLED)],
+    ids=["without the sandbox", "cut by the machine", "stalled"],
 )
 def test_what_cannot_be_relied_on_is_run_again(store: Store, grade: Grade) -> None:
     _accept(store, "ada")
@@ -153,12 +153,12 @@ def test_copies_of_a_suspect_grade_are_suspect_and_run_again(store: Store) -> No
     _accept(store, "ada")
     first = _grade_next(store, worker="wrong")
     second = _accept(store, "bob").job_id
-    done = canaries.quarantine(store, "wrong", "it adds wrongly")
+    done = self_tests.quarantine(store, "wrong", "it adds wrongly")
     assert (set(done.suspect), len(done.again)) == ({first, second}, 2)
     assert _job(store, second).standing is Standing.KEPT
     assert _accept(store, "eve").copied_from is None
     again = _grade_next(store, worker="right")
     claim = jobs.claim(store, "right", 60)
     assert claim is not None
-    assert jobs.finish_with_copy(store, claim)
+    assert jobs.finish_from_cache(store, claim)
     assert _job(store, claim.job_id).copied_from == again

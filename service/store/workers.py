@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now
-from service.store.models import Presence
+from service.store.models import Heartbeat
 
 #: A worker that wrote within this time is taken to live.
 LATELY = timedelta(seconds=30)
@@ -20,53 +20,53 @@ _FORGOTTEN = timedelta(days=1)
 
 
 @dataclass(frozen=True, slots=True)
-class Worker:
+class WorkerDescription:
     """One worker, as it describes itself."""
 
     name: str
     host: str
     concurrency: int  # gradings at a time
     grader_version: str
-    walls: str  # what stands round student code there
+    sandbox: str  # what stands round student code there
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
     """A worker, and when it was last heard of."""
 
-    worker: Worker
+    worker: WorkerDescription
     started_at: datetime
     seen_at: datetime
     lately: bool
 
 
-def tell(store: Store, worker: Worker) -> None:
+def beat(store: Store, worker: WorkerDescription) -> None:
     """Write down that the worker lives now. Those that fell silent a day ago are forgotten."""
     with store.transaction() as session:
         at = now(session)
-        row = session.get(Presence, worker.name)
+        row = session.get(Heartbeat, worker.name)
         if row is None:
-            session.execute(delete(Presence).where(Presence.seen_at < at - _FORGOTTEN))
-            row = Presence(worker=worker.name, started_at=at)
+            session.execute(delete(Heartbeat).where(Heartbeat.seen_at < at - _FORGOTTEN))
+            row = Heartbeat(worker=worker.name, started_at=at)
             session.add(row)
         row.host, row.concurrency = worker.host, worker.concurrency
-        row.grader_version, row.walls = worker.grader_version, worker.walls
+        row.grader_version, row.sandbox = worker.grader_version, worker.sandbox
         row.seen_at = at
 
 
 def forget(store: Store, name: str) -> None:
     """Take away the row of a worker that has ended."""
     with store.transaction() as session:
-        session.execute(delete(Presence).where(Presence.worker == name))
+        session.execute(delete(Heartbeat).where(Heartbeat.worker == name))
 
 
-def workers(session: Session) -> list[Seen]:
+def known_workers(session: Session) -> list[Seen]:
     """All workers that are written down, by name."""
     at = now(session)
-    rows = session.scalars(select(Presence).order_by(Presence.worker))
+    rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
     return [
         Seen(
-            Worker(row.worker, row.host, row.concurrency, row.grader_version, row.walls),
+            WorkerDescription(row.worker, row.host, row.concurrency, row.grader_version, row.sandbox),
             row.started_at,
             row.seen_at,
             row.seen_at > at - LATELY,
@@ -77,4 +77,4 @@ def workers(session: Session) -> list[Seen]:
 
 def another_lives(worker: str, at: datetime) -> ColumnElement[bool]:
     """Whether a worker other than this one was heard of lately, as a condition."""
-    return select(Presence.worker).where(Presence.worker != worker, Presence.seen_at > at - LATELY).exists()
+    return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - LATELY).exists()

@@ -1,6 +1,6 @@
-"""A process of a worker checks itself: it grades a hand-in whose recordings' hashes and marks are known.
+"""A process of a worker checks itself: it grades a submission whose recordings' hashes and marks are known.
 
-What follows from a wrong answer is ``service.store.canaries``'s; this module only asks the question.
+What follows from a wrong answer is ``service.store.self_tests``'s; this module only asks the question.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ import structlog
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.rig import Rig
-from service.store import canaries
+from service.grading.trial_runner import TrialRunner
+from service.store import self_tests
 from service.store.engine import Store
 from sim.recording import Verdict
 from submissions.assignment import Assignment
@@ -46,7 +46,7 @@ class Answer(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What grading the known hand-in gives: the marks and the hash of each trial's recording."""
+    """What grading the known submission gives: the marks and the hash of each trial's recording."""
 
     marks: str
     chains: tuple[str, ...]
@@ -58,10 +58,10 @@ def known() -> Known:
     return Known(told["marks"], tuple(told["chains"]))
 
 
-def ask(rig: Rig) -> Known | None:
+def ask(runner: TrialRunner) -> Known | None:
     """What this process finds; None when a limit of the machine cut it. Raises HostError when it cannot grade."""
     submission, assignment = _question()
-    graded = grade(submission, assignment, rig=rig)
+    graded = grade(submission, assignment, runner=runner)
     cut = any(trial.verdict in _CUT for trial in graded.trials) or any(result.unjudged for result in graded.criteria)
     return None if cut else found(graded)
 
@@ -90,9 +90,9 @@ class Watch:
     Grading and looking take turns; whoever grades holds ``busy``.
     """
 
-    def __init__(self, store: Store, rig: Rig, worker: str, every_seconds: float) -> None:
+    def __init__(self, store: Store, runner: TrialRunner, worker: str, every_seconds: float) -> None:
         self._store = store
-        self._rig = rig
+        self._runner = runner
         self._worker = worker
         self._every = every_seconds
         self._next = 0.0
@@ -116,7 +116,7 @@ class Watch:
     def keep_looking(self) -> None:
         """Look again and again from a thread that lives as long as the process, so that idleness hides nothing."""
         if self._thread is None:
-            self._thread = Thread(target=self._run, name="canaries", daemon=True)
+            self._thread = Thread(target=self._run, name="self_test", daemon=True)
             self._thread.start()
 
     def end(self) -> None:
@@ -134,18 +134,18 @@ class Watch:
     def _look(self) -> Answer:
         self._next = time.monotonic() + self._every
         try:
-            actual = ask(self._rig)
+            actual = ask(self._runner)
             if actual is None:
-                _log.warning("canary.unclear", reason="it was cut by a limit of this machine")
+                _log.warning("self_test.unclear", reason="it was cut by a limit of this machine")
                 return Answer.UNCLEAR
             wrong = difference(known(), actual)
             if not wrong:
-                canaries.answered_rightly(self._store, self._worker, os.getpid())
+                self_tests.answered_rightly(self._store, self._worker, os.getpid())
                 return Answer.RIGHT
-            spoilt = canaries.quarantine(self._store, self._worker, wrong)
+            spoilt = self_tests.quarantine(self._store, self._worker, wrong)
         except Exception:
             # Trouble with the machine or the database shows in the jobs themselves.
-            _log.exception("canary.unclear")
+            _log.exception("self_test.unclear")
             return Answer.UNCLEAR
         _log.error(
             "worker.quarantined",
@@ -161,7 +161,7 @@ class Watch:
 @cache
 def _question() -> tuple[Submission, Assignment]:
     assignment = read_assignment(FOLDER)
-    return read_submission(FOLDER / "hand_in", asked=assignment.parts), assignment
+    return read_submission(FOLDER / "grading_request", asked=assignment.parts), assignment
 
 
 def _start(answer: Known, number: int) -> str:
@@ -170,8 +170,8 @@ def _start(answer: Known, number: int) -> str:
 
 def write_answer() -> None:
     """Write down as known what this checkout finds; for whoever changes the simulator on purpose."""
-    with Rig() as rig:
-        actual = ask(rig)
+    with TrialRunner() as runner:
+        actual = ask(runner)
     if actual is None:
         raise SystemExit("the machine cut the trials; try again")
     text = json.dumps({"marks": actual.marks, "chains": actual.chains}, indent=2)

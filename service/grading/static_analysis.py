@@ -1,6 +1,6 @@
-"""What is found out about a hand-in without driving: what its text has, values of its functions, a check's answers.
+"""What is found out about a submission without driving: what its text has, values of its functions, a check's answers.
 
-All of it is found inside the walls; what it is worth is decided in the modules of the kinds.
+All of it is found inside the sandbox; what it is worth is decided in the modules of the kinds.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ _RESPONDERS = ("responder", "*_responder")
 
 
 @dataclass(frozen=True, slots=True)
-class HandedIn:
+class SubmittedParts:
     """What is looked at: the sources of the parts, the flags of the program's magic line, the responder's files.
 
-    ``own`` are those of the files that were handed in; ``cells`` those of a notebook that is the responder.
+    ``own`` are those of the files that were submitted; ``cells`` those of a notebook that is the responder.
     """
 
     program: Source | None = None
@@ -53,18 +53,18 @@ class HandedIn:
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
+class StaticAnalysis:
     """``answers`` and ``called`` are by the id of a criterion, ``checks`` by that and the place of the trial."""
 
     answers: Mapping[str, SourceAnswers] = field(default_factory=dict)
     flags: Flags = field(default_factory=Flags)
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Outcome] = field(default_factory=dict)
-    walls: str = ""
+    sandbox: str = ""
 
 
 class Caller(Protocol):
-    """Calls functions inside the walls; a rig does."""
+    """Calls functions inside the sandbox; a runner does."""
 
     def call(
         self,
@@ -78,32 +78,32 @@ class Caller(Protocol):
     ) -> Called: ...
 
 
-def look_at(
-    handed_in: HandedIn,
+def analyse(
+    submitted: SubmittedParts,
     assignment: Assignment,
     trials: Sequence[TrialResult],
     caller: Caller,
     meter: JobMeter,
-) -> Findings:
+) -> StaticAnalysis:
     """Everything that the criteria ask for beside the recordings.
 
     Raises AssignmentError when a check of the instructor's fails, HostError when the machine does.
     """
-    sources = {"program": handed_in.program, "responder": handed_in.responder}
+    sources = {"program": submitted.program, "responder": submitted.responder}
     answers: dict[str, SourceAnswers] = {}
     called: dict[str, Called] = {}
     checks: dict[tuple[str, int], Outcome] = {}
     for criterion in assignment.criteria:
         if isinstance(criterion, SourceRules) and sources[criterion.part] is not None:
-            answers[criterion.id] = _answers(criterion, handed_in, assignment, caller, meter)
-        elif isinstance(criterion, Functions) and handed_in.responder is not None:
-            called[criterion.id] = _called(criterion, handed_in, assignment, caller, meter)
+            answers[criterion.id] = _answers(criterion, submitted, assignment, caller, meter)
+        elif isinstance(criterion, Functions) and submitted.responder is not None:
+            called[criterion.id] = _called(criterion, submitted, assignment, caller, meter)
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
                     checks[criterion.id, place] = _check(criterion, trial, assignment, caller, meter)
-    walls = next((each.walls for each in called.values()), "")
-    return Findings(answers, handed_in.flags, called, checks, walls)
+    sandbox = next((each.sandbox for each in called.values()), "")
+    return StaticAnalysis(answers, submitted.flags, called, checks, sandbox)
 
 
 def reads_program(assignment: Assignment) -> bool:
@@ -156,7 +156,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
 
 
 def _answers(
-    criterion: SourceRules, handed_in: HandedIn, assignment: Assignment, caller: Caller, meter: JobMeter
+    criterion: SourceRules, submitted: SubmittedParts, assignment: Assignment, caller: Caller, meter: JobMeter
 ) -> SourceAnswers:
     asked = {
         "uses": criterion.uses,
@@ -166,7 +166,7 @@ def _answers(
         "shown": SPEECH,
         "entries": (*criterion.defines, *_entries(assignment)) if criterion.part == "responder" else criterion.defines,
     }
-    calls = [FunctionCall("read", [list(_read_files(criterion.part, handed_in)), asked])]
+    calls = [FunctionCall("read", [list(_read_files(criterion.part, submitted)), asked])]
     called = caller.call(_READER, {}, calls, _READER_LIMITS, _READER_OUTPUT, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:
@@ -174,16 +174,16 @@ def _answers(
     return SourceAnswers.read(called.returned[0].value, criterion)
 
 
-def _read_files(part: str, handed_in: HandedIn) -> Iterator[Mapping[str, Any]]:
+def _read_files(part: str, submitted: SubmittedParts) -> Iterator[Mapping[str, Any]]:
     """The part, and the Python files beside a responder, as bytes: they say themselves how they are written."""
-    source = handed_in.program if part == "program" else handed_in.responder
+    source = submitted.program if part == "program" else submitted.responder
     assert source is not None
-    if part == "responder" and handed_in.cells:
-        yield {"name": "", "cells": [(cell.number, cell.source) for cell in handed_in.cells]}
+    if part == "responder" and submitted.cells:
+        yield {"name": "", "cells": [(cell.number, cell.source) for cell in submitted.cells]}
     else:
         yield {"name": "", "text": source.text[:_MOST_OF_ONE]}
     left = _MOST_READ - len(source.text)
-    beside = {name: data for name, data in handed_in.own.items() if name.lower().endswith(".py")}
+    beside = {name: data for name, data in submitted.own.items() if name.lower().endswith(".py")}
     for name, data in beside.items() if part == "responder" else ():
         if left > 0:
             yield {"name": name, "bytes": data[:_MOST_OF_ONE].decode("latin-1")}
@@ -201,17 +201,17 @@ def _entries(assignment: Assignment) -> Iterator[str]:
 
 
 def _called(
-    criterion: Functions, handed_in: HandedIn, assignment: Assignment, caller: Caller, meter: JobMeter
+    criterion: Functions, submitted: SubmittedParts, assignment: Assignment, caller: Caller, meter: JobMeter
 ) -> Called:
-    responder = handed_in.responder
+    responder = submitted.responder
     assert responder is not None
     return caller.call(
         Code(responder.name, responder.text),
-        handed_in.files,
+        submitted.files,
         calls_of(criterion),
         responder_limits(assignment),
         assignment.limits.output_bytes,
-        Stream(handed_in.child_seed, f"calls {criterion.id}").integer(0) >> 1,
+        Stream(submitted.child_seed, f"calls {criterion.id}").integer(0) >> 1,
         meter,
     )
 

@@ -1,7 +1,7 @@
 """Which workers can be trusted: when each process last graded the known answer rightly, and who is in quarantine.
 
 A worker that got it wrong claims nothing any more, and what it graded since its last right answer is run again by
-others. Grading the known answer is ``service.queue.canaries``'s.
+others. Grading the known answer is ``service.queue.self_test``'s.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import Store, now
-from service.store.models import Batch, BatchState, Canary, Job, JobState, Lane, Standing, Worker
+from service.store.models import Batch, BatchState, Job, JobState, Lane, SelfTest, Standing, Worker
 from service.version import GRADER_VERSION, grader_sha256
 
 _FORGOTTEN = timedelta(days=30)
@@ -41,11 +41,11 @@ def answered_rightly(store: Store, worker: str, process: int) -> None:
     """Write down that this process of the worker graded the known answer rightly now."""
     with store.transaction() as session:
         at = now(session)
-        _worker(session, worker, at).canary_at = at
-        query = select(Canary).where(Canary.worker == worker, Canary.process == process)
+        _worker(session, worker, at).self_tested_at = at
+        query = select(SelfTest).where(SelfTest.worker == worker, SelfTest.process == process)
         row = session.scalar(query)
         if row is None:
-            session.add(Canary(worker=worker, process=process, right_at=at))
+            session.add(SelfTest(worker=worker, process=process, right_at=at))
         else:
             row.right_at = at
 
@@ -61,7 +61,7 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
         row = _worker(session, worker, at)
         if row.quarantined_at is not None:
             return Quarantined(0, (), ())
-        row.canary_at = row.quarantined_at = at
+        row.self_tested_at = row.quarantined_at = at
         row.reason = reason
         # A finish waits for this row, or was committed before it was locked and is seen below.
         session.flush()
@@ -98,16 +98,18 @@ def _worker(session: Session, name: str, at: datetime) -> Worker:
     row = session.scalar(select(Worker).where(Worker.name == name).with_for_update())
     if row is None:
         _forget_old(session, at)
-        row = Worker(name=name, grader_version=GRADER_VERSION, grader_sha256=grader_sha256(), first_at=at, canary_at=at)
+        row = Worker(
+            name=name, grader_version=GRADER_VERSION, grader_sha256=grader_sha256(), first_at=at, self_tested_at=at
+        )
         session.add(row)
         session.flush()
     return row
 
 
 def _forget_old(session: Session, at: datetime) -> None:
-    old = select(Worker.name).where(Worker.canary_at < at - _FORGOTTEN)
+    old = select(Worker.name).where(Worker.self_tested_at < at - _FORGOTTEN)
     for statement in (
-        delete(Canary).where(Canary.worker.in_(old)),
+        delete(SelfTest).where(SelfTest.worker.in_(old)),
         delete(Worker).where(Worker.name.in_(old)),
     ):
         session.execute(statement, execution_options={"synchronize_session": False})
@@ -117,7 +119,7 @@ def _take_back(session: Session, worker: str, at: datetime) -> int:
     held = select(Job).where(Job.state == JobState.RUNNING, Job.worker == worker).with_for_update()
     jobs = session.scalars(held).all()
     for job in jobs:
-        job.state, job.lease, job.lease_until, job.nudged_at = JobState.QUEUED, None, None, None
+        job.state, job.lease, job.lease_until, job.notified_at = JobState.QUEUED, None, None, None
         job.progress, job.due_at, job.attempt = 0.0, at, job.attempt - 1
     session.flush()
     return len(jobs)
@@ -126,8 +128,8 @@ def _take_back(session: Session, worker: str, at: datetime) -> int:
 def _suspects(session: Session, worker: str) -> Sequence[Job]:
     """What the worker graded since it was last known to grade rightly, and all copies of that."""
     last = (
-        select(Canary.right_at)
-        .where(Canary.worker == worker, Canary.process == Job.process)
+        select(SelfTest.right_at)
+        .where(SelfTest.worker == worker, SelfTest.process == Job.process)
         .correlate(Job)
         .scalar_subquery()
     )

@@ -15,12 +15,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from PIL import Image as Picture
 
-from service.grading.grade import Sight
-from service.reports.figure import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.grading.grade import Prediction
+from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
 from sim.recording import Image
 
-MOST_SIGHTS = 12
+MOST_PREDICTIONS = 12
 #: The part of the 20 x 20 picture that lies wholly inside the round sensor: left, upper, right, lower.
 FOCUS = (3, 3, 17, 17)
 _CARD_WIDTH, _CARD_HEIGHT = 2.56, 1.77
@@ -28,31 +28,31 @@ _SIDE = 1.13  # inches of a picture
 _COLUMNS = 2
 
 
-def draw_sights(sights: Sequence[Sight], title: str) -> Figure:
-    """Cards of at most ``MOST_SIGHTS`` pictures, wrong answers first where not all fit."""
-    shown = chosen_sights(sights)
+def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
+    """Cards of at most ``MOST_PREDICTIONS`` pictures, wrong answers first where not all fit."""
+    shown = chosen_predictions(predictions)
     rows = -(-len(shown) // _COLUMNS)
     height = rows * _CARD_HEIGHT
-    figure = new_figure(HEAD + height + 0.06, title, _subtitle(sights, shown))
+    figure = new_figure(HEAD + height + 0.06, title, _subtitle(predictions, shown))
     axes = axes_at(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
     axes.set_axis_off()
     for place, number in enumerate(shown):
         x, y = place % _COLUMNS * _CARD_WIDTH, place // _COLUMNS * _CARD_HEIGHT
-        _draw_card(axes, sights[number], number + 1, x, y)
+        _draw_card(axes, predictions[number], number + 1, x, y)
     axes.set_xlim(-0.08, WIDTH - 0.12)
     axes.set_ylim(height, -0.06)
     return figure
 
 
-def chosen_sights(sights: Sequence[Sight]) -> tuple[int, ...]:
+def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
     """Indices of the pictures to show, ascending; if there are too many, all wrong ones come first."""
-    order = sorted(range(len(sights)), key=lambda index: (is_right(sights[index]), index))
-    return tuple(sorted(order[:MOST_SIGHTS]))
+    order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
+    return tuple(sorted(order[:MOST_PREDICTIONS]))
 
 
-def is_right(sight: Sight) -> bool:
+def is_right(prediction: Prediction) -> bool:
     """Whether the answer was the truth."""
-    return sight.answer is not None and sight.answer == sight.truth
+    return prediction.answer is not None and prediction.answer == prediction.truth
 
 
 def sensor_picture(image: Image) -> Picture.Image:
@@ -66,18 +66,22 @@ def focus_picture(image: Image) -> Picture.Image:
     return whole.crop(FOCUS) if image.side == 20 else whole
 
 
-def _subtitle(sights: Sequence[Sight], shown: Sequence[int]) -> str:
-    wrong = sum(not is_right(sight) for sight in sights)
-    count = f"{len(sights)} pictures" if len(shown) == len(sights) else f"{len(shown)} of {len(sights)} pictures"
+def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
+    wrong = sum(not is_right(prediction) for prediction in predictions)
+    count = (
+        f"{len(predictions)} pictures"
+        if len(shown) == len(predictions)
+        else f"{len(shown)} of {len(predictions)} pictures"
+    )
     return f"{count}, {wrong} answered wrongly; each: all 20×20, then the 14×14 focus"
 
 
-def _draw_card(axes: Axes, sight: Sight, number: int, x: float, y: float) -> None:
-    right = is_right(sight)
-    whole, focus = np.asarray(sensor_picture(sight.image)), np.asarray(focus_picture(sight.image))
+def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
+    right = is_right(prediction)
+    whole, focus = np.asarray(sensor_picture(prediction.image)), np.asarray(focus_picture(prediction.image))
     _draw_picture(axes, whole, x, y)
     _draw_picture(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
-    if sight.image.side == 20:
+    if prediction.image.side == 20:
         pixel = _SIDE / 20
         axes.add_patch(
             Rectangle((x + FOCUS[0] * pixel, y + FOCUS[1] * pixel), 14 * pixel, 14 * pixel, facecolor="none",
@@ -90,11 +94,11 @@ def _draw_card(axes: Axes, sight: Sight, number: int, x: float, y: float) -> Non
                       linewidth=1.8)
         )  # fmt: skip
     sign, word = ("✓", "right") if right else ("✗", "wrong")
-    answer = "no answer" if sight.answer is None else one_line(sight.answer, 30)
+    answer = "no answer" if prediction.answer is None else one_line(prediction.answer, 30)
     lines = [
         (f"{number}. {sign} {word}", colour, True),
-        (f"answered: {answer}" if sight.answer is not None else answer, INK, False),
-        (f"truth: {one_line(sight.truth, 30)}", FAINT if right else INK, False),
+        (f"answered: {answer}" if prediction.answer is not None else answer, INK, False),
+        (f"truth: {one_line(prediction.truth, 30)}", FAINT if right else INK, False),
     ]
     for row, (text, shade, bold) in enumerate(lines):
         axes.text(

@@ -19,10 +19,10 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 T = TypeVar("T")
-Plain = None | bool | int | float | str | list["Plain"] | dict[str, "Plain"]
+Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 
-def to_plain(value: object) -> Plain:
+def encode(value: object) -> Json:
     """A JSON value for dataclasses, pydantic models, tuples, mappings, enums, decimals and bytes.
 
     Bytes become base64, floats that JSON has no word for their names. Raises TypeError for anything else.
@@ -31,7 +31,7 @@ def to_plain(value: object) -> Plain:
         value = value.item()
     match value:
         case Enum():
-            return cast(Plain, value.value)
+            return cast(Json, value.value)
         case None | bool() | int() | str():
             return value
         case float():
@@ -41,25 +41,25 @@ def to_plain(value: object) -> Plain:
         case bytes():
             return base64.b64encode(value).decode("ascii")
         case BaseModel():
-            return cast(Plain, value.model_dump(mode="json", by_alias=True))
+            return cast(Json, value.model_dump(mode="json", by_alias=True))
         case Mapping():
-            return {str(key): to_plain(item) for key, item in value.items()}
+            return {str(key): encode(item) for key, item in value.items()}
         case Sequence():
-            return [to_plain(item) for item in value]
+            return [encode(item) for item in value]
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: encode(getattr(value, field.name)) for field in fields(value)}
     raise TypeError(f"{type(value).__name__} has no plain form")
 
 
-def from_plain(kind: type[T], value: Plain) -> T:
-    """The inverse of ``to_plain`` for a value of type ``kind``.
+def decode(kind: type[T], value: Json) -> T:
+    """The inverse of ``encode`` for a value of type ``kind``.
 
     Unknown fields are ignored, missing ones defaulted. Raises TypeError or ValueError where it does not fit.
     """
     return cast(T, _read(kind, value))
 
 
-def arguments_from_plain(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
+def decoded_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments for the dataclass ``kind`` among the fields that are there; the caller adds the rest."""
     known = _hints(kind)
     return {name: _read(known[name], item) for name, item in value.items() if name in known}

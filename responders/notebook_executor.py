@@ -1,6 +1,6 @@
-"""Plays a notebook from top to bottom: each magic that starts a robot is a run of its own, with its own recording.
+"""Executes a notebook from top to bottom: each magic that starts a robot is a run of its own, with its own recording.
 
-What a magic comes to (floor, pose, noise, and which run is the marked one) is told by the caller's ``Stage``.
+What a magic comes to (floor, pose, noise, and which run is the marked one) is told by the caller's ``RunPlanner``.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
-from responders.bridge import Bridge, TrialOrder
-from responders.notebook_process import NotebookOrder, NotebookProcess
+from responders.bridge import Bridge, TrialSpec
+from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.trial import MOST_NOTES, read_log, recording_of
@@ -23,7 +23,7 @@ from sim.world import Chain, World
 
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
-#: What all unmarked runs of a play may compute together, as a multiple of what one may.
+#: What all unmarked runs of an execution may compute together, as a multiple of what one may.
 _UNMARKED_CPU = 4
 #: And how long they may take together, in simulated seconds, or in the longest that one may take.
 _UNMARKED_SECONDS, _UNMARKED_RUNS = 600, 20
@@ -41,10 +41,10 @@ class MagicCall:
 
 
 @dataclass(frozen=True, slots=True)
-class Staged:
+class PlannedRun:
     """What a magic comes to: a run or none, and sentences about it."""
 
-    order: TrialOrder | None = None
+    spec: TrialSpec | None = None
     obstacles: tuple[Rectangle, ...] = ()
     program_cell: int | None = None  # where the program is that is run
     marked: bool = False
@@ -52,19 +52,19 @@ class Staged:
     notes: tuple[str, ...] = ()
 
 
-class Stage(Protocol):
+class RunPlanner(Protocol):
     """Decides what magics come to."""
 
-    def call(self, call: MagicCall) -> Staged: ...
+    def call(self, call: MagicCall) -> PlannedRun: ...
 
     def ran(self, recording: Recording) -> None:
-        """A run that was staged has ended."""
+        """A run that was planned has ended."""
 
-    def last(self) -> Staged:
-        """What is run when all cells have been played, if anything."""
+    def last(self) -> PlannedRun:
+        """What is run when all cells have been executed, if anything."""
 
 
-Ground = Callable[[TrialOrder, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
+Ground = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +77,14 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
-    """What came of a play. ``raised`` are the faults of single cells, ``stopped`` what ended the process."""
+class ExecutedNotebook:
+    """What came of a notebook. ``raised`` are the faults of single cells, ``stopped`` what ended the process."""
 
     runs: tuple[Run, ...]
     output: str
     log: str
     notes: tuple[str, ...]
-    walls: str
+    sandbox: str
     raised: tuple[Fault, ...]
     stopped: Fault | None
 
@@ -102,65 +102,67 @@ class Played:
         )
 
 
-def play_notebook(order: NotebookOrder, stage: Stage, ground: Ground, sandboxes: Sandboxes, meter: JobMeter) -> Played:
-    """Play the notebook in a fresh process and folder; ``meter`` counts what its job costs.
+def execute_notebook(
+    spec: NotebookSpec, planner: RunPlanner, ground: Ground, sandboxes: Sandboxes, meter: JobMeter
+) -> ExecutedNotebook:
+    """Execute the notebook in a fresh process and folder; ``meter`` counts what its job costs.
 
     Raises HostError when the machine, not the student, fails.
     """
     with sandboxes.private_folder() as folder:
-        process = NotebookProcess(order, sandboxes, folder, meter)
+        process = NotebookProcess(spec, sandboxes, folder, meter)
         try:
-            play = _Play(process, stage, ground, sandboxes, meter)
-            process.play(play.perform)
+            play = _Execution(process, planner, ground, sandboxes, meter)
+            process.execute(play.perform)
             play.finish()
         finally:
             process.close()
         log, unread = read_log(folder, meter)
-    return Played(
+    return ExecutedNotebook(
         tuple(play.runs),
         "\n".join(process.output),
         log,
         tuple(process.notes),
-        process.walls,
+        process.sandbox,
         tuple(process.raised),
         process.stopped or unread,
     )
 
 
-def never_ran(order: TrialOrder, arena: Arena, camera: LightCamera, fault: Fault, walls: str) -> Recording:
+def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str) -> Recording:
     """The recording of a run that did not come about: the robot stands where it would have started."""
     chain = Chain()
-    world = World(order.robot, arena, camera, order.pose, order.noise, order.seed, chain)
+    world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain)
     return Recording(
-        background=order.floor.name,
-        start=order.pose,
-        end=order.pose,
+        background=spec.floor.name,
+        start=spec.pose,
+        end=spec.pose,
         end_t=0.0,
         ticks=world.ticks(),
         verdict=fault.verdict,
         sha256=chain.hexdigest(),
         faults=(fault,),
         obstacles=world.obstacles,
-        patches=order.floor.patches,
-        sheet=order.floor.sheet,
-        robot=order.robot.name,
-        walls=walls,
+        patches=spec.floor.patches,
+        sheet=spec.floor.sheet,
+        robot=spec.robot.name,
+        sandbox=sandbox,
     )
 
 
-class _Play:
-    """The runs of one play."""
+class _Execution:
+    """The runs of one execution."""
 
     def __init__(
         self,
         process: NotebookProcess,
-        stage: Stage,
+        planner: RunPlanner,
         ground: Ground,
         sandboxes: Sandboxes,
         meter: JobMeter,
     ) -> None:
         self._process = process
-        self._stage = stage
+        self._planner = planner
         self._ground = ground
         self._sandboxes = sandboxes
         self._meter = meter
@@ -171,59 +173,59 @@ class _Play:
         """Do what a magic asks; the frame that lets the notebook go on."""
         cell, line = self._process.place(frame["line"])
         call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
-        staged = self._stage.call(call)
-        for note in staged.notes:
+        planned = self._planner.call(call)
+        for note in planned.notes:
             self._process.note(frame["line"], note)
-        if staged.order is None:
+        if planned.spec is None:
             return _done()
-        refusal = self._refusal(staged, staged.order)
+        refusal = self._refusal(planned, planned.spec)
         if refusal:
             self._process.note(frame["line"], refusal)
             return _done()
-        bridge = self._run(cell, staged, staged.order)
+        bridge = self._run(cell, planned, planned.spec)
         logged = bridge.collected()
         return _done(bridge.now, logged.data, logged.images, bridge.robot_state())
 
     def finish(self) -> None:
-        """Run what the stage has for the end."""
-        staged = self._stage.last()
-        if staged.order is not None:
-            self._run(None, staged, staged.order)
+        """Run what the planner has for the end."""
+        planned = self._planner.last()
+        if planned.spec is not None:
+            self._run(None, planned, planned.spec)
 
-    def _refusal(self, staged: Staged, order: TrialOrder) -> str:
-        if staged.marked:
+    def _refusal(self, planned: PlannedRun, spec: TrialSpec) -> str:
+        if planned.marked:
             return ""
         if len(self.runs) >= _MOST_RUNS:
             return f"the robot was not started: a notebook may start it {_MOST_RUNS} times"
-        too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * order.seconds)
-        if too_long or self._unmarked_cpu > _UNMARKED_CPU * order.program.limits.cpu_seconds:
+        too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * spec.seconds)
+        if too_long or self._unmarked_cpu > _UNMARKED_CPU * spec.program.limits.cpu_seconds:
             return "the robot was not started: the runs before have used up the time for runs that are not marked"
         return ""
 
-    def _run(self, cell: int | None, staged: Staged, order: TrialOrder) -> Bridge:
+    def _run(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
         process = self._process
-        answers = order.collaborative and (process.missing is None or staged.needs_responder)
+        answers = spec.collaborative and (process.missing is None or planned.needs_responder)
         first_call = len(process.calls)
-        arena, camera = self._ground(order, staged.obstacles)
-        program = self._sandboxes.spawn("robot", order.program.limits, meter=self._meter)
+        arena, camera = self._ground(spec, planned.obstacles)
+        program = self._sandboxes.spawn("robot", spec.program.limits, meter=self._meter)
         try:
-            bridge = Bridge(order, arena, camera, program, process if answers else None, self._meter)
+            bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()
-            if not staged.marked:
+            if not planned.marked:
                 self._unmarked_cpu += program.cpu_seconds()
                 self._unmarked_seconds += bridge.now / SECOND
         finally:
             program.close()
         bridge.conversation.finish()
         faults = [*bridge.conversation.faults, *([fault] if fault else [])]
-        if staged.needs_responder and process.missing is not None and not bridge.conversation.faults:
+        if planned.needs_responder and process.missing is not None and not bridge.conversation.faults:
             faults.append(Fault(0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._why_missing()))
-        faults = [self._placed(each, staged.program_cell) for each in faults]
+        faults = [self._placed(each, planned.program_cell) for each in faults]
         faults.sort(key=lambda each: each.t)
-        recording = recording_of(order, bridge, tuple(faults), program.walls)
+        recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
         recording = replace(recording, calls=tuple(process.calls[first_call:]))
-        self.runs.append(Run(cell, staged.marked, recording))
-        self._stage.ran(recording)
+        self.runs.append(Run(cell, planned.marked, recording))
+        self._planner.ran(recording)
         return bridge
 
     def _placed(self, fault: Fault, program_cell: int | None) -> Fault:

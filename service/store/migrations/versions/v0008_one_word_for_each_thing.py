@@ -1,0 +1,39 @@
+"""Tables, columns and files take the words that the rest of Robomark has for them; nothing of their content changes."""
+
+from __future__ import annotations
+
+from alembic import op
+
+from service.store.migrate import refuse_downgrade
+
+revision = "0008"
+down_revision = "0006"
+branch_labels = None
+depends_on = None
+
+_TABLES = {"canary": "self_test", "presence": "heartbeat"}
+_COLUMNS = (
+    ("submission", "handed_in_at", "submitted_at"),
+    ("job", "nudged_at", "notified_at"),
+    ("job", "walls", "sandbox"),
+    ("job", "fresh", "forced"),
+    ("criterion_result", "sights", "predictions"),
+    ("worker", "canary_at", "self_tested_at"),
+    ("heartbeat", "walls", "sandbox"),
+)
+
+
+def upgrade() -> None:
+    op.drop_index("ix_canary_worker_process", "canary")
+    op.drop_index("ix_presence_seen_at", "presence")
+    for before, after in _TABLES.items():
+        op.rename_table(before, after)
+    # One statement each, and never a rebuilt table: SQLite would empty, by cascade, those that refer to it.
+    for table, before, after in _COLUMNS:
+        op.execute(f"ALTER TABLE {table} RENAME COLUMN {before} TO {after}")
+    op.create_index("ix_self_test_worker_process", "self_test", ["worker", "process"], unique=True)
+    op.create_index("ix_heartbeat_seen_at", "heartbeat", ["seen_at"])
+    op.execute("UPDATE artifact SET name = 'plot-predictions-' || substr(name, 13) WHERE name LIKE 'plot-sights-%'")
+
+
+downgrade = refuse_downgrade
