@@ -1,6 +1,6 @@
-"""Runs attacks inside a child, against self_test made for each: files, a process and servers that nobody needs.
+"""Runs attacks inside a child, against decoys made for each: files, a process and servers that nobody needs.
 
-What an attack says of itself is one half of the evidence; the self_test, looked at afterwards from outside, the other.
+What an attack says of itself is one half of the evidence; the decoys, looked at afterwards from outside, the other.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ SETTINGS = {
 #: An interpreter that every user can read, where the machine has one.
 SYSTEM_PYTHON = "/usr/bin/python3.11"
 #: In the worker's environment and memory while attacks run.
-SECRET = "canary-of-the-worker-51c9"
+SECRET = "decoy-of-the-worker-51c9"
 SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
 _TOOLS = Path(tools.__file__).read_text()
 _NUMBERS = {name: number for number, name, _ in listed()}
@@ -96,7 +96,7 @@ def responder(text): return text
 
 @dataclass(frozen=True)
 class Attack:
-    """One attack: its group, its name, and which wall stops it."""
+    """One attack: its group, its name, and which layer stops it."""
 
     group: str
     name: str
@@ -156,7 +156,7 @@ class Victim:
             self._process = None
 
 
-class Canaries:
+class Decoys:
     """A folder with secrets, a process, and servers: all that attacks are aimed at."""
 
     def __init__(self, home: Path, victim: Victim) -> None:
@@ -347,8 +347,8 @@ def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str
 
 
 @contextlib.contextmanager
-def self_test(home: Path, victim: Victim) -> Iterator[Canaries]:
-    made = Canaries(home, victim)
+def decoys(home: Path, victim: Victim) -> Iterator[Decoys]:
+    made = Decoys(home, victim)
     try:
         yield made
     finally:

@@ -23,11 +23,11 @@ from battery import (
     Attack,
     Victim,
     attacks,
+    decoys,
     memories,
     readable_tree,
     remembered,
     run,
-    self_test,
     unread,
 )
 from responders.sandbox import manager, private_folders
@@ -95,7 +95,7 @@ def test_the_sandbox_holds(
     attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     """With a folder to write in, which is more than a robot program gets."""
-    with self_test(tmp_path, victim) as targets:
+    with decoys(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], role, attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
         assert targets.harm() == []
@@ -112,7 +112,7 @@ def test_the_sandbox_holds_inside_bubblewrap(
     attack: Attack, wrapped: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
     """Most of what remains otherwise, names of files above all, does not remain in there."""
-    with self_test(tmp_path, victim) as targets:
+    with decoys(tmp_path, victim) as targets:
         outcome = run(wrapped, "robot", attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.name in REMAINS_INSIDE_BUBBLEWRAP), outcome
         assert targets.harm() == []
@@ -125,7 +125,7 @@ def test_the_sandbox_holds_round_a_user_of_its_own(
     attack: Attack, own_user: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
     """Some of what remains otherwise does not remain for a user who may not even enter the folders."""
-    with self_test(tmp_path, victim) as targets:
+    with decoys(tmp_path, victim) as targets:
         outcome = run(own_user, "robot", attack, targets.targets())
         assert attack.stopped_by == tools.REMAINS or not outcome.startswith("LEAK"), outcome
         assert targets.harm() == []
@@ -143,10 +143,10 @@ def test_the_sandbox_holds_round_a_user_of_its_own(
 def test_without_its_layer_it_gets_through(
     attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
-    with self_test(tmp_path, victim) as targets:
+    with decoys(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], "robot", attack, targets.targets())
     if not outcome.startswith("LEAK"):
-        with self_test(tmp_path, victim) as targets:
+        with decoys(tmp_path, victim) as targets:
             bare = run(sandboxes["none"], "robot", attack, targets.targets())
         if not bare.startswith("LEAK"):
             pytest.skip(f"this machine refuses it to everybody: {bare}")

@@ -1,4 +1,4 @@
-"""A machine that lacks a wall: student code is refused, in a sentence that names what is missing.
+"""A machine that lacks a layer of the sandbox: student code is refused, in a sentence that names what is missing.
 
 The machine is this one, behind a filter that says no as an old kernel, a switched-off module or a container would.
 """
@@ -71,7 +71,7 @@ _CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED
 def test_a_missing_layer_is_named(number: int, error: int, words: str) -> None:
     ran = _run(_CHECK, number, error)
     assert ran.returncode == 3
-    assert ran.stdout.startswith(f"SandboxMissing: this machine cannot wall in student code: {words}:"), ran.stdout
+    assert ran.stdout.startswith(f"SandboxMissing: this machine cannot enclose student code: {words}:"), ran.stdout
     assert "Linux 5.13" in ran.stdout
     assert "Traceback" not in ran.stderr
 

@@ -22,7 +22,7 @@ import sim.robot
 from builders import grading_request, settings_in
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue import self_tests as known_answers
+from service.queue import self_test as known_answers
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier

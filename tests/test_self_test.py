@@ -20,7 +20,7 @@ from sim.recording import Recording
 
 #: A sentence that stands in one of the grader's own files.
 _OF_THE_PACKAGE = "Judging: from recordings to marks"
-_SECRETS = {place: f"canary-of-the-{place}-7f3a" for place in ("environment", "memory", "file")}
+_SECRETS = {place: f"decoy-of-the-{place}-7f3a" for place in ("environment", "memory", "file")}
 _HELD = [_SECRETS["memory"]]
 
 #: Opens with the C library, so that only the kernel can refuse, and says whatever it gets in every way there is.
@@ -50,7 +50,7 @@ def tell():
                 print(secret)
                 raise RuntimeError(secret)
 """
-_LAST = "canary-of-the-last-student"
+_LAST = "decoy-of-the-last-student"
 
 
 def _search(paths: list[str], *secrets: str) -> str:
@@ -101,7 +101,7 @@ def test_the_next_student_sees_nothing_of_the_last(role: str) -> None:
     """The first leaves its mark in memory, in modules, in built-in functions and in files."""
     leave = """
 import builtins, json, sys
-mark = "canary-of-the-last-" + "student".lower()
+mark = "decoy-of-the-last-" + "student".lower()
 builtins.left_here = mark
 json.loads = lambda text: mark
 sys.left_here = sys.modules["left_here"] = mark

@@ -229,17 +229,17 @@ def put_compiled_code_beside_the_key():
 
 @attack(LANDLOCK)
 def write_into_tmp():
-    return _create(f"/tmp/robomark-canary-{os.getpid()}")
+    return _create(f"/tmp/robomark-decoy-{os.getpid()}")
 
 
 @attack(LANDLOCK)
 def write_into_shared_memory():
-    return _create(f"/dev/shm/robomark-canary-{os.getpid()}")
+    return _create(f"/dev/shm/robomark-decoy-{os.getpid()}")
 
 
 @attack(LANDLOCK)
 def write_into_the_home_folder():
-    return _create(os.path.join(os.path.dirname(targets.folder), f"canary-{os.getpid()}"))
+    return _create(os.path.join(os.path.dirname(targets.folder), f"decoy-{os.getpid()}"))
 
 
 @attack(LANDLOCK)

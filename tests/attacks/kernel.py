@@ -147,8 +147,8 @@ def reboot():
 @attack(UNTRIED)
 def queue_messages():
     attributes = struct.pack("=qqqq", 0, 1, 8, 0) + bytes(32)
-    call("mq_open", b"robomark-canary", os.O_CREAT | os.O_RDWR, 0o600, attributes)
-    call("mq_unlink", b"robomark-canary")
+    call("mq_open", b"robomark-decoy", os.O_CREAT | os.O_RDWR, 0o600, attributes)
+    call("mq_unlink", b"robomark-decoy")
     return True
 
 
@@ -200,7 +200,7 @@ def read_the_kernels_clock_settings():
 globals().update(
     system_calls(
         SECCOMP,
-        add_key=(b"user", b"robomark-canary", b"x", 1, -2),
+        add_key=(b"user", b"robomark-decoy", b"x", 1, -2),
         keyctl=(0, -2, 1),
         userfaultfd=(1,),
         memfd_secret=(0,),
@@ -240,14 +240,14 @@ globals().update(
             clock_settime=(1, bytes(16)),
             settimeofday=(0, 0),
             clock_adjtime=(1, space(256)),
-            sethostname=(b"robomark-canary", -1),
-            setdomainname=(b"robomark-canary", -1),
+            sethostname=(b"robomark-decoy", -1),
+            setdomainname=(b"robomark-decoy", -1),
             syslog=(3, space(), 256),
             migrate_pages=(0, 0, 0, 0),
             move_pages=(0, 0, 0, 0, 0, 0),
             mlockall=(1,),
             mlock2=(0, 0, 0),
-            request_key=(b"user", b"robomark-canary", 0, 0),
+            request_key=(b"user", b"robomark-decoy", 0, 0),
             vhangup=(),
             io_setup=(1, space(8)),
             io_uring_register=(0, 0, 0, 0),

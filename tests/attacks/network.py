@@ -89,7 +89,7 @@ def send_from_one_of_a_pair():
 @attack(SECCOMP)
 def listen_on_an_abstract_socket():
     with socket.socket(socket.AF_UNIX) as server:
-        server.bind(f"\0robomark-canary-{os.getpid()}")
+        server.bind(f"\0robomark-decoy-{os.getpid()}")
         server.listen()
         return True
 

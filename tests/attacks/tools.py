@@ -1,4 +1,4 @@
-"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the self_test.
+"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the decoys.
 
 Python's own refusals are switched off first, as any student could, so that only the kernel's layers are tried.
 """
@@ -16,12 +16,12 @@ libc = ctypes.CDLL(None, use_errno=True)
 libc.syscall.restype = ctypes.c_long
 libc.mmap.restype = ctypes.c_void_p
 
-#: Which wall stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
+#: Which layer stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
 LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "either", "newer", "remains", "untried"
 #: By the doorkeeper alone; by nothing, as it is nowhere to be found.
 DOORKEEPER, NOWHERE = "doorkeeper", "nowhere"
 
-#: The numbers of system calls by name, and the self_test; filled before an attack runs.
+#: The numbers of system calls by name, and the decoys; filled before an attack runs.
 numbers: dict[str, int] = {}
 targets = SimpleNamespace()
 

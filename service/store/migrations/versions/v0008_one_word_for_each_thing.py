@@ -34,6 +34,9 @@ def upgrade() -> None:
     op.create_index("ix_self_test_worker_process", "self_test", ["worker", "process"], unique=True)
     op.create_index("ix_heartbeat_seen_at", "heartbeat", ["seen_at"])
     op.execute("UPDATE artifact SET name = 'plot-predictions-' || substr(name, 13) WHERE name LIKE 'plot-sights-%'")
+    op.execute(
+        "UPDATE job SET error = 'superseded by a newer submission' WHERE error = 'superseded by a newer hand-in'"
+    )
 
 
 downgrade = refuse_downgrade
