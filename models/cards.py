@@ -21,7 +21,7 @@ Confusion = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """How many of ``n`` pictures were named rightly."""
+    """How many of ``n`` images were named rightly."""
 
     right: int
     n: int

@@ -111,8 +111,8 @@ def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
     middle = 14.0
     # Where each pixel comes from: the middle stays the middle, but for the move.
     inverse = (a, b, middle - a * (middle + x) - b * (middle + y), c, d, middle - c * (middle + x) - d * (middle + y))
-    picture = Image.fromarray(digit).transform((28, 28), Image.Transform.AFFINE, inverse, Image.Resampling.BILINEAR)
-    return np.asarray(picture)
+    image = Image.fromarray(digit).transform((28, 28), Image.Transform.AFFINE, inverse, Image.Resampling.BILINEAR)
+    return np.asarray(image)
 
 
 def _noisy(grey: Grey, noise: int, chance: Stream, round_: int) -> Grey:

@@ -37,7 +37,7 @@ class Network(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """One picture of the test: where it was taken, what it shows, and what it was taken for."""
+    """One image of the test: where it was taken, what it shows, and what it was taken for."""
 
     place: Place
     noise: float
@@ -51,7 +51,7 @@ class Answered:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What was measured here and now, beside what the card says; ``answered`` are the pictures in the confusion."""
+    """What was measured here and now, beside what the card says; ``answered`` are the images in the confusion."""
 
     card: Card
     measured: Measured
@@ -66,7 +66,7 @@ def evaluate(name: str) -> Evaluation:
 
 
 def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...]]:
-    """The whole test of ``task``, and the pictures that its accuracy counts."""
+    """The whole test of ``task``, and the images that its accuracy counts."""
     with Viewer() as viewer:
         answered = tuple(_accuracy(task, network, viewer))
         curves = tuple(_curves(task, network, viewer))

@@ -1,4 +1,4 @@
-"""What a packaged classifier is for: the pictures it is trained on, and the places where it is tested.
+"""What a packaged classifier is for: the images it is trained on, and the places where it is tested.
 
 The tasks themselves are in ``shapes.py`` and ``digits.py``; all are trained and measured by the same code.
 """

@@ -59,7 +59,7 @@ class Viewer:
     def look(self, place: Place, shift: Shift, seed: int = 0) -> Grey:
         """The grey focus of the left light sensor, shape (14, 14)."""
         pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
-        camera = self._cameras.camera(_ground(place).picture)
+        camera = self._cameras.camera(_ground(place).pixels)
         world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, Chain())
         return focus(world.images()[0])
 

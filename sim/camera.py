@@ -26,7 +26,7 @@ _TILE = 128
 
 
 class LightCamera(Protocol):
-    """Sees windows of ``side`` x ``side`` pixels whose upper left pixel is (column, row) of the floor picture."""
+    """Sees windows of ``side`` x ``side`` pixels whose upper left pixel is (column, row) of the floor image."""
 
     def window(self, column: int, row: int, side: int) -> Bytes:
         """RGB, shape (side, side, 3), top row first; black outside the floor."""
@@ -54,8 +54,8 @@ def _orthographic(half: float, shift: float) -> tuple[float, ...]:
 class BulletCamera:
     """The reference: every window is one image taken by PyBullet's software renderer of the textured floor."""
 
-    def __init__(self, picture: Bytes) -> None:
-        """``picture`` has shape (1143, 2362, 3), row 0 at the top."""
+    def __init__(self, pixels: Bytes) -> None:
+        """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
         self._client = Client()
         self._masks: dict[int, NDArray[np.bool_]] = {}
         width, height = (WIDTH + 2 * _PAD) * _METRE, (HEIGHT + 2 * _PAD) * _METRE
@@ -71,7 +71,7 @@ class BulletCamera:
             physicsClientId=self._client.id,
         )
         body = pb.createMultiBody(0, -1, shape, physicsClientId=self._client.id)
-        padded = np.pad(picture, ((_PAD, _PAD), (_PAD, _PAD), (0, 0)))
+        padded = np.pad(pixels, ((_PAD, _PAD), (_PAD, _PAD), (0, 0)))
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "floor.bmp"
             Image.fromarray(padded).save(file)
@@ -133,11 +133,11 @@ class CachedCamera:
     Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track.
     """
 
-    def __init__(self, picture: Bytes) -> None:
-        """``picture`` has shape (1143, 2362, 3), row 0 at the top."""
-        self._picture = picture
+    def __init__(self, pixels: Bytes) -> None:
+        """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
+        self._pixels = pixels
         self._camera: BulletCamera | None = None
-        self._pixels: dict[tuple[int, int, int], Bytes] = {}
+        self._tiles: dict[tuple[int, int, int], Bytes] = {}
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
     def close(self) -> None:
@@ -167,11 +167,11 @@ class CachedCamera:
 
     def _tile(self, tile_column: int, tile_row: int, side: int) -> Bytes:
         key = (tile_column, tile_row, side)
-        tile = self._pixels.get(key)
+        tile = self._tiles.get(key)
         if tile is None:
             if self._camera is None:
-                self._camera = BulletCamera(self._picture)
-            tile = self._pixels[key] = self._camera.window(tile_column * _TILE, tile_row * _TILE, _TILE + side)
+                self._camera = BulletCamera(self._pixels)
+            tile = self._tiles[key] = self._camera.window(tile_column * _TILE, tile_row * _TILE, _TILE + side)
         return tile
 
 
@@ -190,23 +190,23 @@ def _disc_sums(tile: Bytes, side: int) -> memoryview:
 
 
 class Cameras:
-    """A few cached cameras, one a picture. Only the one used last keeps PyBullet; the oldest is dropped."""
+    """A few cached cameras, one an image. Only the one used last keeps PyBullet; the oldest is dropped."""
 
     def __init__(self, most: int = 3) -> None:
         """The tiles of each grow to 50 MB, once a robot has been everywhere on its floor."""
         self._most = most
-        # Keyed by identity: a picture that is held here cannot share its id with another.
+        # Keyed by identity: an image that is held here cannot share its id with another.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
-    def camera(self, picture: Bytes) -> CachedCamera:
-        """The camera over ``picture``, which must not change afterwards."""
-        held = self._cameras.pop(id(picture), None)
+    def camera(self, pixels: Bytes) -> CachedCamera:
+        """The camera over ``image``, which must not change afterwards."""
+        held = self._cameras.pop(id(pixels), None)
         self.close()
         if held is None:
             while len(self._cameras) >= self._most:
                 self._cameras.popitem(last=False)
-            held = picture, CachedCamera(picture)
-        self._cameras[id(picture)] = held
+            held = pixels, CachedCamera(pixels)
+        self._cameras[id(pixels)] = held
         return held[1]
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ class WorldSpec:
     """What the robot is put into."""
 
     background: str = "Empty_Map"
-    picture: bytes | None = None  # a floor picture of the instructor's own, as the bytes of the file
+    image: bytes | None = None  # a floor image of the instructor's own, as the bytes of the file
     labels: bool = True
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
     robot: str = "Default_Robot"
@@ -80,9 +80,9 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """The submission trains a model: on the pictures of ``scenarios``, to name those of all others.
+    """The submission trains a model: on the images of ``scenarios``, to name those of all others.
 
-    ``function`` is the student's ``train(images, labels)``; ``image`` says what of a picture it is given.
+    ``function`` is the student's ``train(images, labels)``; ``image`` says what of an image it is given.
     """
 
     scenarios: tuple[str, ...]

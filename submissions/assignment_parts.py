@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_picture, names
+from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, names
 from sim.errors import UsageError
 from sim.recording import Pose
 from sim.robot import usual_robot
@@ -44,7 +44,7 @@ T = TypeVar("T", bound=BaseModel)
 
 _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
-_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 _LISTS_OF_TEXTS = {"equals", "starts_with", "contains", "in_order", "to", "to_starts_with", "scenarios", "truth"}
 
@@ -131,17 +131,17 @@ def _ground(table: WorldTable, files: Files, problems: Problems) -> Floor | None
     try:
         if name in names():
             return floor(name, labels=table.labels)
-        if name.lower().endswith(_PICTURE_SUFFIXES) and name in files:
-            return floor_from_picture(name, files[name])
+        if name.lower().endswith(_IMAGE_SUFFIXES) and name in files:
+            return floor_from_image(name, files[name])
     except UsageError as error:
-        problems.add(place, f"{str(error).rstrip('.')}, expected a picture that can be used")
+        problems.add(place, f"{str(error).rstrip('.')}, expected an image that can be used")
         return None
-    if name.lower().endswith(_PICTURE_SUFFIXES):
-        problems.add(place, f'background is "{name[:60]}", expected a picture beside this file')
+    if name.lower().endswith(_IMAGE_SUFFIXES):
+        problems.add(place, f'background is "{name[:60]}", expected an image beside this file')
         return None
     hint = did_you_mean(name, names()) or f"; there are {', '.join(names())}"
     problems.add(
-        place, f'background is "{name[:60]}", expected a background or a picture (.png, .jpg) beside this file{hint}'
+        place, f'background is "{name[:60]}", expected a background or an image (.png, .jpg) beside this file{hint}'
     )
     return None
 

@@ -98,7 +98,7 @@ def checked_training(
     hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
     for number, name in enumerate(table.scenarios):
         if name in hidden:
-            sentence = f'scenarios names "{name[:60]}", which is not visible, expected one whose pictures may be told'
+            sentence = f'scenarios names "{name[:60]}", which is not visible, expected one whose images may be told'
             problems.add(("training", "scenarios", number), sentence)
         if name not in ids:
             problems.add(
@@ -107,11 +107,11 @@ def checked_training(
             )
     if ids and not set(ids) - set(table.scenarios):
         problems.add(
-            ("training", "scenarios"), "scenarios names every scenario, expected one whose pictures are not trained on"
+            ("training", "scenarios"), "scenarios names every scenario, expected one whose images are not trained on"
         )
     if ground is not None and not label_names(ground.name):
         problems.add(
-            ("training",), f"the pictures of {ground.name} have no labels to train with, expected a floor that has"
+            ("training",), f"the images of {ground.name} have no labels to train with, expected a floor that has"
         )
     return Training(table.scenarios, table.function, table.image)
 

@@ -68,7 +68,7 @@ def line_follower_recording(count: int = 300, background: str = "Lollipop", star
     left_degrees = right_degrees = 0.0
     lights: list[tuple[list[int], list[int]]] = []
     for _ in range(count):
-        sums = [_sensor(plan.picture, Pose(x, y, heading), side)[MASK].sum(axis=0).tolist() for side in (-20, 20)]
+        sums = [_sensor(plan.pixels, Pose(x, y, heading), side)[MASK].sum(axis=0).tolist() for side in (-20, 20)]
         error = (sums[0][0] - sums[1][0]) / 305 / 255
         left, right = 9.0 + 7.0 * error, 9.0 - 7.0 * error
         left_degrees, right_degrees = left_degrees + left, right_degrees + right
@@ -149,7 +149,7 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
         criteria=(
             CriterionResult(
                 "names-the-right-shape", "Names the right shape", Decimal(right), Decimal(6),
-                f"{right} of 6 pictures were named rightly; the {SHAPES[wrong]} was taken for a diamond.",
+                f"{right} of 6 images were named rightly; the {SHAPES[wrong]} was taken for a diamond.",
                 evidence=tuple(Evidence(index, index != wrong, "") for index in range(6)),
                 accuracy=accuracy, predictions=predictions,
             ),
@@ -272,13 +272,13 @@ def hostile_grade() -> Grade:
 
 def _shape_trial(index: int, wrong: int) -> TrialResult:
     pose = Pose(200.0 + 80 * index, 900.0, 0.0)
-    picture = floor("Simple_Shapes").picture
-    left, right = (_rgba(_sensor(picture, pose, side)) for side in (-20, 20))
+    pixels = floor("Simple_Shapes").pixels
+    left, right = (_rgba(_sensor(pixels, pose, side)) for side in (-20, 20))
     answer = "diamond" if index == wrong else SHAPES[index]
     image = Image(0.0, 0, pose, left, right, 0, SHAPES[index])
     count = 94
     still = np.ones(count)
-    sums = [_sensor(picture, pose, side)[MASK].sum(axis=0) for side in (-20, 20)]
+    sums = [_sensor(pixels, pose, side)[MASK].sum(axis=0) for side in (-20, 20)]
     ticks = Ticks(
         x=pose.x * still,
         y=pose.y * still,
@@ -318,14 +318,14 @@ def _shape_trial(index: int, wrong: int) -> TrialResult:
     return TrialResult("each-shape", index, 1000 + index, 0.0, 0.0, "visible", recording)
 
 
-def _sensor(picture: np.ndarray, pose: Pose, offset: float) -> np.ndarray:
+def _sensor(pixels: np.ndarray, pose: Pose, offset: float) -> np.ndarray:
     """The 20 x 20 pixels under a light sensor ``offset`` mm to the right of the middle, 30 mm in front."""
     angle = math.radians(pose.heading - 90)
     x = pose.x + math.cos(angle) * offset - math.sin(angle) * 30
     y = pose.y + math.sin(angle) * offset + math.cos(angle) * 30
     window = np.zeros((20, 20, 3), dtype=np.int64)
     top, left = int(1143 - y - 10), int(x - 10)
-    part = picture[max(0, top) : max(0, top + 20), max(0, left) : max(0, left + 20)]
+    part = pixels[max(0, top) : max(0, top + 20), max(0, left) : max(0, left + 20)]
     window[: part.shape[0], : part.shape[1]] = part
     return window
 

@@ -243,7 +243,7 @@ check = "pose"
         (HEAD + SCENARIO + FINISHES.replace('check = "finishes"\n', ""), 6, "check is missing"),
         (HEAD + SCENARIO + FINISHES + 'id = "e"\n' + FINISHES + 'id = "e"\n', 15, "id of an earlier criterion"),
         (HEAD + '[world]\nbackground = "Looop"\n' + SCENARIO + FINISHES, 4, 'did you mean "Loop"?'),
-        (HEAD + '[world]\nbackground = "mine.png"\n' + SCENARIO + FINISHES, 4, "picture beside this file"),
+        (HEAD + '[world]\nbackground = "mine.png"\n' + SCENARIO + FINISHES, 4, "image beside this file"),
         (HEAD + '[world]\nobstacles = "Post"\n' + SCENARIO + FINISHES, 4, "Central_post"),
         (HEAD + "[world]\nobstacles = [[1, 2, 3]]\n" + SCENARIO + FINISHES, 4, "[x, y, width, height]"),
         (HEAD + 'given_models = { "n.joblib" = "shape" }\n' + SCENARIO + FINISHES, 3, 'did you mean "shapes"?'),

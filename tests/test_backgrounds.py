@@ -34,14 +34,14 @@ def sensor_mean(floor: str, pose: tuple[float, float, float], sideways: float) -
     column = math.trunc(cosine * sideways - sine * 30 + x - 10)
     row = math.trunc(-(sine * sideways + cosine * 30) + (1143 - y) - 10)
     rows, columns = np.mgrid[0:20, 0:20]
-    window = backgrounds.floor(floor).picture[row : row + 20, column : column + 20]
+    window = backgrounds.floor(floor).pixels[row : row + 20, column : column + 20]
     mean: NDArray[np.float64] = window[(rows - 10) ** 2 + (columns - 10) ** 2 < 100].mean(axis=0)
     return mean
 
 
 @pytest.mark.parametrize(("name", "check_sum"), CHECK_SUMS.items())
 def test_redrawn_bit_for_bit(name: str, check_sum: str) -> None:
-    assert hashlib.sha256(backgrounds.floor(name).picture.tobytes()).hexdigest().startswith(check_sum)
+    assert hashlib.sha256(backgrounds.floor(name).pixels.tobytes()).hexdigest().startswith(check_sum)
 
 
 @pytest.mark.parametrize(
@@ -92,12 +92,12 @@ def test_light_sensors_read_what_they_read_in_the_original(
     ],
 )
 def test_colour_at_a_place(name: str, column: int, row: int, colour: tuple[int, int, int]) -> None:
-    assert tuple(backgrounds.floor(name).picture[row, column]) == colour
+    assert tuple(backgrounds.floor(name).pixels[row, column]) == colour
 
 
 def test_lines_of_the_line_following_test_are_twenty_wide_and_start_where_the_robot_does() -> None:
     floor = backgrounds.floor("Line_Following_Test")
-    darkness = 1 - floor.picture[1090, :, 0] / 255.0
+    darkness = 1 - floor.pixels[1090, :, 0] / 255.0
     starts = [141, 440, 771, 1076, 1453, 1820, 2137]
     for start in starts:
         near = darkness[start - 25 : start + 26]
@@ -110,9 +110,9 @@ def test_lines_of_the_line_following_test_are_twenty_wide_and_start_where_the_ro
 @pytest.mark.parametrize("name", backgrounds.names())
 def test_every_floor_is_whole_and_cannot_be_changed(name: str) -> None:
     floor = backgrounds.floor(name)
-    assert floor.picture.shape == (1143, 2362, 3)
-    assert floor.picture.dtype == np.uint8
-    assert not floor.picture.flags.writeable
+    assert floor.pixels.shape == (1143, 2362, 3)
+    assert floor.pixels.dtype == np.uint8
+    assert not floor.pixels.flags.writeable
     assert 0 <= floor.default_pose.x <= 2362
     assert 0 <= floor.default_pose.y <= 1143
     assert floor is backgrounds.floor(name)
@@ -141,13 +141,13 @@ def test_each_label_lies_over_its_shape() -> None:
     floor = backgrounds.floor("Simple_Shapes")
     for label in floor.labels:
         top, left = 1143 - int(label.y + label.height), int(label.x)
-        view = floor.picture[top : top + 20, left : left + 20, 0]
+        view = floor.pixels[top : top + 20, left : left + 20, 0]
         assert 49 <= (view == 0).sum() <= 60, label
 
 
 def test_without_labels_only_the_grey_patches_are_missing() -> None:
-    with_labels = backgrounds.floor("Simple_Shapes").picture
-    without = backgrounds.floor("Simple_Shapes", labels=False).picture
+    with_labels = backgrounds.floor("Simple_Shapes").pixels
+    without = backgrounds.floor("Simple_Shapes", labels=False).pixels
     rows, columns = np.nonzero((with_labels != without).any(axis=2))
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (251, 275, 221, 639)
     assert (without[240:300] == 255).all()
@@ -164,7 +164,7 @@ def test_an_unknown_name_is_refused_with_the_nearest(wrong: str, near: str) -> N
         backgrounds.floor(wrong)
 
 
-def picture_bytes(size: tuple[int, int], form: str = "PNG", mode: str = "RGB") -> bytes:
+def image_bytes(size: tuple[int, int], form: str = "PNG", mode: str = "RGB") -> bytes:
     stream = io.BytesIO()
     Image.new(mode, size, 0).save(stream, form)
     return stream.getvalue()
@@ -173,20 +173,20 @@ def picture_bytes(size: tuple[int, int], form: str = "PNG", mode: str = "RGB") -
 @pytest.mark.parametrize(
     ("data", "complaint"),
     [
-        (picture_bytes((100, 50)), "100 x 50 pixels"),
-        (b"not a picture", "cannot be read"),
+        (image_bytes((100, 50)), "100 x 50 pixels"),
+        (b"not an image", "cannot be read"),
         (b"", "cannot be read"),
-        (picture_bytes((2362, 1143))[:300], "cannot be read"),
-        (picture_bytes((2362, 1143), "BMP"), "cannot be read"),
+        (image_bytes((2362, 1143))[:300], "cannot be read"),
+        (image_bytes((2362, 1143), "BMP"), "cannot be read"),
     ],
 )
-def test_a_bad_picture_is_refused(data: bytes, complaint: str) -> None:
+def test_a_bad_image_is_refused(data: bytes, complaint: str) -> None:
     with pytest.raises(UsageError, match=complaint):
-        backgrounds.floor_from_picture("mat", data)
+        backgrounds.floor_from_image("mat", data)
 
 
-def test_an_own_picture_becomes_a_floor_and_shows_white_where_it_is_clear() -> None:
-    floor = backgrounds.floor_from_picture("mat", picture_bytes((2362, 1143), mode="RGBA"))
-    assert (floor.picture == 255).all()
-    assert not floor.picture.flags.writeable
-    assert backgrounds.floor_from_picture("mat", picture_bytes((2362, 1143), "JPEG")).picture.max() <= 2
+def test_an_own_image_becomes_a_floor_and_shows_white_where_it_is_clear() -> None:
+    floor = backgrounds.floor_from_image("mat", image_bytes((2362, 1143), mode="RGBA"))
+    assert (floor.pixels == 255).all()
+    assert not floor.pixels.flags.writeable
+    assert backgrounds.floor_from_image("mat", image_bytes((2362, 1143), "JPEG")).pixels.max() <= 2

@@ -96,9 +96,9 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     shown = robomark(home, "show", found[1], "--report", tmp_path / "out")
     assert shown.status == 0
     assert "10" in shown.out
-    pictures = sorted((tmp_path / "out").glob("*.png"))
-    assert pictures
-    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+    images = sorted((tmp_path / "out").glob("*.png"))
+    assert images
+    assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
     assert (tmp_path / "out" / "reference.html").exists()
 
 

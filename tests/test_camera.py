@@ -12,10 +12,10 @@ MARGIN = 400
 
 
 @pytest.fixture(scope="module", params=["Lollipop", "noise"])
-def picture(request: pytest.FixtureRequest) -> np.ndarray:
+def pixels(request: pytest.FixtureRequest) -> np.ndarray:
     if request.param == "noise":
         return np.random.default_rng(7).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
-    return floor(request.param).picture
+    return floor(request.param).pixels
 
 
 def places(count: int) -> list[tuple[int, int, int]]:
@@ -25,9 +25,9 @@ def places(count: int) -> list[tuple[int, int, int]]:
     return [(int(x), int(y), (10, 20, 30)[i % 3]) for i, (x, y) in enumerate(zip(columns, rows, strict=True))]
 
 
-def test_no_pixel_differs_over_a_thousand_places(picture: np.ndarray) -> None:
-    padded = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)))
-    reference, cached = BulletCamera(picture), CachedCamera(picture)
+def test_no_pixel_differs_over_a_thousand_places(pixels: np.ndarray) -> None:
+    padded = np.pad(pixels, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)))
+    reference, cached = BulletCamera(pixels), CachedCamera(pixels)
     try:
         for column, row, side in places(1000):
             printed = padded[row + MARGIN : row + MARGIN + side, column + MARGIN : column + MARGIN + side]

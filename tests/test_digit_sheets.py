@@ -55,14 +55,14 @@ def graded(folder: Path, sheet: str, runner: TrialRunner, labels: str = "false")
 
 
 def shown(image: Image) -> bytes:
-    """The 14 x 14 grey levels in the middle of the left sensor's picture."""
+    """The 14 x 14 grey levels in the middle of the left sensor's image."""
     rgba = np.frombuffer(image.left, np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 4)
     return rgba[3:17, 3:17, 0].tobytes()
 
 
 def on_sheet(seed: int) -> bytes:
     """The digit that the robot at (400, 50, 90) has under its left sensor on sheet ``seed``."""
-    return floor("MNIST_Digits", seed=seed).picture[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
+    return floor("MNIST_Digits", seed=seed).pixels[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
 
 
 @pytest.mark.parametrize(("sheet", "seed"), [('"fixed"', 0), ("7", 7)])
@@ -90,12 +90,12 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
     recording = bare.trials[0].recording
     assert (recording.sheet, recording.patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
-    pictures = set()
+    images = set()
     for change in ({}, {"sheet": 0}, {"patches": True}):
         trial = replace(bare.trials[0], recording=replace(recording, images=(), messages=(), **change))
         drawn = draw_all(replace(bare, criteria=(), trials=(trial,)))
-        pictures.add(next(drawn[name] for name in drawn if name.startswith("path")))
-    assert len(pictures) == 3
+        images.add(next(drawn[name] for name in drawn if name.startswith("path")))
+    assert len(images) == 3
 
 
 def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(

@@ -110,7 +110,7 @@ def test_what_does_not_do_what_was_asked_gets_little(
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
 
 
-# Pictures
+# Images
 
 #: The middle of the left sensor, to the robot's right and ahead, as it is mounted.
 _LEFT = (-20.0, 30.0)
@@ -128,7 +128,7 @@ def _looking_at(x: float, y: float, heading: float) -> Pose:
 
 
 def _photographed(*seen: tuple[Pose, str, str], **parts: Any) -> Recording:
-    """Pictures from these poses: what each shows, and the answer."""
+    """Images from these poses: what each shows, and the answer."""
     images, messages = [], []
     for number, (pose, truth, answer) in enumerate(seen):
         t = number / 10
@@ -151,7 +151,7 @@ def test_one_pattern_from_many_headings_is_one_pattern(how: str, headings: range
     one = [(_looking_at(310, 920, heading), "square", "square") for heading in headings]
     result = judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*one))
     assert result.marks == 0
-    assert "pictures of 1 patterns, and 6 were expected" in result.message
+    assert "images of 1 patterns, and 6 were expected" in result.message
     six = [(_looking_at(230 + 80 * number, 920, 60 * number), "square", "square") for number in range(6)]
     assert judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*six)).marks == 4
 
@@ -178,14 +178,14 @@ def test_a_robot_may_not_turn_to_what_is_easier() -> None:
     start = _looking_at(310, 920, 0)
     turned = Pose(start.x, start.y, 180)
     run = _photographed((turned, "square", "square"), start=start)
-    near = criterion("classification", near_start=30, pictures="last")
+    near = criterion("classification", near_start=30, images="last")
     assert judged(near, run).marks == 0
     assert "the robot sent none from within 30 mm of where it started" in judged(near, run).message
     stayed = _photographed((_looking_at(318, 915, 15), "square", "square"), start=start)
     assert judged(near, stayed).marks == 4
 
 
-def test_sending_the_same_picture_again_counts_nothing() -> None:
+def test_sending_the_same_image_again_counts_nothing() -> None:
     """One that is known, a hundred times, made up for all that are not."""
     known = [(_looking_at(230, 920, heading), "square", "square") for heading in range(100)]
     other = [(_looking_at(310 + 80 * number, 920, 0), "diamond", "square") for number in range(3)]
@@ -197,7 +197,7 @@ def test_sending_the_same_picture_again_counts_nothing() -> None:
 
 
 def test_one_place_gives_one_image_whatever_the_noise() -> None:
-    """With noise no two pictures are the same, and standing still gave as many different ones as were asked for."""
+    """With noise no two images are the same, and standing still gave as many different ones as were asked for."""
     patch = np.zeros((20, 20, 4), np.uint8).tobytes()
 
     def collected(*places: float) -> Recording:

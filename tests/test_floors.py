@@ -19,14 +19,14 @@ PLACES = [(column, row) for row in range(11) for column in range(20)]
 DISC = np.fromfunction(lambda row, column: (row - 10) ** 2 + (column - 10) ** 2 < 100, (20, 20))
 
 
-def window(picture: NDArray[np.uint8], pose: tuple[float, float, float], sideways: float) -> NDArray[np.uint8]:
+def window(pixels: NDArray[np.uint8], pose: tuple[float, float, float], sideways: float) -> NDArray[np.uint8]:
     """The 20 x 20 window of a light sensor ``sideways`` mm right of the middle, as the camera cuts it."""
     x, y, heading = pose
     turn = math.radians(heading) - math.pi / 2
     cosine, sine = math.cos(turn), math.sin(turn)
     column = math.trunc(cosine * sideways - sine * 30 + x - 10)
     row = math.trunc(-(sine * sideways + cosine * 30) + (1143 - y) - 10)
-    return picture[row : row + 20, column : column + 20]
+    return pixels[row : row + 20, column : column + 20]
 
 
 def nominal(column: int, row: int) -> tuple[float, float, float]:
@@ -63,7 +63,7 @@ def test_every_digit_of_a_sheet_is_seen_whole_and_its_patch_decodes(name: str, s
     assert len(sheet.labels) == 220
     for column, row in PLACES:
         x, y, _ = pose = nominal(column, row)
-        left, right = window(sheet.picture, pose, -20), window(sheet.picture, pose, 20)
+        left, right = window(sheet.pixels, pose, -20), window(sheet.pixels, pose, 20)
         label = sheet.label_at(x - 20, y + 30)
         assert label is not None
         assert int(label) in known[left[3:17, 3:17, 0].tobytes()]
@@ -79,7 +79,7 @@ def test_outside_digits_and_patches_a_sheet_is_paper(name: str) -> None:
     for column, row in PLACES:
         paper[56 + 100 * row : 70 + 100 * row, 73 + 100 * column : 87 + 100 * column] = False
         paper[53 + 100 * row : 77 + 100 * row, 111 + 100 * column : 132 + 100 * column] = False
-    assert (backgrounds.floor(name).picture[paper] == SHEETS[name]).all()
+    assert (backgrounds.floor(name).pixels[paper] == SHEETS[name]).all()
 
 
 def test_a_sheet_without_patches_has_the_same_digits_and_labels() -> None:
@@ -87,15 +87,15 @@ def test_a_sheet_without_patches_has_the_same_digits_and_labels() -> None:
     assert bare.labels == marked.labels
     for column, row in PLACES:
         pose = nominal(column, row)
-        assert np.array_equal(window(bare.picture, pose, -20), window(marked.picture, pose, -20))
-        assert (window(bare.picture, pose, 20) == 255).all()
+        assert np.array_equal(window(bare.pixels, pose, -20), window(marked.pixels, pose, -20))
+        assert (window(bare.pixels, pose, 20) == 255).all()
 
 
 def test_a_seed_gives_the_same_sheet_again_and_another_seed_another() -> None:
     first, other = digits.draw_sheet(1, 255, patches=True), digits.draw_sheet(2, 255, patches=True)
     again = digits.draw_sheet(1, 255, patches=True)
     assert first.digits == again.digits
-    assert np.array_equal(first.picture, again.picture)
+    assert np.array_equal(first.pixels, again.pixels)
     assert sum(a != b for a, b in zip(first.digits, other.digits, strict=True)) > 150
     assert digits.draw_sheet(1, 0, patches=True).digits == first.digits
 
@@ -162,7 +162,7 @@ def test_obstacles_test_brings_its_obstacles_and_no_other_floor_does() -> None:
     ],
 )
 def test_colour_at_a_place(name: str, column: int, row: int, colour: tuple[int, int, int]) -> None:
-    assert tuple(backgrounds.floor(name).picture[row, column].tolist()) == colour
+    assert tuple(backgrounds.floor(name).pixels[row, column].tolist()) == colour
 
 
 @pytest.mark.parametrize(("box", "colour"), mats.WRO_2018_TARGETS)
@@ -170,31 +170,31 @@ def test_each_target_of_wro_2018_has_three_grey_cells(
     box: tuple[int, int, int, int], colour: tuple[int, int, int]
 ) -> None:
     left, top, right, bottom = box
-    picture = backgrounds.floor("WRO_2018_Regular_Junior").picture[top : bottom + 1, left : right + 1]
-    cells = (picture == (201, 200, 199)).all(axis=2)
+    pixels = backgrounds.floor("WRO_2018_Regular_Junior").pixels[top : bottom + 1, left : right + 1]
+    cells = (pixels == (201, 200, 199)).all(axis=2)
     assert cells.sum() == pytest.approx(3 * 60 * 60, rel=0.05)
     along = cells.any(axis=0 if right - left > bottom - top else 1)
     assert np.count_nonzero(np.diff(along.astype(int)) == 1) == 3
-    assert ((picture == colour).all(axis=2) | cells).mean() > 0.97
+    assert ((pixels == colour).all(axis=2) | cells).mean() > 0.97
 
 
 def test_bars_of_into_orbit_are_black_with_a_white_rim_and_nothing_beyond() -> None:
-    picture = backgrounds.floor("FLL_2018_Into_Orbit").picture
+    pixels = backgrounds.floor("FLL_2018_Into_Orbit").pixels
     rows, columns = np.mgrid[0:1143, 0:2362] + 0.5
-    nearest = np.full(picture.shape[:2], np.inf)
+    nearest = np.full(pixels.shape[:2], np.inf)
     for (x1, y1), (x2, y2), radius in mats.ORBIT_BARS:
         dx, dy = x2 - x1, y2 - y1
         share = np.clip(((columns - x1) * dx + (rows - y1) * dy) / (dx * dx + dy * dy), 0, 1)
         distance = np.hypot(columns - x1 - share * dx, rows - y1 - share * dy)
         nearest = np.minimum(nearest, distance - radius)
-    assert (picture[nearest < -12] == 0).all()
-    assert (picture[(nearest > -8) & (nearest < -2)] == 255).all()
-    assert not (picture[nearest > 2] == 0).all(axis=1).any()
+    assert (pixels[nearest < -12] == 0).all()
+    assert (pixels[(nearest > -8) & (nearest < -2)] == 255).all()
+    assert not (pixels[nearest > 2] == 0).all(axis=1).any()
 
 
 def test_the_asteroid_fills_its_box_and_keeps_within() -> None:
-    picture = backgrounds.floor("FLL_2018_Into_Orbit").picture
-    rows, columns = np.nonzero((picture == (116, 96, 80)).all(axis=2))
+    pixels = backgrounds.floor("FLL_2018_Into_Orbit").pixels
+    rows, columns = np.nonzero((pixels == (116, 96, 80)).all(axis=2))
     assert (columns.min(), rows.min(), columns.max(), rows.max()) == pytest.approx((486, 16, 926, 600), abs=3)
 
 
@@ -205,20 +205,20 @@ def test_thruxton_is_a_closed_loop_of_the_listed_length_width_and_extent() -> No
     length = sum(math.dist(a, b) for a, b in zip(track.points, track.points[1:], strict=False))
     assert length == pytest.approx(3850, rel=0.005)
     signed = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(track.points, track.points[1:], strict=False))
-    assert signed > 0  # y points down, so clockwise on the picture
-    picture = backgrounds.floor("Thruxton_Circuit").picture
-    black = (picture == 0).all(axis=2)
+    assert signed > 0  # y points down, so clockwise on the image
+    pixels = backgrounds.floor("Thruxton_Circuit").pixels
+    black = (pixels == 0).all(axis=2)
     bar = np.hypot(np.arange(2362)[None, :] - 423, np.arange(1143)[:, None] - 848) < 150
     assert all(black[int(y), int(x)] for x, y in track.points if not bar[int(y), int(x)])
     rows, columns = np.nonzero(black[:, 600:])
     assert (rows.min(), rows.max(), columns.max() + 600) == pytest.approx((198, 994, 1895), abs=6)
     outside_the_bar = length - 25
-    assert (1 - picture[:, :, 1] / 255.0)[~bar].sum() == pytest.approx(14 * outside_the_bar, rel=0.12)
+    assert (1 - pixels[:, :, 1] / 255.0)[~bar].sum() == pytest.approx(14 * outside_the_bar, rel=0.12)
 
 
 def test_the_start_bar_of_thruxton_has_its_size_and_slant() -> None:
-    picture = backgrounds.floor("Thruxton_Circuit").picture
-    rows, columns = np.nonzero((picture == 192).all(axis=2))
+    pixels = backgrounds.floor("Thruxton_Circuit").pixels
+    rows, columns = np.nonzero((pixels == 192).all(axis=2))
     assert len(rows) == pytest.approx(258 * 25, rel=0.08)
     assert (columns.mean(), rows.mean()) == pytest.approx((423.2, 847.9), abs=4)
     spread = np.cov(columns, -rows)
@@ -227,5 +227,5 @@ def test_the_start_bar_of_thruxton_has_its_size_and_slant() -> None:
 
 
 def test_junction_markers_are_squares_of_twenty_five() -> None:
-    green = (backgrounds.floor("Junction_Handling_Test").picture == (0, 179, 0)).all(axis=2)
+    green = (backgrounds.floor("Junction_Handling_Test").pixels == (0, 179, 0)).all(axis=2)
     assert green.sum() == 9 * 25 * 25

@@ -158,7 +158,7 @@ class _Sandboxes:
 @pytest.fixture(scope="module")
 def ground() -> Iterator[tuple[Arena, Any]]:
     cameras, arena = Cameras(), Arena(())
-    yield arena, cameras.camera(floor("Empty_Map").picture)
+    yield arena, cameras.camera(floor("Empty_Map").pixels)
     arena.close()
     cameras.close()
 

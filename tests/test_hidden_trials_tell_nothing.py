@@ -117,7 +117,7 @@ TRIES = """try:
 except OSError:
     pass"""
 PROGRAMS = {
-    "the number of pictures": "for _ in range(1 + seen):\n    print('IMG_DATA')\n    time.sleep(0.2)",
+    "the number of images": "for _ in range(1 + seen):\n    print('IMG_DATA')\n    time.sleep(0.2)",
     "the number of messages": "for _ in range(seen):\n    print('PY::x')\n    time.sleep(0.1)",
     "the text of a message": "print('PY::' + str(seen))\ntime.sleep(1)",
     "the text of an error": "raise ValueError(seen)",
@@ -199,11 +199,11 @@ def test_what_the_cells_after_a_hidden_run_do_is_not_told(runner: TrialRunner, a
     told_apart(runner, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
 
 
-#: Trained on visible pictures, asked about visible and hidden ones in one process.
+#: Trained on visible images, asked about visible and hidden ones in one process.
 MODELS = {
     "what the model prints": "print(seen)",
     "what the model raises": "1 / (seen % 2)",
-    "what the model calls the pictures it is shown next": "self.said = str(seen)",
+    "what the model calls the images it is shown next": "self.said = str(seen)",
     "computing on": "[0 for _ in iter(lambda: seen % 2, 0)]",
 }
 MODEL = """
@@ -230,7 +230,7 @@ def training() -> Assignment:
 
 
 @pytest.mark.parametrize("channel", MODELS)
-def test_what_a_model_does_with_hidden_pictures_is_not_told(
+def test_what_a_model_does_with_hidden_images_is_not_told(
     runner: TrialRunner, training: Assignment, channel: str
 ) -> None:
     model = Source("responder.py", MODEL.replace("{}", MODELS[channel]))

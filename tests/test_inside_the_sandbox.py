@@ -1,4 +1,4 @@
-"""What is taught works inside the sandbox: learning, saved models, tables, pictures, ``eval``, late imports."""
+"""What is taught works inside the sandbox: learning, saved models, tables, images, ``eval``, late imports."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def empty(sandboxes: Sandboxes) -> Iterator[Path]:
 
 @pytest.fixture
 def folder(empty: Path) -> Path:
-    """What a submission brings: models saved in several ways, a table and pictures."""
+    """What a submission brings: models saved in several ways, a table and images."""
     chance = np.random.default_rng(1)
     values = chance.normal(size=(60, 4))
     model = RandomForestClassifier(5, n_jobs=2, random_state=1).fit(values, values[:, 0] > 0)
@@ -70,7 +70,7 @@ def folder(empty: Path) -> Path:
     np.save(empty / "array.npy", values)
     pd.DataFrame({"a": [1, 2], "b": [3.5, 4.5]}).to_csv(empty / "table.csv", index=False)
     for kind in ("png", "jpg", "gif", "bmp"):
-        Image.new("RGB", (20, 10), "red").save(empty / f"picture.{kind}")
+        Image.new("RGB", (20, 10), "red").save(empty / f"image.{kind}")
     return empty
 
 
@@ -108,10 +108,10 @@ def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
         ),
         pytest.param(
             "from PIL import Image, ImageFilter\nfor kind in ('png', 'jpg', 'gif', 'bmp'):\n"
-            "    picture = Image.open(f'picture.{kind}').convert('L').resize((4, 4)).filter(ImageFilter.BLUR)\n"
-            "    picture.save('mine.' + kind); print(picture.size)",
+            "    image = Image.open(f'image.{kind}').convert('L').resize((4, 4)).filter(ImageFilter.BLUR)\n"
+            "    image.save('mine.' + kind); print(image.size)",
             ["(4, 4)"] * 4,
-            id="pictures",
+            id="images",
         ),
         pytest.param(
             "print(eval('{\"shape\": [1, 2]}')['shape'], eval('2 ** 10'))\nexec('x = 5')\nprint(x)",

@@ -18,7 +18,7 @@ from service.grading.judging.answers import NOTHING, at_path, parsed, same_value
 from service.grading.judging.judge import judge
 from service.grading.judging.marks import Over, earned, share_of, share_of_accuracy
 from service.grading.judging.outcome import Outcome
-from service.grading.judging.truths import NO_PICTURE
+from service.grading.judging.truths import NO_IMAGE
 from sim.errors import HostError
 from sim.recording import Fault, Image, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
@@ -334,7 +334,7 @@ def test_end_pose(keys: dict[str, Any], end: Pose, passes: bool) -> None:
 # classification
 
 
-def pictured(truth: str | None, answer: str | None, *, spoken: str = "", count: int = 1) -> Recording:
+def imaged(truth: str | None, answer: str | None, *, spoken: str = "", count: int = 1) -> Recording:
     messages = talk(*[("IMG_DATA::{}", answer)] * count)
     asked = [index for index, message in enumerate(messages) if message.sender == "robot"]
     images = tuple(
@@ -365,7 +365,7 @@ def pictured(truth: str | None, answer: str | None, *, spoken: str = "", count: 
 )
 def test_what_an_answer_names(answer: str | None, right: bool) -> None:
     asked = criterion("classification", answer="message.shape", aliases={"upwards facing triangle": ["up triangle"]})
-    result = judged(asked, pictured("upwards facing triangle", answer))
+    result = judged(asked, imaged("upwards facing triangle", answer))
     assert result.marks == (4 if right else 0), result.message
     assert result.accuracy is not None
     assert result.accuracy.n == 1
@@ -374,11 +374,11 @@ def test_what_an_answer_names(answer: str | None, right: bool) -> None:
 
 def test_classification_pools_and_counts_silence_as_wrong() -> None:
     runs = [
-        pictured(SQUARE, "square"),
-        pictured(SQUARE, "diamond"),
-        pictured(DIAMOND, "square or diamond"),
+        imaged(SQUARE, "square"),
+        imaged(SQUARE, "diamond"),
+        imaged(DIAMOND, "square or diamond"),
         recorded(background="Simple_Shapes"),
-        pictured(None, "square"),
+        imaged(None, "square"),
     ]
     result = judged(criterion("classification"), *runs)
     assert result.marks == Decimal("0.80")
@@ -388,32 +388,32 @@ def test_classification_pools_and_counts_silence_as_wrong() -> None:
         (SQUARE, SQUARE): 1,
         (SQUARE, DIAMOND): 1,
         (DIAMOND, None): 1,
-        (NO_PICTURE, None): 2,
+        (NO_IMAGE, None): 2,
     }
     assert len(result.predictions) == 3
-    assert 'The picture showed "square", but it was taken for "diamond".' in result.message
+    assert 'The image showed "square", but it was taken for "diamond".' in result.message
     assert [evidence.passed for evidence in result.evidence] == [True, False, False, False, False]
 
 
-@pytest.mark.parametrize(("pictures", "count"), [("all", 3), ("first", 1), ("last", 1)])
-def test_which_pictures_count(pictures: str, count: int) -> None:
-    result = judged(criterion("classification", pictures=pictures), pictured(SQUARE, "square", count=3))
+@pytest.mark.parametrize(("images", "count"), [("all", 3), ("first", 1), ("last", 1)])
+def test_which_images_count(images: str, count: int) -> None:
+    result = judged(criterion("classification", images=images), imaged(SQUARE, "square", count=3))
     assert len(result.predictions) == count
 
 
 def test_truth_told_for_each_pose() -> None:
     asked = criterion("classification", truth=["Three", "four"], aliases={"Three": ["3"], "four": ["4"]})
     poses = (START, Pose(200, 800, 0))
-    result = judged(asked, pictured(None, "it is a 3"), pictured(None, "3"), poses=poses)
+    result = judged(asked, imaged(None, "it is a 3"), imaged(None, "3"), poses=poses)
     assert result.marks == 2
-    silent = judged(asked, pictured(None, "3"), recorded(background="Simple_Shapes"), poses=poses)
+    silent = judged(asked, imaged(None, "3"), recorded(background="Simple_Shapes"), poses=poses)
     assert ("four", None, 1) in (silent.accuracy.confusion if silent.accuracy else ())
 
 
 def test_what_the_robot_says_can_be_the_answer() -> None:
     asked = criterion("classification", answer_from="speech")
-    assert judged(asked, pictured(SQUARE, None, spoken="Is that a square")).marks == 4
-    assert "said nothing after it" in judged(asked, pictured(SQUARE, "square")).message
+    assert judged(asked, imaged(SQUARE, None, spoken="Is that a square")).marks == 4
+    assert "said nothing after it" in judged(asked, imaged(SQUARE, "square")).message
 
 
 @pytest.mark.parametrize(
@@ -430,7 +430,7 @@ def test_wilson_interval(right: int, count: int, low: float, high: float) -> Non
 
 def test_hidden_trials_are_counted_but_not_told() -> None:
     for asked in (criterion("says", equals="secret"), criterion("classification")):
-        result = judged(asked, pictured(SQUARE, "diamond", spoken="no"), recorded(), visibility="hidden")
+        result = judged(asked, imaged(SQUARE, "diamond", spoken="no"), recorded(), visibility="hidden")
         assert "scenario s" in result.message  # for staff
         assert result.shown == Shown("Marked in trials that are not shown.")
 

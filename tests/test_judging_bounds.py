@@ -371,7 +371,7 @@ def test_a_rank_of_what_could_not_be_judged_is_not_judged_either(monkeypatch: py
 
 
 def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Through a process too, and the pictures are the recordings' own."""
+    """Through a process too, and the images are the recordings' own."""
     messages = (Message(0, "robot", "IMG_DATA::{}", 0), Message(0, "responder", "a", 0.1, 0))
     images = tuple(Image(n / 2, 15 * n, START, bytes([n]) * 1600, bytes(1600), 0, "a") for n in range(3))
     run = recorded(messages=messages, images=images)

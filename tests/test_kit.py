@@ -52,7 +52,7 @@ def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
 
 def raw(column: int, row: int) -> str:
     """The numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
-    window = backgrounds.floor("Simple_Shapes").picture[row : row + 20, column : column + 20]
+    window = backgrounds.floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
     rows, columns = np.mgrid[0:20, 0:20]
     seen = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
     rgb = np.where(seen[:, :, None], window, np.array([245, 226, 225]))

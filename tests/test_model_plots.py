@@ -44,7 +44,7 @@ def texts(figure: Figure) -> list[str]:
 def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -> None:
     figure = draw_evaluation_confusion(evaluation)
     low, high = Tally(15, 18).interval
-    assert f"accuracy 0.833, 95 % interval {low:.3f} to {high:.3f}, n = 18 pictures" in texts(figure)
+    assert f"accuracy 0.833, 95 % interval {low:.3f} to {high:.3f}, n = 18 images" in texts(figure)
     bold = [text for text in figure.axes[0].texts if str(text.get_fontproperties().get_file()).endswith("-Bold.ttf")]
     assert sorted(int(text.get_text()) for text in bold) == [1, 1, 2, 2, 3, 3, 3, 3]
 
@@ -52,16 +52,16 @@ def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -
 def test_misread_images_stand_beside_right_ones_each_kind_first(evaluation: Evaluation) -> None:
     figure = draw_misread(evaluation)
     shown = texts(figure)
-    assert "all 3 misread, of n = 18 pictures; 14 × 14 grey pixels" in shown
+    assert "all 3 misread, of n = 18 images; 14 × 14 grey pixels" in shown
     assert [text for text in shown if text.startswith("✗")] == [
         "✗ read as diamond",
         "✗ read as right facing triangle",
         "✗ read as diamond",
     ]
-    pictures = [np.asarray(image.get_array()) for image in figure.axes[0].images]
-    assert len(pictures) == 9
+    images = [np.asarray(image.get_array()) for image in figure.axes[0].images]
+    assert len(images) == 9
     right = {each.grey.tobytes(): each.place.label for each in evaluation.answered if each.right}
-    assert [right.get(picture.tobytes()) for picture in pictures] == [None, 0, 5, None, 5, 1, None, 0, 5]
+    assert [right.get(pixels.tobytes()) for pixels in images] == [None, 0, 5, None, 5, 1, None, 0, 5]
 
 
 def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: Evaluation) -> None:
@@ -72,7 +72,7 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
         "offset in y, mm",
         "heading, degrees",
     ]
-    assert texts(figure).count("n = 6 to 120 pictures a point") == 4
+    assert texts(figure).count("n = 6 to 120 images a point") == 4
     line = figure.axes[1].lines[2]
     assert line.get_xdata().tolist() == list(evaluation.measured.curves[1].values)
 
@@ -82,15 +82,15 @@ def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation
     assert first == second
     assert set(first) == {"shapes-confusion.png", "shapes-misread.png", "shapes-robustness.png"}
     for data in first.values():
-        with Image.open(io.BytesIO(data)) as picture:
-            assert picture.width == 1040
+        with Image.open(io.BytesIO(data)) as pixels:
+            assert pixels.width == 1040
 
 
 def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
     curve = Curve("x", (3.0,), (0.5,), (0.2,), (0.8,), (12,))
     figure = draw_curves([Panel("delay", "seconds", (curve,), level=0.8)], "A curve")
     assert "asked for: 0.8" in texts(figure)
-    assert "n = 12 pictures a point" in texts(figure)
+    assert "n = 12 images a point" in texts(figure)
 
 
 def test_the_list_has_every_model_with_its_interval() -> None:

@@ -138,7 +138,7 @@ def test_training_images_are_what_the_sensor_would_see(
     assert any(np.array_equal(digits.seen(digit, paper, dx, dy), grey) for digit in own)
 
 
-def test_what_a_network_is_shown_of_a_picture() -> None:
+def test_what_a_network_is_shown_of_a_image() -> None:
     grey = np.full((14, 14), 50, np.uint8)
     grey[3, 4] = 200
     values = features(grey)

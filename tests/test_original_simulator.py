@@ -37,7 +37,7 @@ def test_drive(runner: TrialRunner, row: dict[str, Any]) -> None:
 @pytest.mark.parametrize("row", GOLDEN["light"], ids=lambda row: f"{row['background']} {row['pose']}")
 def test_light_sensors(row: dict[str, Any]) -> None:
     ground = floor(row["background"])
-    arena, camera = Arena(), CachedCamera(ground.picture)
+    arena, camera = Arena(), CachedCamera(ground.pixels)
     try:
         world = World(robot("Default_Robot"), arena, camera, Pose(*row["pose"]), Noise(), 0, Chain())
         for sums, pixels, expected in zip(

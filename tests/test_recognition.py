@@ -1,4 +1,4 @@
-"""Recognition judged with recordings made by hand: truths, what becomes of pictures, and what it is worth."""
+"""Recognition judged with recordings made by hand: truths, what becomes of images, and what it is worth."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, 
 from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.per_class import class_scores
-from service.grading.judging.truths import NO_PICTURE
+from service.grading.judging.truths import NO_IMAGE
 from service.reports.audience import student_view
 from service.reports.recognition_table import recognition_tables
 from sim.backgrounds import SHAPES
@@ -62,7 +62,7 @@ def recorded(
 
 
 def talk(*exchanges: tuple[str | None, str | None]) -> Recording:
-    """A picture a second, 30 mm apart: what each shows, and the answer that arrives a tenth later."""
+    """An image a second, 30 mm apart: what each shows, and the answer that arrives a tenth later."""
     messages: list[Message] = []
     images = []
     for number, (truth, answer) in enumerate(exchanges):
@@ -87,7 +87,7 @@ def accuracy(result: CriterionResult) -> Accuracy:
     return result.accuracy
 
 
-# What becomes of a picture
+# What becomes of an image
 
 
 @pytest.mark.parametrize(
@@ -149,18 +149,18 @@ _TIMES = st.none() | st.floats(0, 12)
 _REPLIES = st.lists(
     st.tuples(_TEXTS, _TIMES, st.sampled_from(["", "lost", "duplicated", "malformed", "undelivered"])), max_size=4
 )
-_PICTURES = st.lists(
+_IMAGES = st.lists(
     st.tuples(st.floats(0, 2), st.sampled_from([None, "square", "diamond"]), _REPLIES, st.booleans()), max_size=7
 )
 
 
 @st.composite
 def recordings(draw: st.DrawFn) -> Recording:
-    """Any talk about pictures, in any order of arrival; faults at any time."""
+    """Any talk about images, in any order of arrival; faults at any time."""
     messages: list[Message] = []
     images = []
     t = 0.0
-    for wait, truth, replies, lost in draw(_PICTURES):
+    for wait, truth, replies, lost in draw(_IMAGES):
         t += wait
         images.append(Image(t, int(30 * t), Pose(100 + 10 * t, 800, 0), b"", b"", len(messages), truth))
         asked_at = len(messages)
@@ -176,7 +176,7 @@ def recordings(draw: st.DrawFn) -> Recording:
 @given(
     st.lists(recordings(), min_size=1, max_size=3),
     st.sampled_from(
-        [{}, {"pictures": "last"}, {"late": "wrong"}, {"each_pattern": "majority", "patterns": 2}, {"answer": "shape"}]
+        [{}, {"images": "last"}, {"late": "wrong"}, {"each_pattern": "majority", "patterns": 2}, {"answer": "shape"}]
     ),
 )
 def test_the_counts_add_up(played: list[Recording], keys: dict[str, Any]) -> None:
@@ -187,7 +187,7 @@ def test_the_counts_add_up(played: list[Recording], keys: dict[str, Any]) -> Non
     assert counts.sent == sum(len(recording.images) for recording in played)
     assert counts.sent == counts.answered + counts.late + counts.malformed + counts.unanswered
     assert found.n == counts.counted + counts.missing == sum(number for _, _, number in found.confusion)
-    assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_PICTURE)
+    assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_IMAGE)
     assert sum(score.shown for score in class_scores(found)) == found.n
     assert 0 <= found.low <= found.value <= found.high <= 1
     numbers = [int(word) for word in recognition_tables(_grade_of(result))[0].sums.split() if word.isdecimal()]
@@ -226,9 +226,9 @@ def test_the_instructors_places_can_be_the_truth() -> None:
     # The left sensor of a robot at (100, 800) that faces 0 degrees is at (130, 820).
     places = [[130, 820, "church"], [160, 828, "mill"], [400, 400, "inn"]]
     recording = talk((None, "a church"), (None, "the mill"), (None, "church"))
-    assert judged(asked(truth="places", places=places), recording).message.startswith("2 of 2 pictures named rightly")
+    assert judged(asked(truth="places", places=places), recording).message.startswith("2 of 2 images named rightly")
     near = judged(asked(truth="places", places=places, within=5), recording)
-    assert near.message.startswith("1 of 1 pictures")
+    assert near.message.startswith("1 of 1 images")
 
 
 def test_places_are_read_from_a_file(tmp_path: Path) -> None:
@@ -287,7 +287,7 @@ def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
     assert len(list(found.trials())) == 70
     (tmp_path / "assignment.toml").write_text(f"{shown}\n{training}".replace('"collected"', '"worse-and-worse"'))
     (tmp_path / "drive_over_shapes.py").write_text("")
-    with pytest.raises(AssignmentProblems, match="scenarios names every scenario, expected one whose pictures"):
+    with pytest.raises(AssignmentProblems, match="scenarios names every scenario, expected one whose images"):
         read_assignment(tmp_path)
 
 
@@ -329,7 +329,7 @@ def test_marks_by_steps(right: int, marks: str) -> None:
         ("majority", [None, None], False),
     ],
 )
-def test_pictures_of_one_pattern_are_one_answer(how: str, answers: list[str | None], named: bool) -> None:
+def test_images_of_one_pattern_are_one_answer(how: str, answers: list[str | None], named: bool) -> None:
     recording = talk(*[("square", answer) for answer in answers])
     close = tuple(replace(image, pose=Pose(100 + n, 800, 0)) for n, image in enumerate(recording.images))
     result = judged(asked(each_pattern=how), replace(recording, images=close))
@@ -339,23 +339,23 @@ def test_pictures_of_one_pattern_are_one_answer(how: str, answers: list[str | No
 
 
 def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
-    # 30 mm apart: the pictures before the gap are of one square, those after it of another.
+    # 30 mm apart: the images before the gap are of one square, those after it of another.
     recording = talk(("square", "square"), ("square", "square"), (None, "square"), ("square", "square"))
     assert accuracy(judged(asked(each_pattern="first"), recording)).n == 2
     result = judged(asked(each_pattern="first", patterns=4), recording)
     assert (accuracy(result).n, result.marks) == (4, 2)
-    assert "pictures of 2 patterns, and 4 were expected" in result.message
+    assert "images of 2 patterns, and 4 were expected" in result.message
 
 
-def test_pictures_taken_elsewhere_do_not_count_near_the_start() -> None:
+def test_images_taken_elsewhere_do_not_count_near_the_start() -> None:
     """A robot may not drive on to something that is easier to name."""
     moved = talk(("square", None), ("diamond", None), ("circle", "circle"))
     stayed = talk(("square", None), ("circle", "circle"))
-    assert judged(asked(pictures="last"), moved).marks == 4
+    assert judged(asked(images="last"), moved).marks == 4
     for recording in (moved, stayed):
-        result = judged(asked(pictures="last", near_start=20), recording)
+        result = judged(asked(images="last", near_start=20), recording)
         assert result.marks == 0
-        assert 'The picture showed "square"' in result.message
+        assert 'The image showed "square"' in result.message
     left = judged(asked(near_start=20), replace(moved, images=moved.images[1:]))
     assert (left.marks, accuracy(left).n) == (0, 1)
     assert "the robot sent none from within 20 mm of where it started" in left.message

@@ -1,4 +1,4 @@
-"""Pictures of recognition: confusion with precision and recall, what was misread, curves, and the track."""
+"""Images of recognition: confusion with precision and recall, what was misread, curves, and the track."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from PIL import Image as Picture
+from PIL import Image as Pixels
 
 import report_builders as build
 from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, TrialResult
@@ -27,7 +27,7 @@ def _texts(figure: Figure) -> list[str]:
 
 
 def _moving() -> Grade:
-    """Two trials of the line follower's that send a picture each half second; the second names one in two rightly."""
+    """Two trials of the line follower's that send an image each half second; the second names one in two rightly."""
     grade = build.line_follower_grade()
     left = build.shape_grade().trials[0].recording.images[0].left
     trials: list[TrialResult] = []
@@ -52,7 +52,7 @@ def test_recognition_has_its_plots() -> None:
     assert kinds == ["confusion", "curves", "misread", "predictions"]
     assert [plot.kind for plot in plots_of(_moving()) if not plot.scenario] == ["track", "predictions"]
     for data in draw_all(build.swept_grade()).values():
-        assert 300 < Picture.open(io.BytesIO(data)).height < 2600
+        assert 300 < Pixels.open(io.BytesIO(data)).height < 2600
 
 
 def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
@@ -60,10 +60,10 @@ def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
     result = CriterionResult("c", "C", build.shape_grade().marks, build.shape_grade().marks, "")
     shown = _texts(draw_confusion(result, accuracy, "t"))
     assert {"precision", "recall", ".75", ".25", ".50", "1"} <= set(shown)  # b: recall 1 of 4, precision 1 of 2
-    assert any("n = 8 pictures" in text for text in shown)
+    assert any("n = 8 images" in text for text in shown)
 
 
-def test_a_misread_picture_stands_beside_the_nearest_right_ones() -> None:
+def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     grade = build.shape_grade(wrong=4)
     (found,) = misread(grade.criteria[0].predictions)
     assert (found.number, found.prediction.truth, found.prediction.answer) == (5, "upwards facing triangle", "diamond")
@@ -72,29 +72,29 @@ def test_a_misread_picture_stands_beside_the_nearest_right_ones() -> None:
     assert found.like_answer.truth == "diamond"
     shown = _texts(draw_misread([found], 6, "t"))
     assert {"misread", "right, same truth", "right, same answer", "none", "5. ✗ wrong"} <= set(shown)
-    assert any("1 misread of n = 6 pictures" in text for text in shown)
-    # Of two right pictures of a class the nearer one is shown.
+    assert any("1 misread of n = 6 images" in text for text in shown)
+    # Of two right images of a class the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
     (again,) = misread((far, *grade.criteria[0].predictions))
     assert again.like_answer is found.like_answer
 
 
-def test_a_track_shows_every_picture_and_the_share_along_the_way() -> None:
+def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     grade = _moving()
     predictions = grade.criteria[0].predictions
     assert tracks(predictions, grade.trials) == (0, 1)
     assert worst_track(predictions, grade.trials) == 1
-    pictures = taken(predictions, grade.trials, 1)
-    assert [item.right for item in pictures[:3]] == [True, False, True]
-    assert not pictures[1].answered
-    way = np.array([item.way for item in pictures])
+    images = taken(predictions, grade.trials, 1)
+    assert [item.right for item in images[:3]] == [True, False, True]
+    assert not images[1].answered
+    way = np.array([item.way for item in images])
     assert (np.diff(way) > 0).all()
-    curve = along_the_way([*taken(predictions, grade.trials, 0), *pictures])
+    curve = along_the_way([*taken(predictions, grade.trials, 0), *images])
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").picture))
+    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").image))
     assert {"x, mm", "y, mm", "way driven, mm", "share right"} <= set(shown)
-    assert any(f"of n = {len(predictions)} pictures right, 2 trials" in text for text in shown)
+    assert any(f"of n = {len(predictions)} images right, 2 trials" in text for text in shown)
 
 
 def test_standing_still_is_no_track() -> None:
@@ -108,5 +108,5 @@ def test_the_page_has_the_figures(make: object) -> None:
     page = student_report(grade, {})
     assert "Class by class" in page
     if make is build.swept_grade:
-        assert "Pictures sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page
+        assert "Images sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page
         assert "Mean confidence 0.90 when right (n = 5)." in page

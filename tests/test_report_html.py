@@ -128,9 +128,9 @@ def test_students_see_nothing_hidden_and_staff_see_all() -> None:
     for seed in ("1004", "1005"):
         assert f">{seed}<" not in student
         assert f">{seed}<" in staff
-    hidden_pictures = {base64.b64encode(data).decode() for name, data in plots.items() if name.endswith("-staff")}
-    assert hidden_pictures
-    assert not any(picture in student for picture in hidden_pictures)
+    hidden_images = {base64.b64encode(data).decode() for name, data in plots.items() if name.endswith("-staff")}
+    assert hidden_images
+    assert not any(image in student for image in hidden_images)
     first_hidden = replace(grade, trials=grade.trials[::-1])
     assert "SECRETSCENARIO" not in student_report(first_hidden, {})
     after = student_report(grade, plots, released=frozenset({"visible", "hidden"}))
@@ -187,7 +187,7 @@ def test_timelines_are_capped_and_say_so() -> None:
     assert [entry.text for entry in entries if not entry.t] == ["2,950 more entries are not shown"]
 
 
-def test_messages_name_pictures_and_losses() -> None:
+def test_messages_name_images_and_losses() -> None:
     assert "IMG_DATA::{left, right}" in Reader(student_report(build.shape_grade(), {})).text
     assert "never (lost)" in Reader(student_report(build.faulty_grade(), {})).text
 

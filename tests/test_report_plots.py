@@ -16,7 +16,7 @@ from service.reports.conversation_plot import draw_conversation
 from service.reports.path_plot import draw_path
 from service.reports.plot_style import DPI, WIDTH
 from service.reports.plots import draw_all, plots_of
-from service.reports.predictions_plot import chosen_predictions, focus_picture, sensor_picture
+from service.reports.predictions_plot import chosen_predictions, focus_image, sensor_image
 from service.reports.sensor_plot import draw_sensors, panels_of, strips_of
 from service.reports.sequence import Gap, Step, conversation
 from sim.recording import Call, Message, Pose, Recording
@@ -46,11 +46,11 @@ def test_bytes_repeat_and_sizes_are_small() -> None:
     first, second = draw_all(build.line_follower_grade()), draw_all(build.line_follower_grade())
     assert first == second
     for data in first.values():
-        with Image.open(io.BytesIO(data)) as picture:
-            assert picture.format == "PNG"
-            assert picture.width == round(WIDTH * DPI)
-            assert 300 < picture.height < 2600
-            assert "Software" not in picture.info
+        with Image.open(io.BytesIO(data)) as image:
+            assert image.format == "PNG"
+            assert image.width == round(WIDTH * DPI)
+            assert 300 < image.height < 2600
+            assert "Software" not in image.info
         assert len(data) < 150_000
 
 
@@ -85,13 +85,13 @@ def test_a_path_that_leaves_the_floor_says_so() -> None:
     )
     ticks = replace(far.ticks, y=np.full(90, 800.0))
     shown = _texts(draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None))
-    assert "the path goes on outside this picture" in shown
+    assert "the path goes on outside this image" in shown
     draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # not a finite tick but the start
 
 
-def test_path_tells_units_start_end_and_pictures() -> None:
+def test_path_tells_units_start_end_and_images() -> None:
     shown = _texts(draw_path(build.shape_grade().trials[4], "Shapes: path", None))
-    assert {"x, mm", "y, mm", "start", "end", "picture sent", "Shapes: path", "1"} <= set(shown)
+    assert {"x, mm", "y, mm", "start", "end", "image sent", "Shapes: path", "1"} <= set(shown)
     assert any("from (520, 900) heading 0°" in text for text in shown)
 
 
@@ -168,16 +168,16 @@ def test_confusion_counts_totals_and_missing_answers() -> None:
     assert "no answer" in shown
 
 
-def test_sensor_pictures_and_focus() -> None:
+def test_sensor_images_and_focus() -> None:
     image = build.shape_grade().trials[0].recording.images[0]
-    assert sensor_picture(image).size == (20, 20)
-    focus = focus_picture(image)
+    assert sensor_image(image).size == (20, 20)
+    focus = focus_image(image)
     assert (focus.size, focus.mode) == ((14, 14), "L")
     assert focus.getpixel((7, 7)) == 0
     assert focus.getpixel((0, 0)) == 255
 
 
-def test_wrong_pictures_come_first_when_not_all_fit() -> None:
+def test_wrong_images_come_first_when_not_all_fit() -> None:
     predictions = build.shape_grade().criteria[0].predictions * 10
     chosen = chosen_predictions(predictions)
     assert len(chosen) == 12

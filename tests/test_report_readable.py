@@ -41,7 +41,7 @@ def test_one_line() -> None:
     assert one_line("w" * 50, 10) == "wwwwwwwww…"
 
 
-def test_a_picture_message_is_named_not_listed() -> None:
+def test_a_image_message_is_named_not_listed() -> None:
     assert message_words('IMG_DATA::{"left": "' + "1," * 3200) == "IMG_DATA::{left, right}"
     assert message_words("PY::[1, 2]") == "PY::[1, 2]"
 

@@ -46,7 +46,7 @@ def _job(store: Store, job_id: str) -> Job:
 def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Store) -> None:
     _accept(store, "ada")
     first = _grade_next(store)
-    jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"picture")])
+    jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"image")])
     second = _accept(store, "bob")
     assert second.copied_from == first
     job = _job(store, second.job_id)
@@ -55,7 +55,7 @@ def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Sto
     with store.reading() as session:
         original, copy = grades.load(session, first), grades.load(session, second.job_id)
         assert comparable(replace(copy, student=original.student)) == comparable(original)
-        assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"picture"
+        assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"image"
         assert batches.job_line(session, second.job_id).copied_from == first
     # A copy is not copied: what is named is always the grade that was run.
     assert _accept(store, "eve").copied_from == first

@@ -35,7 +35,7 @@ RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 pictures."""
+    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 images."""
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT

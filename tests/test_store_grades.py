@@ -91,7 +91,7 @@ def test_marks_keep_their_places(store: Store) -> None:
     assert (str(back.marks), str(back.max_marks)) == ("0.10", "3.30")
 
 
-def test_a_flood_of_pictures_is_cut_and_the_marks_stay(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flood_of_images_is_cut_and_the_marks_stay(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.store.recordings.GRADE_BYTES", 1)
     monkeypatch.setattr("service.store.recordings.SMALLEST_CAP", 1_000)
     grade = report_builders.shape_grade()

@@ -110,8 +110,8 @@ def test_an_assignment_comes_back_as_it_was(name: str) -> None:
     assert assignment_to_bytes(back) == assignment_to_bytes(assignment)
 
 
-def test_an_assignment_keeps_its_secret_and_its_pictures() -> None:
+def test_an_assignment_keeps_its_secret_and_its_images() -> None:
     assignment = find_assignment("echo-responder")
-    world = replace(assignment.world, picture=bytes(range(256)), obstacles=((1.0, 2.0, 3.0, 4.0),))
+    world = replace(assignment.world, image=bytes(range(256)), obstacles=((1.0, 2.0, 3.0, 4.0),))
     changed = replace(assignment, secret="hush", given={"a.bin": b"\0\xff"}, world=world)
     assert assignment_from_bytes(assignment_to_bytes(changed)) == changed

@@ -171,7 +171,7 @@ def test_a_better_level_never_costs_marks(pairs: list[tuple[int, int]], data: st
 
 
 def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
-    """Two pictures over a square, a second apart, count as one; the answer \"square\" comes 0.2 s after each."""
+    """Two images over a square, a second apart, count as one; the answer \"square\" comes 0.2 s after each."""
     sweep = Sweep(offset_x=(0, 80), loss=(0, 1), delay=(0.1, 0.9, 3))
     base = {"marks": Decimal(6), "late": "wrong", "check": "robustness"}
     wanted = tuple(

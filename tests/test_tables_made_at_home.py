@@ -19,7 +19,7 @@ import pytest
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.label_patches import grey_picture
+from service.grading.judging.label_patches import grey_image
 from service.grading.trial_runner import TrialRunner
 from submissions.assignment import Assignment
 from submissions.assignment_file import find_assignment
@@ -76,7 +76,7 @@ def responder(text):
         heard = json.loads(text[4:])
         return "noted"
     left = json.loads(text[10:])["left"]
-    keys = {"picture": hashlib.sha256(left.encode()).hexdigest()}
+    keys = {"image": hashlib.sha256(left.encode()).hexdigest()}
     keys |= {"mine " + kind: value for kind, value in told.items()}
     keys |= {"its " + kind: value for kind, value in heard.items()}
     keys = {kind: json.dumps(value) for kind, value in keys.items()}
@@ -109,7 +109,7 @@ def marked(name: str) -> Assignment:
 
 
 def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
-    """The keys that the responder saw with each picture, and what the picture showed."""
+    """The keys that the responder saw with each image, and what the image showed."""
     for trial in graded.trials:
         lines = [line for line in trial.recording.responder_output.splitlines() if line.startswith("{")]
         for line, image in zip(lines, trial.recording.images, strict=True):
@@ -117,7 +117,7 @@ def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
 
 
 def table_of(grades: Sequence[Grade]) -> Table:
-    """What a student writes down at home, where the tool tells what each picture showed."""
+    """What a student writes down at home, where the tool tells what each image showed."""
     table: Table = {}
     for graded in grades:
         for keys, truth in looked_up(graded):
@@ -143,20 +143,20 @@ def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> N
     assert offered >= 8
     at_home = [grade(grading_request(program, {}, "spy"), asked, secret=home, runner=runner) for home in HOMES]
     table = table_of(at_home)
-    assert len(table["picture"]) >= 20
+    assert len(table["image"]) >= 20
 
-    # Where it was made, the pictures tell everything. So would the chance, if it did not differ by submission.
-    seen = grading_request(program, {"picture": table["picture"]}, "table of pictures")
+    # Where it was made, the images tell everything. So would the chance, if it did not differ by submission.
+    seen = grading_request(program, {"image": table["image"]}, "table of images")
     assert grade(seen, asked, secret=HOMES[1], runner=runner).marks == offered
-    chances = {kind: entries for kind, entries in table.items() if kind != "picture" and "place" not in kind}
+    chances = {kind: entries for kind, entries in table.items() if kind != "image" and "place" not in kind}
     chances.pop("its step", None)
     assert len(chances) == 13
     by_chance = grading_request(program, chances, "table of chance")
     assert grade(by_chance, asked, secret=HOMES[1], runner=runner).marks == 0
 
-    # Where marks are given, no picture and no chance is met again.
+    # Where marks are given, no image and no chance is met again.
     everything = grade(
-        grading_request(program, {**chances, "picture": table["picture"]}, "both"), asked, secret=MARKING, runner=runner
+        grading_request(program, {**chances, "image": table["image"]}, "both"), asked, secret=MARKING, runner=runner
     )
     hits = [kind for keys, _ in looked_up(everything) for kind, key in keys.items() if key in table[kind]]
     assert {kind for kind in hits if "place" not in kind and kind != "its step"} == set()
@@ -190,7 +190,7 @@ def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
     table = {}
     for trial in grade(_model({}), asked, secret=HOMES[1], runner=runner).trials:
         for image in trial.recording.images:
-            row = grey_picture(image, focus=True).astype(float).ravel()
+            row = grey_image(image, focus=True).astype(float).ravel()
             table[str(np.round(row / max(1.0, row.max()) * 255).astype(int).tolist())] = str(image.truth)
     assert grade(_model(table), asked, secret=HOMES[1], runner=runner).marks == asked.max_marks
     assert grade(_model(table), asked, secret=MARKING, runner=runner).marks == 0

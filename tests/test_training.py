@@ -126,7 +126,7 @@ class Model:
 
 
 def test_unseen_images_do_not_come_in_the_order_of_the_track(runner: TrialRunner, training: Assignment) -> None:
-    """Else a model could name a whole stretch by the clearest picture in it."""
+    """Else a model could name a whole stretch by the clearest image in it."""
     result = trained(runner, training, ROWS.format("return [str(place) for place in range(len(rows))]"))
     messages = result.trials[1].recording.messages
     places = [int(message.text) for message in messages if message.sender == "responder"][:100]

@@ -78,14 +78,14 @@ def run(
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw the path over the floor, as PNG.")] = None,
+    image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
     ] = False,
 ) -> None:
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
-    if picture is not None and picture.suffix.lower() != ".png":
-        raise UsageError(f"--picture {picture}: expected a name that ends in .png")
+    if image is not None and image.suffix.lower() != ".png":
+        raise UsageError(f"--picture {image}: expected a name that ends in .png")
     values = {
         "b": background,
         "r": robot_setup,
@@ -111,7 +111,7 @@ def run(
             executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
         show_notebook(executed, _show)
         if executed.runs:
-            _keep(executed.runs[-1].recording, program.name, seed, trace_file, picture)
+            _keep(executed.runs[-1].recording, program.name, seed, trace_file, image)
         return
     flags, text = _program(program)
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
@@ -135,14 +135,14 @@ def run(
     with TrialRunner(NONE if unsafe else FULL) as runner:
         recording = runner.run(spec, chosen.obstacles)
     _show(recording)
-    _keep(recording, program.name, seed, trace_file, picture)
+    _keep(recording, program.name, seed, trace_file, image)
 
 
-def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, picture: Path | None) -> None:
+def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, image: Path | None) -> None:
     if trace_file is not None:
         _write(trace_file, json.dumps(trace(recording)).encode())
-    if picture is not None:
-        _write(picture, _drawn(recording, name, seed))
+    if image is not None:
+        _write(image, _drawn(recording, name, seed))
 
 
 def _notebook(path: Path) -> Notebook | None:
@@ -233,4 +233,4 @@ def _show(recording: Recording) -> None:
 
 def _drawn(recording: Recording, name: str, seed: int) -> bytes:
     trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
-    return png(draw_path(trial, name, floor(recording.background, seed=recording.sheet).picture))
+    return png(draw_path(trial, name, floor(recording.background, seed=recording.sheet).pixels))

@@ -14,9 +14,9 @@ from submissions.seeds import PUBLIC
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What became of the pictures that were sent: ``sent`` is the sum of the four that follow it.
+    """What became of the images that were sent: ``sent`` is the sum of the four that follow it.
 
-    ``duplicates`` are answers beyond the one that counts. Accuracy is over ``counted`` pictures (or patterns) and
+    ``duplicates`` are answers beyond the one that counts. Accuracy is over ``counted`` images (or patterns) and
     ``missing`` ones, which are wrong.
     """
 
@@ -28,7 +28,7 @@ class Counts:
     duplicates: int = 0
     counted: int = 0
     missing: int = 0
-    of: str = "pictures"  # what is counted: pictures, or the patterns that several pictures show
+    of: str = "images"  # what is counted: images, or the patterns that several images show
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class AccuracyCurve:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """One picture the robot sent, what it showed and what was answered."""
+    """One image the robot sent, what it showed and what was answered."""
 
     image: Image
     truth: str

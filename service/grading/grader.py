@@ -23,7 +23,7 @@ from service.grading.static_analysis import SubmittedParts, analyse, does_withou
 from service.grading.training import with_models_answers
 from service.grading.trial_runner import TrialRunner
 from service.version import GRADER_VERSION
-from sim.backgrounds import Floor, floor, floor_from_picture
+from sim.backgrounds import Floor, floor, floor_from_image
 from sim.chance import Stream
 from sim.errors import AssignmentError, UsageError
 from sim.motion import Physics
@@ -272,15 +272,15 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
 
 
 def _floor(world: WorldSpec, seed: int) -> Floor:
-    if world.picture is not None:
-        return _own_floor(world.background, world.picture)
+    if world.image is not None:
+        return _own_floor(world.background, world.image)
     return floor(world.background, labels=world.labels, seed=seed if world.sheet is None else world.sheet)
 
 
 @functools.lru_cache(maxsize=2)
-def _own_floor(name: str, picture: bytes) -> Floor:
-    """Read once for all trials: cameras know a picture again by its identity."""
-    return floor_from_picture(name, picture)
+def _own_floor(name: str, image: bytes) -> Floor:
+    """Read once for all trials: cameras know an image again by its identity."""
+    return floor_from_image(name, image)
 
 
 def _recording(

@@ -1,4 +1,4 @@
-"""Marking a submission that trains: its model is trained on some trials' pictures and names those of the others.
+"""Marking a submission that trains: its model is trained on some trials' images and names those of the others.
 
 The robot's runs come first and are recorded like any; here the submission's answers are added to the recordings, so
 that they are judged like a responder's.
@@ -18,7 +18,7 @@ from responders.sandbox.meter import JobMeter
 from responders.training import Images, Named, TrainingSpec
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
-from service.grading.judging.label_patches import grey_picture
+from service.grading.judging.label_patches import grey_image
 from service.grading.static_analysis import responder_limits
 from service.grading.trial_runner import TrialRunner
 from sim.chance import Stream
@@ -40,7 +40,7 @@ def with_models_answers(
     runner: TrialRunner,
     meter: JobMeter,
 ) -> list[TrialResult]:
-    """The trials, those that are tested on with the answers of the submission's model to their pictures.
+    """The trials, those that are tested on with the answers of the submission's model to their images.
 
     What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
     machine fails, and whatever the meter's heartbeat raises.
@@ -48,13 +48,13 @@ def with_models_answers(
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
     asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
-    # Hidden pictures come last: what a student is told of the visible ones is said before the model has seen those.
+    # Hidden images come last: what a student is told of the visible ones is said before the model has seen those.
     visible = [index for index in asked if results[index].visibility == "visible"]
     groups = [group for group in (visible, [index for index in asked if index not in visible]) if group]
     unseen = [[pair for index in group for pair in _collected(results[index])] for group in groups]
     # Not in the order of the track: neighbours on it mostly show the same.
-    chance = Stream(child_seed, "order of pictures")
-    orders = [sorted(range(len(pictures)), key=chance.integer) for pictures in unseen]
+    chance = Stream(child_seed, "order of images")
+    orders = [sorted(range(len(images)), key=chance.integer) for images in unseen]
     named = runner.train(
         TrainingSpec(
             Code(grading_request.name, grading_request.text),
@@ -63,8 +63,8 @@ def with_models_answers(
             _arrays([pair for pair, _ in known], training),
             [truth for _, truth in known],
             [
-                _arrays([pictures[place] for place in order], training)
-                for pictures, order in zip(unseen, orders, strict=True)
+                _arrays([images[place] for place in order], training)
+                for images, order in zip(unseen, orders, strict=True)
             ],
             responder_limits(assignment),
             assignment.limits.output_bytes,
@@ -83,19 +83,19 @@ def with_models_answers(
 
 
 def _collected(result: TrialResult) -> list[Pair]:
-    """A trial's pictures, logged and sent, in the order in which they were taken."""
+    """A trial's images, logged and sent, in the order in which they were taken."""
     found = [*pairs(result.recording, "log"), *pairs(result.recording, "sent")]
     return sorted(found, key=lambda pair: pair.image.tick)
 
 
 def _arrays(found: Sequence[Pair], training: Training) -> Images:
     side = _SIDE[training.image]
-    pictures = [grey_picture(pair.image, focus=training.image == "focus") for pair in found]
-    return np.stack(pictures) if pictures else np.empty((0, side, side), np.uint8)
+    images = [grey_image(pair.image, focus=training.image == "focus") for pair in found]
+    return np.stack(images) if images else np.empty((0, side, side), np.uint8)
 
 
 def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str | None], gave: Named) -> Recording:
-    """The recording with each picture as a message of the robot's and each name as its answer."""
+    """The recording with each image as a message of the robot's and each name as its answer."""
     messages: list[Message] = []
     images: list[Image] = []
     given: list[str | None] = []

@@ -78,7 +78,7 @@ class TrialRunner:
         return never_ran(spec, *self._ground(spec, obstacles), fault, sandbox)
 
     def _ground(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
-        return self._arena(obstacles), self._cameras.camera(spec.floor.picture)
+        return self._arena(obstacles), self._cameras.camera(spec.floor.pixels)
 
     def train(self, spec: TrainingSpec, meter: JobMeter | None = None) -> tuple[Named, ...]:
         """A submission's model, trained and asked. Raises as ``run`` does."""

@@ -16,10 +16,10 @@ def draw(grade: Grade, assignment: Assignment) -> list[File]:
     """Every plot of the grade, named ``plot-<name>.png``; floors of the assignment's own are drawn as such."""
     # A worker that only grades need not load the drawing library.
     from service.reports.plots import draw_all
-    from sim.backgrounds import floor_from_picture
+    from sim.backgrounds import floor_from_image
 
     world = assignment.world
-    pictures = {}
-    if world.picture is not None:
-        pictures[world.background] = floor_from_picture(world.background, world.picture).picture
-    return [File(f"{PREFIX}{name}.png", "image/png", data) for name, data in draw_all(grade, pictures).items()]
+    images = {}
+    if world.image is not None:
+        images[world.background] = floor_from_image(world.background, world.image).pixels
+    return [File(f"{PREFIX}{name}.png", "image/png", data) for name, data in draw_all(grade, images).items()]

@@ -19,7 +19,7 @@ BEFORE_PUBLICATION = frozenset({"visible"})
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> Grade:
     """``grade`` without what is for staff, and the criteria and trials whose visibility is not in ``released``.
 
-    Evidence and pictures from hidden trials go too; of a criterion that loses trials the message, the accuracy and
+    Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
     the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
     then those of the criteria shown.
     """

@@ -58,8 +58,8 @@ def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> F
 
 
 def counted(accuracy: Accuracy) -> str:
-    """What ``n`` counts: ``pictures`` or ``patterns``."""
-    return accuracy.counts.of if accuracy.counts is not None else "pictures"
+    """What ``n`` counts: ``images`` or ``patterns``."""
+    return accuracy.counts.of if accuracy.counts is not None else "images"
 
 
 def draw_table(table: Table, title: str, subtitle: str) -> Figure:

@@ -61,7 +61,7 @@ class Panel:
     level: float | None = None
 
 
-def draw_curves(panels: Sequence[Panel], title: str, subtitle: str = "", counted: str = "pictures") -> Figure:
+def draw_curves(panels: Sequence[Panel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
     """The panels under each other, all with the same upright axis from 0 to 1; ``counted`` is what ``n`` counts."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT

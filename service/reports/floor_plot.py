@@ -1,6 +1,6 @@
-"""Draws a floor by itself: the picture with a scale in mm, where the robot starts, obstacles and what has a label.
+"""Draws a floor by itself: the image with a scale in mm, where the robot starts, obstacles and what has a label.
 
-The floors' pictures are ``sim/backgrounds``'; a robot's path over one is drawn in ``path_plot.py``.
+The floors' images are ``sim/backgrounds``'; a robot's path over one is drawn in ``path_plot.py``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def draw_floor(floor: Floor) -> Figure:
         subtitle += f"; {len(floor.labels)} places with a label, {len(names)} labels"
     figure = new_figure(HEAD + height + _FOOT, floor.name, subtitle)
     axes = axes_at(figure, _LEFT_EDGE, _FOOT, width, height)
-    axes.imshow(floor.picture[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")
+    axes.imshow(floor.pixels[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")
     for x, y, across, up in floor.obstacles:
         axes.add_patch(Rectangle((x, y), across, up, facecolor=RULE, edgecolor="black", linewidth=0.8))
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.heading - 90), color=FAULT, markersize=9, markeredgecolor="white")

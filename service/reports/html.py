@@ -42,17 +42,17 @@ class BatchRow:
 
 @dataclass(frozen=True, slots=True)
 class PrintedFloor:
-    """A floor on the page of floors: its picture as a PNG, and the labels that places on it have."""
+    """A floor on the page of floors: its image as a PNG, and the labels that places on it have."""
 
     name: str
-    picture: bytes
+    image: bytes
     labels: tuple[str, ...] = ()
 
 
 def gallery(floors: Sequence[PrintedFloor]) -> str:
     """A page with every floor."""
     shown = [
-        {"name": floor.name, "picture": _data_uri(floor.picture), "labels": ", ".join(floor.labels)} for floor in floors
+        {"name": floor.name, "image": _data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
     ]
     return _render("gallery.html", floors=shown)
 
@@ -98,9 +98,9 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "
 def _page(
     grade: Grade, plots: Mapping[str, bytes], submission: Submission | None, *, staff: bool, withheld: bool
 ) -> str:
-    pictures = {name: _data_uri(data) for name, data in plots.items()}
+    images = {name: _data_uri(data) for name, data in plots.items()}
     page = page_of(grade, submission)
-    return _render("report.html", page=page, pictures=pictures, staff=staff, withheld=withheld)
+    return _render("report.html", page=page, images=images, staff=staff, withheld=withheld)
 
 
 def _render(template: str, **context: object) -> str:

@@ -1,4 +1,4 @@
-"""Draws the pictures that were misread, each beside the nearest ones that were read rightly.
+"""Draws the images that were misread, each beside the nearest ones that were read rightly.
 
 Nearest is by the grey values of the focus that a network is shown; nothing is judged here.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from service.grading.grade import Prediction
 from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
-from service.reports.predictions_plot import focus_picture, is_right
+from service.reports.predictions_plot import focus_image, is_right
 from service.reports.readable import one_line
 
 MOST_MISREAD = 6
@@ -27,18 +27,18 @@ _TEXT = 3 * (_SIDE + _GAP) + 0.08
 
 @dataclass(frozen=True, slots=True)
 class Misread:
-    """A picture that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
+    """An image that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
 
-    number: int  # of the picture, from 1
+    number: int  # of the image, from 1
     prediction: Prediction
     like_truth: Prediction | None
     like_answer: Prediction | None
 
 
 def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
-    """Every picture that was answered, and wrongly, in the order in which they were sent.
+    """Every image that was answered, and wrongly, in the order in which they were sent.
 
-    The nearest ones are looked for only for the pictures that are drawn.
+    The nearest ones are looked for only for the images that are drawn.
     """
     wrong = [
         (number, prediction)
@@ -58,13 +58,13 @@ def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
     return (*drawn, *(Misread(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
 
 
-def draw_misread(found: Sequence[Misread], pictures: int, title: str) -> Figure:
-    """At most ``MOST_MISREAD`` rows: the picture, the nearest right one of its truth, and of what it was taken for."""
+def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
+    """At most ``MOST_MISREAD`` rows: the image, the nearest right one of its truth, and of what it was taken for."""
     shown = found[:MOST_MISREAD]
     height = _ROW * len(shown)
     count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
     figure = new_figure(
-        HEAD + 0.2 + height, title, f"{count} misread of n = {pictures} pictures; each: the focus that a network sees"
+        HEAD + 0.2 + height, title, f"{count} misread of n = {images} images; each: the focus that a network sees"
     )
     axes = axes_at(figure, 0.02, 0.0, WIDTH - 0.04, height + 0.2)
     axes.set_axis_off()
@@ -78,12 +78,12 @@ def draw_misread(found: Sequence[Misread], pictures: int, title: str) -> Figure:
 
 
 def _draw_row(axes: Axes, item: Misread, y: float) -> None:
-    _draw_picture(axes, item.prediction, 0, y, FAULT, 1.8)
+    _draw_image(axes, item.prediction, 0, y, FAULT, 1.8)
     for column, other in ((1, item.like_truth), (2, item.like_answer)):
         if other is None:
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE / 2, "none", FAINT, 8, ha="center")
         else:
-            _draw_picture(axes, other, column * (_SIDE + _GAP), y, RULE, 0.8)
+            _draw_image(axes, other, column * (_SIDE + _GAP), y, RULE, 0.8)
     lines = [
         (f"{item.number}. ✗ wrong", FAULT, True),
         ("truth:", FAINT, False),
@@ -102,8 +102,8 @@ def _draw_row(axes: Axes, item: Misread, y: float) -> None:
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
 
 
-def _draw_picture(axes: Axes, prediction: Prediction, x: float, y: float, colour: str, width: float) -> None:
-    pixels = np.repeat(np.asarray(focus_picture(prediction.image))[:, :, None], 3, axis=2)
+def _draw_image(axes: Axes, prediction: Prediction, x: float, y: float, colour: str, width: float) -> None:
+    pixels = np.repeat(np.asarray(focus_image(prediction.image))[:, :, None], 3, axis=2)
     axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
     axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=colour, linewidth=width))
 
@@ -115,7 +115,7 @@ def _write(
 
 
 def _greys(prediction: Prediction) -> NDArray[np.float64]:
-    return np.asarray(focus_picture(prediction.image), dtype=np.float64)
+    return np.asarray(focus_image(prediction.image), dtype=np.float64)
 
 
 def _nearest(

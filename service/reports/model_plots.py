@@ -1,4 +1,4 @@
-"""The pictures of a classifier's evaluation: confusion, misread images beside right ones, and robustness curves.
+"""The images of a classifier's evaluation: confusion, misread images beside right ones, and robustness curves.
 
 Everything in them was measured by ``models/evaluation.py``; the drawing of tables and curves is shared with grades.
 """
@@ -57,9 +57,9 @@ def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
 
 
 def in_words(tally: Tally) -> str:
-    """``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 pictures``."""
+    """``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 images``."""
     low, high = tally.interval
-    return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} pictures"
+    return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} images"
 
 
 def draw_robustness(evaluation: Evaluation) -> Figure:
@@ -102,12 +102,12 @@ def draw_misread(evaluation: Evaluation) -> Figure:
     shown = f"{len(chosen)} of {count}" if len(chosen) < count else f"all {count}" if count else "none"
     title = f"{evaluation.card.name}: what was misread"
     if not chosen:
-        figure = new_figure(HEAD + 0.3, title, f"none of n = {total} pictures was misread")
+        figure = new_figure(HEAD + 0.3, title, f"none of n = {total} images was misread")
         write(figure, 0.08, 0.1, "There is nothing to show.", size=9)
         return figure
     heads = 0.40
     height = heads + _ROW * len(chosen)
-    figure = new_figure(HEAD + height + 0.06, title, f"{shown} misread, of n = {total} pictures; 14 × 14 grey pixels")
+    figure = new_figure(HEAD + height + 0.06, title, f"{shown} misread, of n = {total} images; 14 × 14 grey pixels")
     axes = axes_at(figure, 0.08, 0.06, WIDTH - 0.16, height)
     axes.set_axis_off()
     axes.set_xlim(-0.05, WIDTH - 0.21)
@@ -126,10 +126,10 @@ def _one_each(misread: Sequence[Answered]) -> list[Answered]:
     kinds: dict[tuple[int, int], int] = {}
     ranked = []
     for number, each in enumerate(misread):
-        picture = each.grey.tobytes()
-        if picture in seen:
+        image = each.grey.tobytes()
+        if image in seen:
             continue
-        seen.add(picture)
+        seen.add(image)
         kind = (each.place.label, each.answer)
         kinds[kind] = kinds.get(kind, 0) + 1
         ranked.append((kinds[kind], number, each))
@@ -138,11 +138,11 @@ def _one_each(misread: Sequence[Answered]) -> list[Answered]:
 
 def _draw_row(axes: Axes, classes: tuple[str, ...], each: Answered, right: Sequence[Answered], y: float) -> None:
     shown, read = each.place.label, each.answer
-    for column, (picture, colour) in enumerate(
+    for column, (image, colour) in enumerate(
         ((each, FAULT), (_nearest(each, right, shown), SAID), (_nearest(each, right, read), SAID))
     ):
-        if picture is not None:
-            _draw_grey(axes, picture.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
+        if image is not None:
+            _draw_grey(axes, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
     lines = [
         (f"shows {classes[shown]}", INK, True),
         (f"✗ read as {classes[read]}", FAULT, True),

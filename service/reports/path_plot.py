@@ -1,6 +1,6 @@
-"""Draws where the robot went: the path over the floor, with start, end, headings, pen, touches and pictures taken.
+"""Draws where the robot went: the path over the floor, with start, end, headings, pen, touches and images taken.
 
-The floor is a picture that the caller gives; nothing here knows how floors are made.
+The floor is an image that the caller gives; nothing here knows how floors are made.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from service.reports.plot_style import (
 from sim.recording import Pose, Recording
 from sim.robot import ROBOTS
 
-Picture = NDArray[np.uint8]
+Pixels = NDArray[np.uint8]
 
 FLOOR_WIDTH, FLOOR_HEIGHT = 2362.0, 1143.0
 _MARGIN = 90.0  # mm around the path
@@ -70,7 +70,7 @@ class View:
         return self.top - self.bottom
 
 
-def draw_path(trial: TrialResult, title: str, floor: Picture | None) -> Figure:
+def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     """The path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
     recording = trial.recording
     points = _points(recording)
@@ -101,7 +101,7 @@ def draw_path(trial: TrialResult, title: str, floor: Picture | None) -> Figure:
         frameon=False, handletextpad=0.5, columnspacing=1.4, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
     if _goes_on(points, view):
-        axes.text(0.5, 0.03, "the path goes on outside this picture", transform=axes.transAxes, ha="center",
+        axes.text(0.5, 0.03, "the path goes on outside this image", transform=axes.transAxes, ha="center",
                   font=font(7.5, bold=True), color=INK, zorder=9,
                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
     if located:
@@ -149,7 +149,7 @@ def _shaped(view: View) -> View:
     return View(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def draw_floor(axes: Axes, floor: Picture | None, view: View) -> None:
+def draw_floor(axes: Axes, floor: Pixels | None, view: View) -> None:
     """The part of the floor that is in ``view``, lifted towards white; without a floor a white one."""
     if floor is None:
         axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
@@ -311,7 +311,7 @@ def _columns(located: bool) -> int:
 
 
 def _legend(recording: Recording, view: View) -> list[Artist]:
-    """A handle for every kind of thing that is in the picture."""
+    """A handle for every kind of thing that is in the image."""
     handles: list[Artist] = [
         Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
                markeredgewidth=1.6, label="start"),
@@ -324,7 +324,7 @@ def _legend(recording: Recording, view: View) -> list[Artist]:
     if recording.images:
         handles.append(
             Line2D([], [], marker="s", linestyle="none", markersize=6.5, color="none", markeredgecolor=INK,
-                   markeredgewidth=1.2, label="picture sent")
+                   markeredgewidth=1.2, label="image sent")
         )  # fmt: skip
     if recording.touches:
         handles.append(
@@ -337,7 +337,7 @@ def _legend(recording: Recording, view: View) -> list[Artist]:
     return handles
 
 
-def _draw_locator(figure: Figure, floor: Picture | None, view: View) -> None:
+def _draw_locator(figure: Figure, floor: Pixels | None, view: View) -> None:
     width = 1.12
     height = width * FLOOR_HEIGHT / FLOOR_WIDTH
     axes = axes_at(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)

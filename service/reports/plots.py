@@ -19,7 +19,7 @@ from service.reports.confusion_plot import draw_confusion
 from service.reports.conversation_plot import draw_conversation
 from service.reports.curve_plot import Curve, Panel, draw_curves
 from service.reports.misread_plot import draw_misread, misread
-from service.reports.path_plot import Picture, draw_path
+from service.reports.path_plot import Pixels, draw_path
 from service.reports.plot_style import png
 from service.reports.predictions_plot import chosen_predictions, draw_predictions, is_right
 from service.reports.readable import one_line
@@ -31,7 +31,7 @@ from sim.recording import Recording
 from submissions.sweep import CONDITIONS, Varied
 
 Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "predictions"]
-_NO_PICTURES: Mapping[str, Picture] = MappingProxyType({})
+_NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,24 +55,24 @@ def plots_of(grade: Grade) -> tuple[Plot, ...]:
     return (*_classifications(grade), *_trials(grade))
 
 
-def draw_all(grade: Grade, pictures: Mapping[str, Picture] = _NO_PICTURES) -> dict[str, bytes]:
+def draw_all(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[str, bytes]:
     """Every plot of ``grade`` for staff and for the student, name -> PNG.
 
-    ``pictures`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
+    ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
     y = 1143 mm; a floor that is in neither is drawn white.
     """
     drawn: dict[str, bytes] = {}
     for view in (grade, student_view(grade)):
         for plot in plots_of(view):
             if plot.name not in drawn:
-                drawn[plot.name] = png(_draw(view, plot, pictures))
+                drawn[plot.name] = png(_draw(view, plot, images))
     return drawn
 
 
-def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
+def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
     if plot.kind == "path":
         trial = grade.trials[plot.subject]
-        return draw_path(trial, plot.title, _floor(trial.recording, pictures))
+        return draw_path(trial, plot.title, _floor(trial.recording, images))
     if plot.kind == "sensors":
         return draw_sensors(grade.trials[plot.subject], plot.title)
     if plot.kind == "conversation":
@@ -84,7 +84,7 @@ def _draw(grade: Grade, plot: Plot, pictures: Mapping[str, Picture]) -> Figure:
         return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
     if plot.kind == "track":
         worst = worst_track(result.predictions, grade.trials)
-        floor = _floor(grade.trials[worst].recording, pictures)
+        floor = _floor(grade.trials[worst].recording, images)
         return draw_track(result.predictions, grade.trials, plot.title, floor)
     if plot.kind == "misread":
         return draw_misread(misread(result.predictions), len(result.predictions), plot.title)
@@ -105,12 +105,12 @@ def _panel(curve: AccuracyCurve) -> Panel:
     return Panel(about.words, about.unit, (drawn,), curve.asked)
 
 
-def _floor(recording: Recording, pictures: Mapping[str, Picture]) -> Picture | None:
+def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
     """The floor as it was in the trial, with the same digits and label patches."""
-    if recording.background in pictures:
-        return pictures[recording.background]
+    if recording.background in images:
+        return images[recording.background]
     try:
-        return floor_of(recording.background, labels=recording.patches, seed=recording.sheet).picture
+        return floor_of(recording.background, labels=recording.patches, seed=recording.sheet).pixels
     except UsageError:
         return None
 
@@ -123,8 +123,8 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
                 f"confusion-{_slug(result.id)}{suffix}", "confusion", index, "", _title(grade, "what was answered"),
-                f"What each picture showed and what was answered, for “{one_line(result.title, 80)}”.",
-                f"Confusion matrix: {right} of {accuracy.n} pictures on the diagonal, accuracy {accuracy.value:.2f}, "
+                f"What each image showed and what was answered, for “{one_line(result.title, 80)}”.",
+                f"Confusion matrix: {right} of {accuracy.n} images on the diagonal, accuracy {accuracy.value:.2f}, "
                 f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
             )  # fmt: skip
         yield from _along(grade, index, result, suffix)
@@ -143,7 +143,7 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 _title(grade, "what the sensor saw"),
                 "What the left light sensor sent, whole and in the focus that a network is shown. "
                 "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
-                f"{shown} sensor pictures, {len(wrong)} of {len(result.predictions)} answered wrongly"
+                f"{shown} sensor images, {len(wrong)} of {len(result.predictions)} answered wrongly"
                 + (f": {told}." if told else "."),
             )  # fmt: skip
 
@@ -159,7 +159,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
         )
         yield Plot(
             f"curves-{_slug(result.id)}{suffix}", "curves", index, "", _title(grade, "robustness"),
-            f"How often pictures were named rightly as conditions got harder, for “{title}”.",
+            f"How often images were named rightly as conditions got harder, for “{title}”.",
             f"Curves of accuracy. {told}.",
         )  # fmt: skip
     on_track = tracks(result.predictions, grade.trials)
@@ -167,17 +167,17 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
         right = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
             f"track-{_slug(result.id)}{suffix}", "track", index, "", _title(grade, "along the track"),
-            "Where pictures were taken and whether they were named rightly: in the trial with most mistakes over the "
+            "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
             "floor, and in all trials by the way driven.",
-            f"{right} of {len(result.predictions)} pictures right along the track in {len(on_track)} trials.",
+            f"{right} of {len(result.predictions)} images right along the track in {len(on_track)} trials.",
         )  # fmt: skip
     wrong = misread(result.predictions)
     if wrong:
         yield Plot(
             f"misread-{_slug(result.id)}{suffix}", "misread", index, "", _title(grade, "what was misread"),
-            "Pictures that were misread, each beside the nearest one of the same truth that was read rightly, and the "
+            "Images that were misread, each beside the nearest one of the same truth that was read rightly, and the "
             "nearest right one of what it was taken for.",
-            f"{len(wrong)} of {len(result.predictions)} pictures were misread.",
+            f"{len(wrong)} of {len(result.predictions)} images were misread.",
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Draws the pictures that a light sensor sent: all of it, the focus that a network is shown, and what was answered.
+"""Draws the images that a light sensor sent: all of it, the focus that a network is shown, and what was answered.
 
 Whether an answer is right was decided when the work was marked; here it is only shown, by sign and word.
 """
@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
-from PIL import Image as Picture
+from PIL import Image as Pixels
 
 from service.grading.grade import Prediction
 from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
@@ -21,15 +21,15 @@ from service.reports.readable import one_line
 from sim.recording import Image
 
 MOST_PREDICTIONS = 12
-#: The part of the 20 x 20 picture that lies wholly inside the round sensor: left, upper, right, lower.
+#: The part of the 20 x 20 image that lies wholly inside the round sensor: left, upper, right, lower.
 FOCUS = (3, 3, 17, 17)
 _CARD_WIDTH, _CARD_HEIGHT = 2.56, 1.77
-_SIDE = 1.13  # inches of a picture
+_SIDE = 1.13  # inches of an image
 _COLUMNS = 2
 
 
 def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
-    """Cards of at most ``MOST_PREDICTIONS`` pictures, wrong answers first where not all fit."""
+    """Cards of at most ``MOST_PREDICTIONS`` images, wrong answers first where not all fit."""
     shown = chosen_predictions(predictions)
     rows = -(-len(shown) // _COLUMNS)
     height = rows * _CARD_HEIGHT
@@ -45,7 +45,7 @@ def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
 
 
 def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
-    """Indices of the pictures to show, ascending; if there are too many, all wrong ones come first."""
+    """Indices of the images to show, ascending; if there are too many, all wrong ones come first."""
     order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
     return tuple(sorted(order[:MOST_PREDICTIONS]))
 
@@ -55,32 +55,30 @@ def is_right(prediction: Prediction) -> bool:
     return prediction.answer is not None and prediction.answer == prediction.truth
 
 
-def sensor_picture(image: Image) -> Picture.Image:
-    """What the left sensor sent, as an RGB picture of ``image.side`` squared."""
-    return Picture.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
+def sensor_image(image: Image) -> Pixels.Image:
+    """What the left sensor sent, as an RGB image of ``image.side`` squared."""
+    return Pixels.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
 
 
-def focus_picture(image: Image) -> Picture.Image:
+def focus_image(image: Image) -> Pixels.Image:
     """The greyscale crop that a network is shown; sensors of another size than 20 are shown whole."""
-    whole = sensor_picture(image).convert("L")
+    whole = sensor_image(image).convert("L")
     return whole.crop(FOCUS) if image.side == 20 else whole
 
 
 def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
     wrong = sum(not is_right(prediction) for prediction in predictions)
     count = (
-        f"{len(predictions)} pictures"
-        if len(shown) == len(predictions)
-        else f"{len(shown)} of {len(predictions)} pictures"
+        f"{len(predictions)} images" if len(shown) == len(predictions) else f"{len(shown)} of {len(predictions)} images"
     )
     return f"{count}, {wrong} answered wrongly; each: all 20×20, then the 14×14 focus"
 
 
 def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
     right = is_right(prediction)
-    whole, focus = np.asarray(sensor_picture(prediction.image)), np.asarray(focus_picture(prediction.image))
-    _draw_picture(axes, whole, x, y)
-    _draw_picture(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
+    whole, focus = np.asarray(sensor_image(prediction.image)), np.asarray(focus_image(prediction.image))
+    _draw_image(axes, whole, x, y)
+    _draw_image(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
     if prediction.image.side == 20:
         pixel = _SIDE / 20
         axes.add_patch(
@@ -107,6 +105,6 @@ def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: flo
         )  # fmt: skip
 
 
-def _draw_picture(axes: Axes, pixels: NDArray[np.uint8], x: float, y: float) -> None:
+def _draw_image(axes: Axes, pixels: NDArray[np.uint8], x: float, y: float) -> None:
     axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
     axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))

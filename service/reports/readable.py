@@ -41,7 +41,7 @@ def one_line(text: str, limit: int = 120) -> str:
 
 
 def message_words(text: str, limit: int = 120) -> str:
-    """A message on one line; the thousands of numbers of a picture are named instead of listed."""
+    """A message on one line; the thousands of numbers of an image are named instead of listed."""
     if text.startswith("IMG_DATA::{") and len(text) > 200:
         return "IMG_DATA::{left, right}"
     return one_line(text, limit)

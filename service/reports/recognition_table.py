@@ -1,4 +1,4 @@
-"""What a report tells of recognition in figures: what became of the pictures, and each class's precision and recall.
+"""What a report tells of recognition in figures: what became of the images, and each class's precision and recall.
 
 Json texts for a template; everything was counted when the work was marked.
 """
@@ -43,7 +43,7 @@ def recognition_tables(grade: Grade) -> tuple[RecognitionTable, ...]:
 def _table(result: CriterionResult) -> RecognitionTable:
     accuracy = result.accuracy
     assert accuracy is not None
-    of = accuracy.counts.of if accuracy.counts is not None else "pictures"
+    of = accuracy.counts.of if accuracy.counts is not None else "images"
     return RecognitionTable(
         title=one_line(result.title, 200),
         accuracy=f"Accuracy {accuracy.value:.3f}, 95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
@@ -71,7 +71,7 @@ def _sums(result: CriterionResult) -> str:
         return ""
     missing = f", and {counts.missing} that were missing, each a wrong answer" if counts.missing else ""
     return (
-        f"Pictures sent: {counts.sent} = {counts.answered} answered + {counts.late} late + {counts.malformed} "
+        f"Images sent: {counts.sent} = {counts.answered} answered + {counts.late} late + {counts.malformed} "
         f"malformed + {counts.unanswered} unanswered; duplicate answers: {counts.duplicates}. "
         f"Counted: {counts.counted} {counts.of}{missing}."
     )

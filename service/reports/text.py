@@ -45,7 +45,7 @@ def accuracy_words(grade: Grade) -> str:
         return ""
     return (
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
-        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'pictures'})."
+        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
     )
 
 

@@ -1,7 +1,7 @@
-"""Draws recognition along a track: where each picture was taken on the floor and whether it was named rightly, and the
+"""Draws recognition along a track: where each image was taken on the floor and whether it was named rightly, and the
 share that was right along the way.
 
-What is right was decided when the work was marked; the floor is a picture that the caller gives.
+What is right was decided when the work was marked; the floor is an image that the caller gives.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from models.intervals import wilson
 from service.grading.grade import Prediction, TrialResult
 from service.grading.judging.places import part_at
 from service.reports.curve_plot import Curve, draw_curve
-from service.reports.path_plot import Picture, View, draw_floor
+from service.reports.path_plot import Pixels, View, draw_floor
 from service.reports.plot_style import (
     FAINT,
     FAULT,
@@ -40,13 +40,13 @@ from sim.recording import Recording
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.56
 _ALONG, _GAP = 1.15, 0.62  # inches: the curve, and what is between it and the floor
 _MOST_BINS = 12
-_LEAST_WAY = 60.0  # mm that pictures must be apart for a track
+_LEAST_WAY = 60.0  # mm that images must be apart for a track
 _MARGIN = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One picture: where the left sensor was (mm), how far the robot had driven (mm), and what came of it."""
+    """One image: where the left sensor was (mm), how far the robot had driven (mm), and what came of it."""
 
     x: float
     y: float
@@ -57,7 +57,7 @@ class Taken:
 
 
 def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
-    """The trials, by index, in which pictures were taken at places far enough apart to speak of a track."""
+    """The trials, by index, in which images were taken at places far enough apart to speak of a track."""
     found = []
     for index in dict.fromkeys(prediction.trial for prediction in predictions):
         places = [part_at(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
@@ -67,7 +67,7 @@ def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> 
 
 
 def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
-    """The pictures of one trial, in the order in which they were sent."""
+    """The images of one trial, in the order in which they were sent."""
     recording = trials[index].recording
     way = _way_driven(recording)
     return tuple(
@@ -84,7 +84,7 @@ def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], inde
 
 
 def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> int:
-    """Of the trials with a track the one with the smallest share of right pictures, the first of equals."""
+    """Of the trials with a track the one with the smallest share of right images, the first of equals."""
 
     def share_right(index: int) -> float:
         own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
@@ -94,40 +94,40 @@ def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]
 
 
 def draw_track(
-    predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Picture | None
+    predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Pixels | None
 ) -> Figure:
-    """The worst trial's pictures over its floor, and the share right along the way in all trials with a track."""
+    """The worst trial's images over its floor, and the share right along the way in all trials with a track."""
     own = tracks(predictions, trials)
     by_trial = {index: taken(predictions, trials, index) for index in own}
     worst = worst_track(predictions, trials)
-    pictures = [item for items in by_trial.values() for item in items]
-    right = sum(item.right for item in pictures)
+    images = [item for items in by_trial.values() for item in items]
+    right = sum(item.right for item in images)
     view = _view(by_trial[worst])
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * view.height / view.width
     trial = trials[worst]
-    what = f"{right} of n = {len(pictures)} pictures right, {len(own)} trials"
+    what = f"{right} of n = {len(images)} images right, {len(own)} trials"
     where = f"floor: {trial.scenario}, trial {trial.index + 1}"
     figure = new_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{what}; {where}")
     top = axes_at(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
     draw_floor(top, floor, view)
     top.set_xlim(view.left, view.right)
     top.set_ylim(view.bottom, view.top)
-    _draw_pictures(top, by_trial[worst], 0.045 * view.width)
+    _draw_images(top, by_trial[worst], 0.045 * view.width)
     top.set_xlabel("x, mm", font=font(8), labelpad=1)
     top.set_ylabel("y, mm", font=font(8), labelpad=1)
-    _draw_along(axes_at(figure, _LEFT_EDGE, _FOOT, width, _ALONG), pictures)
+    _draw_along(axes_at(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
     write(figure, 0.08, 0.09, "beside each place: ○ right  ✗ wrong  □ no answer;   band: 95 % interval, above it: n",
           size=7.2, colour=FAINT)  # fmt: skip
     return figure
 
 
-def along_the_way(pictures: Sequence[Taken]) -> Curve:
+def along_the_way(images: Sequence[Taken]) -> Curve:
     """The share right in at most twelve stretches of equal length, by the middles of the stretches."""
-    first, last = min(item.way for item in pictures), max(item.way for item in pictures)
+    first, last = min(item.way for item in images), max(item.way for item in images)
     length = max((last - first) / _MOST_BINS, 1.0)
     bins: dict[int, list[bool]] = {}
-    for item in pictures:
+    for item in images:
         bins.setdefault(min(int((item.way - first) / length), _MOST_BINS - 1), []).append(item.right)
     places = sorted(bins)
     counts = [(sum(bins[place]), len(bins[place])) for place in places]
@@ -142,13 +142,13 @@ def along_the_way(pictures: Sequence[Taken]) -> Curve:
     )
 
 
-def _draw_pictures(axes: Axes, pictures: Sequence[Taken], beside: float) -> None:
+def _draw_images(axes: Axes, images: Sequence[Taken], beside: float) -> None:
     """The marks stand ``beside`` mm to the robot's left of where the sensor was, so that the floor can be seen."""
     axes.plot(
-        [item.x for item in pictures], [item.y for item in pictures], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
+        [item.x for item in images], [item.y for item in images], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
     )
     shown = []
-    for item in pictures:
+    for item in images:
         angle = math.radians(item.heading + 90)
         x, y = item.x + beside * math.cos(angle), item.y + beside * math.sin(angle)
         axes.plot([item.x, x], [item.y, y], color=FAINT, linewidth=0.5, zorder=3)
@@ -173,8 +173,8 @@ def _draw_mark(axes: Axes, x: float, y: float, marker: str, colour: str, size: f
     )  # fmt: skip
 
 
-def _draw_along(axes: Axes, pictures: Sequence[Taken]) -> None:
-    curve = along_the_way(pictures)
+def _draw_along(axes: Axes, images: Sequence[Taken]) -> None:
+    curve = along_the_way(images)
     axes.set_ylim(-0.04, 1.16)
     axes.set_yticks([0, 0.5, 1])
     axes.grid(axis="y", color=RULE, linewidth=0.5)
@@ -197,8 +197,8 @@ def _way_driven(recording: Recording) -> list[float]:
     return way
 
 
-def _view(pictures: Sequence[Taken]) -> View:
-    xs, ys = [item.x for item in pictures], [item.y for item in pictures]
+def _view(images: Sequence[Taken]) -> View:
+    xs, ys = [item.x for item in images], [item.y for item in images]
     left, right, bottom, top = min(xs) - _MARGIN, max(xs) + _MARGIN, min(ys) - _MARGIN, max(ys) + _MARGIN
     width, height = right - left, top - bottom
     if height < 0.22 * width:

@@ -18,7 +18,7 @@ from service.store.codec import Json
 
 
 def storable(text: str) -> str:
-    """Text that every database takes: no NUL (shown as its picture), no lone surrogates (shown as U+FFFD)."""
+    """Text that every database takes: no NUL (shown as its image), no lone surrogates (shown as U+FFFD)."""
     return text.replace("\0", "\u2400").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 

@@ -45,7 +45,7 @@ class Prepared:
 
 
 def prepare(grade: Grade) -> Prepared:
-    """Compress the recordings and point the predictions at their pictures."""
+    """Compress the recordings and point the predictions at their images."""
     cap = recordings.cap_for(len(grade.trials))
     kept = [recordings.keep(trial.recording, cap) for trial in grade.trials]
     files = [artifacts.File(_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)]
@@ -158,7 +158,7 @@ def _criterion_row(
 
 
 def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
-    """A prediction that names its picture by number in the recording; none if the picture was too much to keep."""
+    """A prediction that names its image by number in the recording; none if the image was too much to keep."""
     if not numbers:
         return None
     where = numbers.get(prediction.image)

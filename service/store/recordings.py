@@ -1,6 +1,6 @@
 """Recordings to bytes and back: compact, bit for bit, and readable without running anything.
 
-A recording's bytes are zlib over an npz of arrays, pictures as raw bytes, and one JSON text; never a pickle.
+A recording's bytes are zlib over an npz of arrays, images as raw bytes, and one JSON text; never a pickle.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def cap_for(trials: int) -> int:
 def keep(recording: Recording, cap: int) -> Kept:
     """The recording within ``cap`` bytes; what does not fit is left out, and a note says so.
 
-    Left out first are pictures and all but the first texts of each kind, then every text, then the ticks; the
+    Left out first are images and all but the first texts of each kind, then every text, then the ticks; the
     verdict, the faults, the poses and the chain's hash always stay.
     """
     data = to_bytes(recording)
@@ -95,25 +95,25 @@ def from_bytes(data: bytes) -> Recording:
     try:
         with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
             words = json.loads(bytes(arrays["words"]))
-            pictures = bytes(arrays["pictures"])
+            pixels = bytes(arrays["pictures"])
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
             columns = {name: _unshuffled(arrays[name], np.float64)[:, 0].copy() for name in _FLOATS}
             columns |= {name: _unshuffled(arrays[name], np.int64).copy() for name in _INTEGERS}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
-        images = _with_pixels(words.pop("images"), sizes, pictures)
+        images = _with_pixels(words.pop("images"), sizes, pixels)
         words = {_FORMERLY.get(name, name): value for name, value in words.items()}
         return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
 
 
-def _with_pixels(images: list[Any], sizes: list[list[int]], pictures: bytes) -> tuple[Image, ...]:
+def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
     made = []
     offset = 0
     for words, (left, right) in zip(images, sizes, strict=True):
         middle, end = offset + left, offset + left + right
         image = decode(Image, words)
-        made.append(replace(image, left=pictures[offset:middle], right=pictures[middle:end]))
+        made.append(replace(image, left=pixels[offset:middle], right=pixels[middle:end]))
         offset = end
     return tuple(made)
 
@@ -161,7 +161,7 @@ def _without_floods(recording: Recording) -> Recording:
             datalog=recording.datalog[:_TEXT_KEPT],
             messages=recording.messages[:_TEXT_KEPT],
         ),
-        f"its pictures and the texts after the first {_TEXT_KEPT} of each kind are left out",
+        f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
     )
 
 

@@ -10,6 +10,7 @@ import json
 import zlib
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.dialects import postgresql, sqlite
@@ -19,6 +20,9 @@ from service.store import models
 from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion
 from submissions.assignment import Assignment
+
+#: What keys are called in assignments that earlier releases kept.
+_FORMERLY = {"picture": "image", "pictures": "images"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +62,7 @@ def keep(session: Session, frozen: Frozen, at: datetime) -> int:
 
 
 def assignment_to_bytes(assignment: Assignment) -> bytes:
-    """All of an assignment, pictures and given files and secret included."""
+    """All of an assignment, images and given files and secret included."""
     text = json.dumps(encode(assignment), sort_keys=True, separators=(",", ":"))
     return zlib.compress(text.encode("ascii"), 6)
 
@@ -66,9 +70,19 @@ def assignment_to_bytes(assignment: Assignment) -> bytes:
 def assignment_from_bytes(content: bytes) -> Assignment:
     """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
     try:
-        return decode(Assignment, json.loads(zlib.decompress(content)))
+        return decode(Assignment, _in_todays_words(json.loads(zlib.decompress(content))))
     except zlib.error as error:
         raise ValueError(f"not an assignment: {error}") from error
+
+
+def _in_todays_words(content: dict[str, Any]) -> dict[str, Any]:
+    """The tables of an assignment as they were kept, with the keys that they have now."""
+    kept = {name: _renamed(content[name]) for name in ("world", "training") if content.get(name) is not None}
+    return content | kept | {"criteria": [_renamed(table) for table in content["criteria"]]}
+
+
+def _renamed(table: dict[str, Any]) -> dict[str, Any]:
+    return {_FORMERLY.get(key, key): value for key, value in table.items()}
 
 
 def insert_if_new(session: Session, table: type[models.Base], **values: object) -> None:

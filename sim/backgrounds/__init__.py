@@ -1,6 +1,6 @@
 """The printed floors that the robot drives over: what they look like, and what is where on them.
 
-Pictures only: how a light sensor sees them is the camera's, and what a flag asks for is the flags'.
+Images only: how a light sensor sees them is the camera's, and what a flag asks for is the flags'.
 """
 
 from sim.backgrounds.drawing import HEIGHT, LABEL_GREYS, WIDTH
@@ -11,7 +11,7 @@ from sim.backgrounds.floors import (
     Floor,
     FloorLabel,
     floor,
-    floor_from_picture,
+    floor_from_image,
     label_names,
     names,
     start_of,
@@ -27,7 +27,7 @@ __all__ = [
     "Floor",
     "FloorLabel",
     "floor",
-    "floor_from_picture",
+    "floor_from_image",
     "label_names",
     "names",
     "start_of",

@@ -27,10 +27,10 @@ COLUMNS, ROWS = 20, 11
 #: Distance between neighbouring digits, along and across.
 PITCH = 100
 
-#: Picture column and row of the upper left pixel of the first digit, and its size.
+#: Image column and row of the upper left pixel of the first digit, and its size.
 DIGIT_LEFT, DIGIT_TOP, DIGIT_SIZE = 73, 56, 14
 
-#: Picture column and row of the upper left pixel of the first label patch, and its size.
+#: Image column and row of the upper left pixel of the first label patch, and its size.
 PATCH_LEFT, PATCH_TOP, PATCH_WIDTH, PATCH_HEIGHT = 111, 53, 21, 24
 
 #: The grey of a patch is this times the digit; the course decodes exactly these values.
@@ -39,9 +39,9 @@ GREY_STEP = 25
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A drawn sheet: ``picture`` of shape (1143, 2362, 3), and ``digits`` row by row, 20 in each, from the top left."""
+    """A drawn sheet: ``image`` of shape (1143, 2362, 3), and ``digits`` row by row, 20 in each, from the top left."""
 
-    picture: NDArray[np.uint8]
+    pixels: NDArray[np.uint8]
     digits: tuple[int, ...]
 
 

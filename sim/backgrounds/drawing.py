@@ -1,6 +1,6 @@
-"""How the plain floors are drawn: Pillow shapes at fixed picture coordinates (y down, rectangles with both edges).
+"""How the plain floors are drawn: Pillow shapes at fixed image coordinates (y down, rectangles with both edges).
 
-Only pictures, and not the tracks, digit sheets and competition mats, which have modules of their own;
+Only images, and not the tracks, digit sheets and competition mats, which have modules of their own;
 default poses, labels and obstacles of the floors are in ``floors.py``.
 """
 
@@ -38,7 +38,7 @@ def grey(level: int) -> Colour:
 
 
 def paint(painter: Painter, background: Colour = WHITE) -> NDArray[np.uint8]:
-    """A floor picture, shape (1143, 2362, 3), with ``painter``'s shapes on ``background``."""
+    """A floor image, shape (1143, 2362, 3), with ``painter``'s shapes on ``background``."""
     image = Image.new("RGB", (WIDTH, HEIGHT), background)
     painter(ImageDraw.Draw(image))
     return np.asarray(image)
@@ -149,7 +149,7 @@ UPPER_ROW, LOWER_ROW = (0, 1, 2, 3, 4, 5), (1, 5, 0, 2)
 
 
 def shape_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, patches: bool) -> None:
-    """Six shapes at picture row 218, and the unlabelled test row at 418.
+    """Six shapes at image row 218, and the unlabelled test row at 418.
 
     With ``patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
     """
@@ -181,7 +181,7 @@ def simple_shapes_with_labels(canvas: Canvas) -> None:
 
 
 def linear_grey() -> NDArray[np.uint8]:
-    """An even slope from white at picture row 100 to black at row 1043, 51 black rows, and white beyond."""
+    """An even slope from white at image row 100 to black at row 1043, 51 black rows, and white beyond."""
     column = np.full(HEIGHT, 255, dtype=np.uint8)
     for row in range(100, 1043):
         column[row] = 255 - int(255 * (row - 100) / 943)

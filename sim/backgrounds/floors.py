@@ -1,4 +1,4 @@
-"""The floors by name: picture, default pose, labels and obstacles, as the course's simulator has them.
+"""The floors by name: image, default pose, labels and obstacles, as the course's simulator has them.
 
 The drawing itself is in ``drawing.py`` and its neighbours;
 what a flag with an unknown name means is decided where flags are read.
@@ -24,7 +24,7 @@ from sim.errors import UsageError
 from sim.recording import Pose
 
 Obstacle = tuple[float, float, float, float]
-_Picture = Callable[[], NDArray[np.uint8]]
+_Pixels = Callable[[], NDArray[np.uint8]]
 
 #: The six shapes of Simple_Shapes, in the order of the codes 0 to 5 that the course gives them.
 SHAPES = (
@@ -68,14 +68,14 @@ class FloorLabel:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A background. ``picture`` is read-only, shape (1143, 2362, 3); its row 0 is at world y = 1143."""
+    """A background. ``pixels`` is read-only, shape (1143, 2362, 3); its row 0 is at world y = 1143."""
 
     name: str
-    picture: NDArray[np.uint8]
+    pixels: NDArray[np.uint8]
     default_pose: Pose
     labels: tuple[FloorLabel, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
-    patches: bool = True  # whether the picture shows the grey patches that tell the answer, where it has any
+    patches: bool = True  # whether the image shows the grey patches that tell the answer, where it has any
     sheet: int = 0  # the seed of the handwritten digits, on a digit sheet, or of the order of the shapes
 
     def label_at(self, x: float, y: float) -> str | None:
@@ -86,8 +86,8 @@ class Floor:
 @dataclass(frozen=True, slots=True)
 class _Plan:
     pose: Pose
-    picture: _Picture
-    unlabelled: _Picture | None = None
+    pixels: _Pixels
+    unlabelled: _Pixels | None = None
     labels: tuple[FloorLabel, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
 
@@ -130,8 +130,8 @@ def _shuffled_shapes(name: str, plan: _ShapesPlan, labels: bool, seed: int) -> F
     upper = sorted(drawing.UPPER_ROW, key=chance.integer)
     lower = [chance.integer(100 + column) % len(SHAPES) for column in range(len(drawing.LOWER_ROW))]
     rows = functools.partial(drawing.shape_rows, upper=upper, lower=lower, patches=labels)
-    picture = _read_only(drawing.paint(rows, drawing.WHITE))
-    return Floor(name, picture, plan.pose, _shape_labels(upper, lower), patches=labels, sheet=seed)
+    pixels = _read_only(drawing.paint(rows, drawing.WHITE))
+    return Floor(name, pixels, plan.pose, _shape_labels(upper, lower), patches=labels, sheet=seed)
 
 
 def _digit_labels(shown: tuple[int, ...]) -> tuple[FloorLabel, ...]:
@@ -210,16 +210,16 @@ def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     return _printed(name, plan, labels)
 
 
-@functools.lru_cache(maxsize=12)  # a picture is 8 MB, and flags can ask for every floor there is
+@functools.lru_cache(maxsize=12)  # an image is 8 MB, and flags can ask for every floor there is
 def _printed(name: str, plan: _Plan, labels: bool) -> Floor:
-    draw = plan.picture if labels or plan.unlabelled is None else plan.unlabelled
+    draw = plan.pixels if labels or plan.unlabelled is None else plan.unlabelled
     return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles, patches=labels)
 
 
 @functools.lru_cache(maxsize=4)  # a worker sees ever new seeds
 def _digit_sheet(name: str, plan: _SheetPlan, labels: bool, seed: int) -> Floor:
     sheet = digits.draw_sheet(seed, plan.paper, patches=labels)
-    return Floor(name, _read_only(sheet.picture), plan.pose, _digit_labels(sheet.digits), patches=labels, sheet=seed)
+    return Floor(name, _read_only(sheet.pixels), plan.pose, _digit_labels(sheet.digits), patches=labels, sheet=seed)
 
 
 def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
@@ -243,23 +243,23 @@ def label_names(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(label.label for label in plan.labels)) if plan is not None else ()
 
 
-def floor_from_picture(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
+def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
     """A floor of the instructor's own, from the bytes of a PNG or JPEG file of 2362 x 1143 pixels.
 
-    Raises UsageError when the bytes are no such picture. See-through parts show white.
+    Raises UsageError when the bytes are no such image. See-through parts show white.
     """
     try:
         with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
             if image.size != (drawing.WIDTH, drawing.HEIGHT):
                 raise UsageError(
-                    f"The background picture {name!r} is {image.width} x {image.height} pixels; "
+                    f"The background image {name!r} is {image.width} x {image.height} pixels; "
                     f"it must be {drawing.WIDTH} x {drawing.HEIGHT}, one a millimetre."
                 )
             paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
-            picture = np.asarray(Image.alpha_composite(paper, image.convert("RGBA")).convert("RGB"))
+            pixels = np.asarray(Image.alpha_composite(paper, image.convert("RGBA")).convert("RGB"))
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise UsageError(f"The background picture {name!r} cannot be read as PNG or JPEG.") from error
-    return Floor(name, _read_only(picture), default_pose)
+        raise UsageError(f"The background image {name!r} cannot be read as PNG or JPEG.") from error
+    return Floor(name, _read_only(pixels), default_pose)
 
 
 def _suggestion(name: str) -> str:
@@ -271,7 +271,7 @@ def _suggestion(name: str) -> str:
     return "there are " + ", ".join(_PLANS) + "."
 
 
-def _read_only(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    fixed = np.ascontiguousarray(picture)
+def _read_only(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    fixed = np.ascontiguousarray(pixels)
     fixed.setflags(write=False)
     return fixed

@@ -1,6 +1,6 @@
 """The competition mats, simplified: the features that activities use are where they are on the real mats.
 
-Pictures only, drawn anew, in picture coordinates (y down); nothing else of the real mats is meant to be exact.
+Images only, drawn anew, in image coordinates (y down); nothing else of the real mats is meant to be exact.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def fll_2018_into_orbit() -> NDArray[np.uint8]:
         for start, end, radius in ORBIT_BARS:
             canvas.capsule(start, end, radius - inset, colour)
     _satellite(canvas)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def _stars(canvas: SmoothCanvas) -> None:
@@ -123,7 +123,7 @@ def fll_2019_city_shaper() -> NDArray[np.uint8]:
     ):  # fmt: skip
         canvas.disc(centre, 90, WHITE)
         canvas.disc(centre, 78, colour)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def wro_2018_regular_junior() -> NDArray[np.uint8]:
@@ -145,7 +145,7 @@ def wro_2018_regular_junior() -> NDArray[np.uint8]:
         canvas.rectangle(_whole(box), colour)
         for cell in _cells(box):
             canvas.rectangle(cell, _CELL_GREY)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def wro_2019_regular_junior() -> NDArray[np.uint8]:
@@ -173,7 +173,7 @@ def wro_2019_regular_junior() -> NDArray[np.uint8]:
         canvas.rectangle((left, 900, left + 200, 1060), _CELL_GREY)
         canvas.rectangle((left + 20, 920, left + 180, 1040), WHITE)
     canvas.rectangle((80, 471, 180, 671), _WRO_BLUE)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def _whole(box: Box) -> Box:

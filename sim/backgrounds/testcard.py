@@ -1,6 +1,6 @@
 """The Testcard floor: a television test card of our own, 2215 x 1073, in the upper left of white paper.
 
-Only the picture; unlike the original's it has no see-through parts, so no earlier floor shows through.
+Only the image; unlike the original's it has no see-through parts, so no earlier floor shows through.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def testcard() -> NDArray[np.uint8]:
     canvas.rectangle((_CENTRE[0] - 350, 496.5, _CENTRE[0] + 350, 576.5), BLACK)
     canvas.line(((_CENTRE[0], 486.5), (_CENTRE[0], 586.5)), 4, WHITE)
     canvas.line(((left, _CENTRE[1]), (right, _CENTRE[1])), 4, WHITE)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def _grid(canvas: SmoothCanvas) -> None:

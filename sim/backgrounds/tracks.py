@@ -1,6 +1,6 @@
 """The floors with tracks to follow: test lines, lines with obstacles, junctions and the Thruxton circuit.
 
-Smooth-edged pictures, in picture coordinates (y down); where the obstacles stand is in ``floors.py``.
+Smooth-edged images, in image coordinates (y down); where the obstacles stand is in ``floors.py``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 
 from sim.backgrounds.drawing import BLACK, HEIGHT, RED, WHITE, WIDTH, Box, Canvas, Colour, grey
 
-#: Pictures are drawn so many times larger and then averaged.
+#: Images are drawn so many times larger and then averaged.
 SCALE = 4
 
 Point = tuple[float, float]
@@ -25,7 +25,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A centreline in picture pixels, and the width of the line drawn along it."""
+    """A centreline in image pixels, and the width of the line drawn along it."""
 
     width: float
     points: tuple[Point, ...]
@@ -38,9 +38,9 @@ def lines_of(file_name: str) -> tuple[Line, ...]:
 
 
 class SmoothCanvas:
-    """A picture that is drawn ``SCALE`` times as large and averaged, so that slanting edges are smooth.
+    """An image that is drawn ``SCALE`` times as large and averaged, so that slanting edges are smooth.
 
-    Coordinates are those of the finished picture, in which pixel 0 reaches from 0 to 1.
+    Coordinates are those of the finished image, in which pixel 0 reaches from 0 to 1.
     """
 
     def __init__(self, background: Colour = WHITE) -> None:
@@ -77,7 +77,7 @@ class SmoothCanvas:
     def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
         self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
 
-    def picture(self) -> NDArray[np.uint8]:
+    def pixels(self) -> NDArray[np.uint8]:
         """What was drawn, shape (1143, 2362, 3)."""
         return np.asarray(self._image.reduce(SCALE))
 
@@ -93,7 +93,7 @@ def line_following_test() -> NDArray[np.uint8]:
     canvas = SmoothCanvas()
     for line in lines_of("line_following_test.json"):
         canvas.line(line.points, line.width)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def obstacles_test() -> NDArray[np.uint8]:
@@ -104,7 +104,7 @@ def obstacles_test() -> NDArray[np.uint8]:
         canvas.line(line.points, line.width)
     first, last = 63.0, 1097.0
     canvas.rectangle((1036, first, 1334, last), BLACK)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def junction_handling_test() -> NDArray[np.uint8]:
@@ -131,7 +131,7 @@ def junction_handling_test() -> NDArray[np.uint8]:
         far = near + sides[side] * marker
         bottom = rows[row] + width / 2  # behind the crossing, for a robot that comes from below
         canvas.rectangle((min(near, far), bottom, max(near, far), bottom + marker), green)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 def thruxton_circuit() -> NDArray[np.uint8]:
@@ -147,12 +147,12 @@ def thruxton_circuit() -> NDArray[np.uint8]:
     canvas.polygon(bar.box(along=(-258 / 2, 258 / 2), across=(-25 / 2, 25 / 2)), grey(192))
     for start in (-200.0, 185.0):
         _chequers(canvas, bar, start)
-    return canvas.picture()
+    return canvas.pixels()
 
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """A place on the picture with its own axes: ``turn`` degrees anticlockwise from the picture's."""
+    """A place on the image with its own axes: ``turn`` degrees anticlockwise from the image's."""
 
     centre: Point
     turn: float

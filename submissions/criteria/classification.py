@@ -1,4 +1,4 @@
-"""Criteria about how often pictures are named rightly: at all, and as conditions get harder.
+"""Criteria about how often images are named rightly: at all, and as conditions get harder.
 
 Only what is asked; finding truths and answers is the service's.
 """
@@ -18,27 +18,27 @@ LabelledPlace = tuple[float, float, str]
 
 
 class Recognition(CriterionBase):
-    """How often the pictures that the robot sends are named rightly; all trials are pooled.
+    """How often the images that the robot sends are named rightly; all trials are pooled.
 
     ``truth`` is where the right answer comes from: ``"label"`` (what the floor has under the left sensor when
-    the picture was taken), ``"grey"`` (the label patch in the right sensor's picture, decoded as the course
+    the image was taken), ``"grey"`` (the label patch in the right sensor's image, decoded as the course
     does), ``"places"`` (the instructor's own: ``places`` is a list of [x, y, label] or a CSV file of such rows
     beside the assignment, and counts where the left sensor's middle is ``within`` so many mm of it), or a
     list, one label for each pose of the scenario.
 
-    The answer is looked for in the reply to the picture, at ``answer`` in its JSON if there is such a place,
-    else in the reply's text; with ``answer_from`` in what the robot said or printed between this picture and
+    The answer is looked for in the reply to the image, at ``answer`` in its JSON if there is such a place,
+    else in the reply's text; with ``answer_from`` in what the robot said or printed between this image and
     the next. Case, hyphens and ``aliases`` (label to other names for it) do not matter; an answer that names
     two different labels is wrong. ``confidence`` is where the JSON has a number from 0 to 1; it is shown, and
     never marked. ``late = "wrong"`` counts an answer as wrong that the robot had not got when it sent its
-    next picture, or at its end.
+    next image, or at its end.
 
-    ``pictures`` says which of a trial's pictures count; those of the same thing from the same place under the
-    sensor are one, by the majority of the answers. With ``each_pattern`` all pictures of one pattern count as one,
+    ``images`` says which of a trial's images count; those of the same thing from the same place under the
+    sensor are one, by the majority of the answers. With ``each_pattern`` all images of one pattern count as one,
     wherever the robot stood: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"``; a trial
-    that has pictures of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
-    ``near_start`` only pictures count whose sensor was at most so many mm from where it was at the start, so that the
-    robot cannot drive or turn to one that is easier. A trial without a picture that counts is one wrong answer, so
+    that has images of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
+    ``near_start`` only images count whose sensor was at most so many mm from where it was at the start, so that the
+    robot cannot drive or turn to one that is easier. A trial without an image that counts is one wrong answer, so
     that staying silent never helps.
     """
 
@@ -51,7 +51,7 @@ class Recognition(CriterionBase):
     late: Literal["counts", "wrong"] = "counts"
     labels: tuple[str, ...] = ()  # all that could be named; without it those that the floor and the truths have
     aliases: dict[str, Texts] = Field(default_factory=dict)
-    pictures: Literal["all", "first", "last"] = "all"
+    images: Literal["all", "first", "last"] = "all"
     near_start: float | None = Field(default=None, gt=0, le=5000)
     each_pattern: Literal["first", "any", "majority"] | None = None
     patterns: int = Field(default=0, ge=0, le=1000)
@@ -87,9 +87,9 @@ class Recognition(CriterionBase):
             raise ValueError('needs truth = "places" and places together, expected both or neither')
         if self.patterns and self.each_pattern is None:
             raise ValueError('has patterns without each_pattern, expected each_pattern = "majority" or the like')
-        if self.each_pattern is not None and (self.pictures != "all" or isinstance(self.truth, tuple)):
+        if self.each_pattern is not None and (self.images != "all" or isinstance(self.truth, tuple)):
             raise ValueError(
-                "has each_pattern beside pictures or a list of truths, expected it with what the floor or places tell"
+                "has each_pattern beside images or a list of truths, expected it with what the floor or places tell"
             )
         if self.answer_from != "reply" and (self.confidence is not None or self.late == "wrong"):
             raise ValueError(f'has confidence or late beside answer_from = "{self.answer_from}", expected replies')
@@ -97,7 +97,7 @@ class Recognition(CriterionBase):
 
 
 class Classification(Recognition):
-    """How often pictures are named rightly.
+    """How often images are named rightly.
 
     Marks: without ``at_least`` the marks times the accuracy. With it, all marks from that accuracy on, and
     ``marks x accuracy / at_least`` below. ``over = "all"``: all marks from ``at_least`` (1 if not given)
@@ -124,7 +124,7 @@ class Classification(Recognition):
 
 
 class Robustness(Recognition):
-    """How long pictures are named rightly as one swept condition gets harder.
+    """How long images are named rightly as one swept condition gets harder.
 
     ``along`` is a condition of the scenario's sweep. ``marks_from = "area"``: the marks times the mean height
     of the curve of accuracy (the area under it, by the width of the sweep). ``"falls_below"``: the marks times

@@ -1,6 +1,6 @@
 """Criteria about where the robot goes: through places, within areas, clear of them, round and near a point.
 
-Only what is asked; lines to follow and pictures to draw have their own modules.
+Only what is asked; lines to follow and images to draw have their own modules.
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ class Says(_TextSequence):
 
 
 class Messages(_TextSequence):
-    """What the robot sends to the responder: texts like ``PY::0``; a picture is the text ``IMG_DATA::...``.
+    """What the robot sends to the responder: texts like ``PY::0``; an image is the text ``IMG_DATA::...``.
 
     With ``json = true`` it is, instead, the robot's queue that is looked at: every answer that began with
     ``JSON::``, was well formed and arrived while the program ran, in order of arrival; ``path`` picks the

@@ -1,4 +1,4 @@
-"""Training and asking the course's networks; the pictures of networks and losses that a notebook shows are left out.
+"""Training and asking the course's networks; the images of networks and losses that a notebook shows are left out.
 
 Predicting divides an image by its brightest pixel, training by its length, as the course does.
 """

@@ -252,7 +252,7 @@ def _frames(told: bytes) -> Iterator[bytes]:
 
 
 class _Pickler(pickle.Pickler):
-    """Names the pictures of the recordings by where they are: they are many, and both sides have them."""
+    """Names the images of the recordings by where they are: they are many, and both sides have them."""
 
     def __init__(self, file: io.BytesIO, places: Mapping[int, tuple[int, int]]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)

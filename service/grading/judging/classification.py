@@ -1,6 +1,6 @@
-"""Judging how often the pictures that the robot sent were named rightly: accuracy, confusion, and every picture.
+"""Judging how often the images that the robot sent were named rightly: accuracy, confusion, and every image.
 
-It compares words only; what a picture shows is found in ``truths.py``, what became of it in ``tally.py``.
+It compares words only; what an image shows is found in ``truths.py``, what became of it in ``tally.py``.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import Side, by_pattern
 from service.grading.judging.samples import Sample
 from service.grading.judging.tally import Reply, ReplyStatus, reply_to
-from service.grading.judging.truths import NO_PICTURE, missing_truth, nameable, shown_in
+from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition
 
-#: A picture taken so near to an earlier one, mm, shows the same again.
+#: An image taken so near to an earlier one, mm, shows the same again.
 _SAME_PLACE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """What a recognition criterion found in its trials: each picture or, where it says so, each pattern."""
+    """What a recognition criterion found in its trials: each image or, where it says so, each pattern."""
 
     samples: tuple[Sample, ...]
     accuracy: Accuracy
@@ -40,12 +40,12 @@ class Classified:
 
 
 def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
-    """Every picture of ``trials`` (with their indices in the grade) that counts, pooled."""
+    """Every image of ``trials`` (with their indices in the grade) that counts, pooled."""
     shown = shown_in(criterion, trials)
     truths = [truth for told_truths in shown.values() for _, truth in told_truths]
     labels = nameable(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
-    pictures: list[Sample] = []
+    images: list[Sample] = []
     samples: list[Sample] = []
     statuses: Counter[ReplyStatus] = Counter()
     duplicates = 0
@@ -59,7 +59,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
             answer, words, confidence = _answer(criterion, replies[number], finder)
             image = recording.images[number]
             own.append(Sample(index, image, finder.canonical(truth), answer, words, confidence))
-        pictures += own
+        images += own
         samples += _that_count(criterion, index, trial, own, finder)
     by_index = dict(trials)
     of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
@@ -67,7 +67,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
         of_trial[sample.trial].append(sample)
     predictions = tuple(
         Prediction(sample.image, sample.truth, sample.answer, by_index[sample.trial].scenario, sample.trial)
-        for sample in pictures
+        for sample in images
         if sample.image is not None
     )
     missing = sum(sample.image is None for sample in samples)
@@ -80,7 +80,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
         duplicates,
         len(samples) - missing,
         missing,
-        "pictures" if criterion.each_pattern is None else "patterns",
+        "images" if criterion.each_pattern is None else "patterns",
     )
     return Classified(
         tuple(samples),
@@ -91,14 +91,14 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tu
 
 
 def told(sample: Sample) -> str:
-    """A sentence on one picture."""
+    """A sentence on one image."""
     if sample.image is None:
-        if sample.truth == NO_PICTURE:
-            return f"Expected a picture (IMG_DATA), but {sample.words}."
+        if sample.truth == NO_IMAGE:
+            return f"Expected an image (IMG_DATA), but {sample.words}."
         return f"Expected {quoted(sample.truth)}, but {sample.words}."
     if sample.right:
-        return f"The picture showed {quoted(sample.truth)} and was named so."
-    return f"The picture showed {quoted(sample.truth)}, but {sample.words}."
+        return f"The image showed {quoted(sample.truth)} and was named so."
+    return f"The image showed {quoted(sample.truth)}, but {sample.words}."
 
 
 def _that_count(
@@ -108,7 +108,7 @@ def _that_count(
     own: list[Sample],
     finder: LabelFinder,
 ) -> Sequence[Sample]:
-    """A trial's pictures, or its patterns; where there are none, or too few, wrong answers in their place."""
+    """A trial's images, or its patterns; where there are none, or too few, wrong answers in their place."""
     if criterion.each_pattern is None:
         counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
     else:
@@ -120,12 +120,12 @@ def _that_count(
         return counted
     if not counted and criterion.patterns <= 1:
         truth = missing_truth(criterion, trial)
-        sent = "the robot sent none" if truth == NO_PICTURE else "the robot sent no picture"
+        sent = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"
         return [Sample(index, None, finder.canonical(truth), None, sent)]
-    words = f"the robot sent pictures of {len(counted)} patterns, and {criterion.patterns} were expected"
-    lacking = Sample(index, None, NO_PICTURE, None, words)
+    words = f"the robot sent images of {len(counted)} patterns, and {criterion.patterns} were expected"
+    lacking = Sample(index, None, NO_IMAGE, None, words)
     return [*counted, *[lacking] * (criterion.patterns - len(counted))]
 
 
@@ -152,7 +152,7 @@ def _confidence(samples: Sequence[Sample]) -> Confidence | None:
 
 
 def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
-    """The first picture of the trial that was named wrongly, else its last."""
+    """The first image of the trial that was named wrongly, else its last."""
     shown = next((sample for sample in own if not sample.right), own[-1])
     image = shown.image
     return Evidence(
@@ -165,7 +165,7 @@ def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
 
 
 def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
-    """What came back to every picture of the recording, whether it counts or not."""
+    """What came back to every image of the recording, whether it counts or not."""
     if criterion.answer_from == "reply":
         answers = Answers(recording)
         return [reply_to(recording, answers, number) for number in range(len(recording.images))]
@@ -209,7 +209,7 @@ def _probability(value: object) -> float | None:
 
 
 def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
-    """What the robot said or printed after this picture and before the next."""
+    """What the robot said or printed after this image and before the next."""
     following = bisect_right(recording.images, image.message, key=lambda other: other.message)
     end = recording.images[following].t if following < len(recording.images) else math.inf
     lines = recording.spoken if speech else recording.printed

@@ -1,6 +1,6 @@
-"""Reading the grey patch that stands beside a pattern in the right sensor's picture, as the course's notebooks do.
+"""Reading the grey patch that stands beside a pattern in the right sensor's image, as the course's notebooks do.
 
-A picture in, a label out; where the robot was does not matter here.
+An image in, a label out; where the robot was does not matter here.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image as Picture
+from PIL import Image as Pixels
 
 from sim.backgrounds import SHAPES
 from sim.recording import Image
 
 #: Of the greys of neighbouring labels, half the smallest distance; a median further off is no label's.
 _TOLERANCE = 12.0
-#: So much of the focus must be of the patch's grey: an edge of a patch in the picture makes it no use.
+#: So much of the focus must be of the patch's grey: an edge of a patch in the image makes it no use.
 _UNIFORM_SHARE = 0.98
 _SLACK = 3.0
 
@@ -35,7 +35,7 @@ GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
 
 
 def decoded(image: Image, background: str, light_noise: float = 0.0) -> str | None:
-    """The label whose patch fills the right picture's focus; None if none does.
+    """The label whose patch fills the right image's focus; None if none does.
 
     ``light_noise`` is the amplitude, in grey levels, that pixels may be off.
     """
@@ -60,11 +60,11 @@ def focus(rgba: bytes, side: int) -> NDArray[np.uint8]:
     return _pixels(rgba, side)[edge : side - edge, edge : side - edge, 0]
 
 
-def grey_picture(image: Image, *, focus: bool) -> NDArray[np.uint8]:
-    """The left picture as greys (Pillow's ``convert("L")``): its 14 x 14 focus, or all 20 x 20 pixels."""
+def grey_image(image: Image, *, focus: bool) -> NDArray[np.uint8]:
+    """The left image as greys (Pillow's ``convert("L")``): its 14 x 14 focus, or all 20 x 20 pixels."""
     edge = round(image.side * 3 / 20) if focus else 0
     rgb = np.ascontiguousarray(_pixels(image.left, image.side)[:, :, :3])
-    grey = np.asarray(Picture.fromarray(rgb).convert("L"))
+    grey = np.asarray(Pixels.fromarray(rgb).convert("L"))
     return np.ascontiguousarray(grey[edge : image.side - edge, edge : image.side - edge])
 
 

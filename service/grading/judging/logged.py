@@ -181,7 +181,7 @@ def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float
 
 def _crop(recording: Recording, sensor: LightSensor, pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """RGB under the sensor, shape (diameter, diameter, 3), black off the floor."""
-    picture = floor(recording.background, labels=recording.patches, seed=recording.sheet).picture
+    drawn = floor(recording.background, labels=recording.patches, seed=recording.sheet).pixels
     sine, cosine = sincos(math.radians(pose.heading) - math.pi / 2)
     where = look(sensor, pose.x, pose.y, sine, cosine)
     side = sensor.diameter
@@ -190,7 +190,7 @@ def _crop(recording: Recording, sensor: LightSensor, pose: Pose) -> np.ndarray[t
     bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
     if top < bottom and left < right:
         place = (slice(top - where.row, bottom - where.row), slice(left - where.column, right - where.column))
-        crop[place] = picture[top:bottom, left:right]
+        crop[place] = drawn[top:bottom, left:right]
     return crop
 
 
@@ -206,7 +206,7 @@ def _is_uniform(csv: str) -> bool:
 
 
 def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
-    """Whether there was floor under the sensor and, where the floor has label patches, one that fills its picture."""
+    """Whether there was floor under the sensor and, where the floor has label patches, one that fills its image."""
     side, csv, tick = entry
     pose = pose_at(recording, tick / 30)
     if floor_share(recording, "left" if side == "left" else "right", pose) < 1:

@@ -1,6 +1,6 @@
-"""Several pictures of one pattern, sent while the robot drives over it, made into one answer.
+"""Several images of one pattern, sent while the robot drives over it, made into one answer.
 
-Pictures belong together if they show the same thing at the same place under the sensor, wherever the robot stood.
+Images belong together if they show the same thing at the same place under the sensor, wherever the robot stood.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ _Place = tuple[float, float]
 
 
 def by_pattern(
-    pictures: Sequence[Sample], recording: Recording, how: How, apart: float, side: Side = "left"
+    images: Sequence[Sample], recording: Recording, how: How, apart: float, side: Side = "left"
 ) -> list[Sample]:
-    """One sample for each pattern among a trial's ``pictures``, in the order in which the robot came to them.
+    """One sample for each pattern among a trial's ``images``, in the order in which the robot came to them.
 
-    Pictures of the same truth are of one pattern if the sensor of that ``side`` was at most ``apart`` mm from where it
+    Images of the same truth are of one pattern if the sensor of that ``side`` was at most ``apart`` mm from where it
     took the first of them.
     """
     groups = _Groups(apart)
-    for picture in pictures:
-        if picture.image is not None:
-            groups.add(picture, part_at(recording, side, picture.image.pose))
+    for image in images:
+        if image.image is not None:
+            groups.add(image, part_at(recording, side, image.image.pose))
     return [_one(group, how) for group in groups.found]
 
 
 @dataclass(slots=True)
 class _Groups:
-    """Pictures by pattern. The floor is cut into squares, so that only neighbours have to be compared."""
+    """Images by pattern. The floor is cut into squares, so that only neighbours have to be compared."""
 
     apart: float
     found: list[list[Sample]] = field(default_factory=list)
     _near: dict[tuple[str, int, int], list[tuple[int, _Place]]] = field(default_factory=dict)
 
-    def add(self, picture: Sample, place: _Place) -> None:
-        own = (picture.truth, *self._square(place))
+    def add(self, image: Sample, place: _Place) -> None:
+        own = (image.truth, *self._square(place))
         numbers = [number for number, first in self._neighbours(own) if math.dist(first, place) <= self.apart]
         if numbers:
-            self.found[min(numbers)].append(picture)
+            self.found[min(numbers)].append(image)
         else:
             self._near.setdefault(own, []).append((len(self.found), place))
-            self.found.append([picture])
+            self.found.append([image])
 
     def _square(self, place: _Place) -> tuple[int, int]:
         return math.floor(place[0] / self.apart), math.floor(place[1] / self.apart)
@@ -76,14 +76,14 @@ def _one(group: Sequence[Sample], how: How) -> Sample:
 
 
 def _majority(group: Sequence[Sample]) -> Sample:
-    """The picture whose answer was given most often; silence counts only if nothing was answered."""
+    """The image whose answer was given most often; silence counts only if nothing was answered."""
     counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
         return group[0]
     most = counts[0][1]
     leaders = tuple(str(answer) for answer, count in counts if count == most)
     if len(leaders) > 1:
-        words = f"{listed(leaders)} were answered equally often for its {len(group)} pictures"
+        words = f"{listed(leaders)} were answered equally often for its {len(group)} images"
         return replace(group[0], answer=None, words=words)
     chosen = next(sample for sample in group if sample.answer == leaders[0])
-    return replace(chosen, words=f"it was taken for {listed(leaders)} {most} times in {len(group)} pictures")
+    return replace(chosen, words=f"it was taken for {listed(leaders)} {most} times in {len(group)} images")

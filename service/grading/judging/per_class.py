@@ -12,7 +12,7 @@ from service.grading.grade import Accuracy
 
 @dataclass(frozen=True, slots=True)
 class ClassScore:
-    """One class: how many pictures showed it, how often it was answered, and how often both.
+    """One class: how many images showed it, how often it was answered, and how often both.
 
     ``precision`` is right / answered and ``recall`` right / shown; None where there is nothing to divide by.
     """

@@ -68,9 +68,9 @@ def _judged(
 
 
 def counts_words(counts: Counts) -> str:
-    """``9 pictures sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
+    """``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
     return (
-        f"{counts.sent} pictures sent: {counts.answered} answered, {counts.late} late, {counts.malformed} malformed, "
+        f"{counts.sent} images sent: {counts.answered} answered, {counts.late} late, {counts.malformed} malformed, "
         f"{counts.unanswered} unanswered; {counts.duplicates} duplicate answers"
     )
 
@@ -88,7 +88,7 @@ def _right(found: Classified) -> int:
 
 def _tally(criterion: Recognition, found: Classified) -> str:
     accuracy = found.accuracy
-    what = "pictures" if criterion.each_pattern is None else "patterns"
+    what = "images" if criterion.each_pattern is None else "patterns"
     words = (
         f"{_right(found)} of {accuracy.n} {what} named rightly: accuracy {accuracy.value:.2f} "
         f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
@@ -136,7 +136,7 @@ def _robustness_words(criterion: Robustness, curve: AccuracyCurve) -> str:
 
 
 def _first_wrong(samples: Sequence[Sample], trials: dict[int, TrialResult]) -> str:
-    """Where the first picture was named wrongly."""
+    """Where the first image was named wrongly."""
     first = next((sample for sample in samples if not sample.right), None)
     if first is None:
         return ""

@@ -1,6 +1,6 @@
-"""What one picture was taken for: the smallest thing that recognition is counted in.
+"""What one image was taken for: the smallest thing that recognition is counted in.
 
-Json data; how a picture and its answer are found is ``classification.py``'s.
+Json data; how an image and its answer are found is ``classification.py``'s.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from sim.recording import Image
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One picture that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
+    """One image that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
 
     trial: int  # index into the grade's trials
     image: Image | None

@@ -1,6 +1,6 @@
-"""What became of every picture that was sent: answered, late, malformed or unanswered; and the answer that counts.
+"""What became of every image that was sent: answered, late, malformed or unanswered; and the answer that counts.
 
-Each picture is in exactly one of the four, so that they add up to the pictures sent. What an answer says is
+Each image is in exactly one of the four, so that they add up to the images sent. What an answer says is
 read elsewhere.
 """
 
@@ -19,7 +19,7 @@ _BEST_FIRST: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unansw
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What came back to one picture. ``text`` is the answer that counts; ``words`` say why there is none."""
+    """What came back to one image. ``text`` is the answer that counts; ``words`` say why there is none."""
 
     status: ReplyStatus
     text: str | None
@@ -28,9 +28,9 @@ class Reply:
 
 
 def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
-    """What came back to picture ``number`` of the recording.
+    """What came back to image ``number`` of the recording.
 
-    An answer is late if it arrived after the next picture was sent, or was under way when the program ended.
+    An answer is late if it arrived after the next image was sent, or was under way when the program ended.
     One that was lost on its way is none. Of several answers the first that arrived in time counts.
     """
     image = recording.images[number]
@@ -57,12 +57,12 @@ def _status(message: Message, following: float | None) -> ReplyStatus:
 
 
 def _silence(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
-    """Nothing arrived: the picture or its answer was lost, the answer was no text, or there was none."""
+    """Nothing arrived: the image or its answer was lost, the answer was no text, or there was none."""
     if came:
         return Reply("unanswered", None, "the answer was lost on its way")
     sent = recording.messages[question] if question < len(recording.messages) else None
     if sent is not None and sent.note == "lost":
-        return Reply("unanswered", None, "the picture was lost on its way")
+        return Reply("unanswered", None, "the image was lost on its way")
     fault = answers.fault_after(question)
     if fault is not None and fault.verdict is Verdict.PROTOCOL_ERROR and "the responder returned" in fault.message:
         return Reply("malformed", None, answers.silence(question))

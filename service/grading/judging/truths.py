@@ -1,6 +1,6 @@
-"""What each picture shows: as the floor, its grey patch, the instructor's places or the assignment's list has it.
+"""What each image shows: as the floor, its grey patch, the instructor's places or the assignment's list has it.
 
-Which pictures count, too; what was answered is none of this module's business.
+Which images count, too; what was answered is none of this module's business.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import LabelledPlace, Recognition
 
-#: Stands for the truth of a picture that was never sent, where the assignment does not tell it.
-NO_PICTURE = "(no picture)"
+#: Stands for the truth of an image that was never sent, where the assignment does not tell it.
+NO_IMAGE = "(no image)"
 
-#: The number of a picture in its recording, and what it shows.
+#: The number of an image in its recording, and what it shows.
 Shown = tuple[int, str]
 
 
 def shown_in(criterion: Recognition, trials: Sequence[tuple[int, TrialResult]]) -> Mapping[int, Sequence[Shown]]:
-    """For each trial (by its index in the grade) the pictures that count, in the order in which they were sent.
+    """For each trial (by its index in the grade) the images that count, in the order in which they were sent.
 
-    Pictures of floor that has no name show nothing to name, and do not count.
+    Images of floor that has no name show nothing to name, and do not count.
     """
     return {index: _counted(criterion, _known(criterion, trial)) for index, trial in trials}
 
 
 def missing_truth(criterion: Recognition, trial: TrialResult) -> str:
-    """What a trial without a picture should have shown, where the assignment tells it."""
-    return _told(criterion, trial) or NO_PICTURE
+    """What a trial without an image should have shown, where the assignment tells it."""
+    return _told(criterion, trial) or NO_IMAGE
 
 
 def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[str]) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[st
 
 
 def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
-    match criterion.pictures:
+    match criterion.images:
         case "first":
             return known[:1]
         case "last":
