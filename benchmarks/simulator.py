@@ -32,8 +32,8 @@ _LIMITS = ChildLimits(30, 512 << 20)
 
 def measure() -> list[Measurement]:
     """Times real time, on one core, by CPU time."""
-    image = floor(_FLOOR).image
-    arena, cached, camera = Arena(), CachedCamera(image), BulletCamera(image)
+    pixels = floor(_FLOOR).pixels
+    arena, cached, camera = Arena(), CachedCamera(pixels), BulletCamera(pixels)
     try:
         table = median_of(5, lambda: cpu_seconds(lambda: _follow(arena, cached)))
         shots = median_of(3, lambda: cpu_seconds(lambda: _follow(arena, camera)))

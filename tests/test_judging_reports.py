@@ -324,11 +324,11 @@ def test_one_series_dips_below_another_and_samples_have_times() -> None:
 
 def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tuple[str, str, int]:
     """What the sensor sees at ``pose`` on sheet 34, from the image itself."""
-    pixels = floor("MNIST_Digits", seed=34).pixels
+    drawn = floor("MNIST_Digits", seed=34).pixels
     column = int(pose.x) - (30 if side == "left" else -10)
     row = 1143 - int(pose.y) - 40
     pixels = np.full((20, 20, 4), 255, np.uint8)
-    crop = pixels[row : row + 20, column : column + 20].astype(int)
+    crop = drawn[row : row + 20, column : column + 20].astype(int)
     pixels[:, :, :3] = np.clip(crop + noise, 0, 255)
     return side, ",".join(map(str, pixels.ravel().tolist())), tick
 

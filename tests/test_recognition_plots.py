@@ -92,7 +92,7 @@ def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     curve = along_the_way([*taken(predictions, grade.trials, 0), *images])
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").image))
+    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").pixels))
     assert {"x, mm", "y, mm", "way driven, mm", "share right"} <= set(shown)
     assert any(f"of n = {len(predictions)} images right, 2 trials" in text for text in shown)
 

@@ -161,7 +161,7 @@ class Watch:
 @cache
 def _question() -> tuple[Submission, Assignment]:
     assignment = read_assignment(FOLDER)
-    return read_submission(FOLDER / "grading_request", asked=assignment.parts), assignment
+    return read_submission(FOLDER / "submission", asked=assignment.parts), assignment
 
 
 def _start(answer: Known, number: int) -> str:
