@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from models.images import Place
 from models.networks import Plan
 from models.preprocessing import SIDE, Grey, features, luma
 from models.tasks import Examples, Task, Test
-from models.views import Place
 from sim.backgrounds import floor
 from sim.backgrounds.digits import COLUMNS, PITCH, ROWS
 from sim.chance import Stream

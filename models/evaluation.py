@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from models import digits, networks, shapes
 from models.cards import Card, Curve, Measured, Tally, card, weights_bytes
+from models.images import Photographer, Place, Shift
 from models.preprocessing import Grey, features
 from models.tasks import Task
-from models.views import Place, Shift, Viewer
 
 TASKS = {task.name: task for task in (digits.DIGITS, digits.DIGITS_28, shapes.TASK)}
 
@@ -67,9 +67,9 @@ def evaluate(name: str) -> Evaluation:
 
 def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...]]:
     """The whole test of ``task``, and the images that its accuracy counts."""
-    with Viewer() as viewer:
-        answered = tuple(_accuracy(task, network, viewer))
-        curves = tuple(_curves(task, network, viewer))
+    with Photographer() as photographer:
+        answered = tuple(_accuracy(task, network, photographer))
+        curves = tuple(_curves(task, network, photographer))
     confusion = np.zeros((len(task.classes), len(task.classes)), np.int64)
     for each in answered:
         confusion[each.place.label, each.answer] += 1
@@ -77,18 +77,18 @@ def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...
     return Measured(Tally(int(np.trace(confusion)), len(answered)), table, curves), answered
 
 
-def _accuracy(task: Task, network: Network, viewer: Viewer) -> Iterator[Answered]:
+def _accuracy(task: Task, network: Network, photographer: Photographer) -> Iterator[Answered]:
     test = task.test()
     for noise, draws in test.noises:
-        found = list(viewer.draws(test.places, Shift(noise=noise), "accuracy", draws))
+        found = list(photographer.draws(test.places, Shift(noise=noise), "accuracy", draws))
         answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
         for (place, grey), answer in zip(found, answers, strict=True):
             yield Answered(place, noise, grey, int(answer))
 
 
-def _curves(task: Task, network: Network, viewer: Viewer) -> Iterator[Curve]:
+def _curves(task: Task, network: Network, photographer: Photographer) -> Iterator[Curve]:
     words = ("light noise", "grey levels either way", "on the spot")
-    yield _curve(task, network, viewer, words, _LIGHT_NOISES, Shift(), "noise")
+    yield _curve(task, network, photographer, words, _LIGHT_NOISES, Shift(), "noise")
     sweeps: tuple[tuple[str, str, tuple[float, ...], Axis], ...] = (
         ("offset in x", "mm", _MILLIMETRES, "x"),
         ("offset in y", "mm", _MILLIMETRES, "y"),
@@ -97,13 +97,13 @@ def _curves(task: Task, network: Network, viewer: Viewer) -> Iterator[Curve]:
     for varied, unit, values, axis in sweeps:
         for noise in task.test().noises_beside:
             words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
-            yield _curve(task, network, viewer, words, values, Shift(noise=noise), axis)
+            yield _curve(task, network, photographer, words, values, Shift(noise=noise), axis)
 
 
 def _curve(
     task: Task,
     network: Network,
-    viewer: Viewer,
+    photographer: Photographer,
     words: tuple[str, str, str],
     values: Sequence[float],
     rest: Shift,
@@ -112,7 +112,7 @@ def _curve(
     test = task.test()
     tallies = []
     for value in values:
-        found = list(viewer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws))
+        found = list(photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws))
         answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
         right = sum(place.label == answer for (place, _), answer in zip(found, answers, strict=True))
         tallies.append(Tally(int(right), len(found)))

@@ -9,10 +9,10 @@ import itertools
 
 import numpy as np
 
+from models.images import Photographer, Place, Shift
 from models.networks import Plan
 from models.preprocessing import features
 from models.tasks import Examples, Task, Test
-from models.views import Place, Shift, Viewer
 from sim.backgrounds import SHAPES
 from sim.chance import Stream
 from sim.recording import Pose
@@ -31,12 +31,12 @@ def places() -> tuple[Place, ...]:
 def _examples() -> Examples:
     """Every shape at every offset, without noise and with several noises; on the spot with more."""
     images, labels = [], []
-    with Viewer() as viewer:
+    with Photographer() as photographer:
         for place, dx, dy in itertools.product(places(), _OFFSETS, _OFFSETS):
             noises = (*_NOISES, *(_NOISES_ON_THE_SPOT if dx == dy == 0 else ()))
             for draw, noise in enumerate(noises):
                 name = f"{_SEED}:{place.label}:{dx}:{dy}:{draw}"
-                grey = viewer.look(place, Shift(x=dx, y=dy, noise=noise), Stream(0, name).integer(0) >> 1)
+                grey = photographer.image(place, Shift(x=dx, y=dy, noise=noise), Stream(0, name).integer(0) >> 1)
                 images.append(features(grey))
                 labels.append(place.label)
     return np.array(images), np.array(labels, np.int64)

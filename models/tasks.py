@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from models.images import Place
 from models.networks import Plan
 from models.preprocessing import Vector
-from models.views import Place
 
 Examples = tuple[Vector, NDArray[np.int64]]
 

@@ -310,7 +310,7 @@ class Bridge:
     def _send_image(self) -> None:
         left, right = self.world.images()
         self._spend(len(left) + len(right), "sent images of")
-        where = self.world.left_look
+        where = self.world.left_footprint
         text = messages.image_message(left, right)
         self._meter.keep(len(text) + len(left) + len(right))
         number = self.conversation.send(text, self.now)

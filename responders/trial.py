@@ -88,7 +88,7 @@ def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], san
         touches=tuple(world.touches),
         faults=faults,
         obstacles=world.obstacles,
-        patches=spec.floor.patches,
+        label_patches=spec.floor.label_patches,
         sheet=spec.floor.sheet,
         robot=spec.robot.name,
         pen=((0, True),) if spec.pen_down else (),

@@ -19,7 +19,7 @@ _OUTSIDE = (245, 226, 225)
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Footprint:
     """Where a sensor is at one moment: the window's upper left pixel and the sensor's middle in world mm."""
 
     column: int
@@ -28,7 +28,7 @@ class Look:
     y: float
 
 
-def look(sensor: LightSensor, x: float, y: float, sine: float, cosine: float) -> Look:
+def footprint(sensor: LightSensor, x: float, y: float, sine: float, cosine: float) -> Footprint:
     """Where ``sensor`` looks from a robot at (x, y); sine and cosine are of the heading less a right angle.
 
     The order of the operations is the original's (robolab section 4), because the result is truncated.
@@ -36,7 +36,7 @@ def look(sensor: LightSensor, x: float, y: float, sine: float, cosine: float) ->
     column = cosine * sensor.x - sine * sensor.y + x
     row = -(sine * sensor.x + cosine * sensor.y) + (HEIGHT - y)
     radius = sensor.diameter / 2
-    return Look(int(column - radius), int(row - radius), column, HEIGHT - row)
+    return Footprint(int(column - radius), int(row - radius), column, HEIGHT - row)
 
 
 class LightReader:
@@ -50,14 +50,14 @@ class LightReader:
         self._mask = sensor_mask(sensor.diameter)
         self.pixels = int(self._mask.sum())
 
-    def sums(self, where: Look, tick: int) -> tuple[int, int, int]:
+    def sums(self, where: Footprint, tick: int) -> tuple[int, int, int]:
         """R, G, B summed over the sensor's pixels, noise included."""
         if self._noise <= 0:
             return self._camera.sums(where.column, where.row, self.sensor.diameter)
         red, green, blue = self._noisy(where, tick).sum(axis=0, dtype=np.int64).tolist()
         return red, green, blue
 
-    def image(self, where: Look, tick: int) -> bytes:
+    def image(self, where: Footprint, tick: int) -> bytes:
         """RGBA bytes, row-major, top row first; pixels outside the round window have the original's fixed colour."""
         side = self.sensor.diameter
         rgba = np.empty((side, side, 4), np.uint8)
@@ -70,7 +70,7 @@ class LightReader:
         rgba[self._mask, :3] = seen
         return rgba.tobytes()
 
-    def _noisy(self, where: Look, tick: int) -> NDArray[np.uint8]:
+    def _noisy(self, where: Footprint, tick: int) -> NDArray[np.uint8]:
         """The seen pixels with uniform noise, rounded half up and clamped, shape (pixels, 3)."""
         seen = self._camera.window(where.column, where.row, self.sensor.diameter)[self._mask]
         offsets = self._chance.uniforms(tick, self.pixels * 3).reshape(-1, 3) * (2 * self._noise) - self._noise

@@ -20,7 +20,7 @@ from sim.drive import Drive
 from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import TICK, Pose, Ticks, Touch
 from sim.robot import Robot
-from sim.sensors import LightReader, Look, look
+from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
 
 _ROW = struct.Struct("<q5d6q2d")
@@ -91,7 +91,7 @@ class World:
             LightReader(robot.right_light, camera, noise.light, Stream(seed, "right light")),
         )
         self._noisy = noise.light > 0
-        self._looks: tuple[Look, Look]
+        self._footprints: tuple[Footprint, Footprint]
         self.left_sums = self.right_sums = (0, 0, 0)
         self.ultrasonic = 0.0
         self.touches: list[Touch] = []
@@ -129,13 +129,15 @@ class World:
 
     def images(self) -> tuple[bytes, bytes]:
         """RGBA bytes of the left and the right light sensor, as of the last tick."""
-        left, right = (reader.image(where, self.clock) for reader, where in zip(self._lights, self._looks, strict=True))
+        left, right = (
+            reader.image(where, self.clock) for reader, where in zip(self._lights, self._footprints, strict=True)
+        )
         return left, right
 
     @property
-    def left_look(self) -> Look:
+    def left_footprint(self) -> Footprint:
         """Where the left light sensor looks."""
-        return self._looks[0]
+        return self._footprints[0]
 
     @property
     def pixels(self) -> tuple[int, int]:
@@ -165,14 +167,14 @@ class World:
         if moved:
             sine, cosine = sincos(drive.heading - _RIGHT_ANGLE)
             left, right = self.robot.left_light, self.robot.right_light
-            self._looks = (
-                look(left, drive.x, drive.y, sine, cosine),
-                look(right, drive.x, drive.y, sine, cosine),
+            self._footprints = (
+                footprint(left, drive.x, drive.y, sine, cosine),
+                footprint(right, drive.x, drive.y, sine, cosine),
             )
             self._feel()
         if moved or self._noisy:
-            self.left_sums = self._lights[0].sums(self._looks[0], self.clock)
-            self.right_sums = self._lights[1].sums(self._looks[1], self.clock)
+            self.left_sums = self._lights[0].sums(self._footprints[0], self.clock)
+            self.right_sums = self._lights[1].sums(self._footprints[1], self.clock)
         if listen:
             self.ultrasonic = self._arena.distance(drive.x, drive.y, drive.heading, self.robot.ultrasonic_y)
 

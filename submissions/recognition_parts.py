@@ -44,7 +44,7 @@ def check_recognition(
     place: Place,
     problems: Problems,
 ) -> None:
-    """Labels on the floor, patches to decode, a truth for every pose, a sweep to judge along: all must be there."""
+    """Labels on the floor, label patches to decode, a truth for every pose, a sweep to judge along: all must be there."""
     own = [
         scenario
         for scenario in scenarios
@@ -64,9 +64,10 @@ def check_recognition(
             f'truth is "{criterion.truth}", but {ground.name} has no labels, '
             "expected a list with one label for each pose, or places",
         )
-    elif criterion.truth == "grey" and ground is not None and not ground.patches:
+    elif criterion.truth == "grey" and ground is not None and not ground.label_patches:
         problems.add(
-            (*place, "truth"), 'truth is "grey", but the world has labels = false, expected truth = "label" or patches'
+            (*place, "truth"),
+            'truth is "grey", but the world has labels = false, expected truth = "label" or label patches',
         )
     if isinstance(criterion, Robustness) and not any(_varies(scenario, criterion.along) for scenario in own):
         problems.add(

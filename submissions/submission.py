@@ -1,6 +1,6 @@
 """What one student submitted, after reading: sources, model files, and where they came from.
 
-Json data; reading archives and folders is ``bundle.py``, deciding what to do with it is the service's.
+Plain data; reading archives and folders is ``bundle.py``, deciding what to do with it is the service's.
 """
 
 from __future__ import annotations

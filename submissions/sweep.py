@@ -1,6 +1,6 @@
 """Sweeps: the conditions that a scenario can vary one at a time, and the levels of each.
 
-Json data; what a trial does under a condition is the grader's, and what the trials show is judged elsewhere.
+Plain data; what a trial does under a condition is the grader's, and what the trials show is judged elsewhere.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ def _small(kind: type[Any], inputs: int) -> bytes:
 
 
 def _huge() -> bytes:
-    """Json weights whose first layer says that it has 2 GB, and has next to nothing."""
+    """Plain weights whose first layer says that it has 2 GB, and has next to nothing."""
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (250_000_000,)})
     file = io.BytesIO()

@@ -88,10 +88,10 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
 ) -> None:
     bare = graded(tmp_path, '"per-seed"', runner)
     recording = bare.trials[0].recording
-    assert (recording.sheet, recording.patches) == (bare.trials[0].seed, False)
+    assert (recording.sheet, recording.label_patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
     images = set()
-    for change in ({}, {"sheet": 0}, {"patches": True}):
+    for change in ({}, {"sheet": 0}, {"label_patches": True}):
         trial = replace(bare.trials[0], recording=replace(recording, images=(), messages=(), **change))
         drawn = draw_all(replace(bare, criteria=(), trials=(trial,)))
         images.add(next(drawn[name] for name in drawn if name.startswith("path")))

@@ -92,16 +92,18 @@ def test_a_sheet_without_patches_has_the_same_digits_and_labels() -> None:
 
 
 def test_a_seed_gives_the_same_sheet_again_and_another_seed_another() -> None:
-    first, other = digits.draw_sheet(1, 255, patches=True), digits.draw_sheet(2, 255, patches=True)
-    again = digits.draw_sheet(1, 255, patches=True)
+    first, other = digits.draw_sheet(1, 255, label_patches=True), digits.draw_sheet(2, 255, label_patches=True)
+    again = digits.draw_sheet(1, 255, label_patches=True)
     assert first.digits == again.digits
     assert np.array_equal(first.pixels, again.pixels)
     assert sum(a != b for a, b in zip(first.digits, other.digits, strict=True)) > 150
-    assert digits.draw_sheet(1, 0, patches=True).digits == first.digits
+    assert digits.draw_sheet(1, 0, label_patches=True).digits == first.digits
 
 
 def test_all_digits_are_as_likely() -> None:
-    counts = np.bincount([digit for seed in range(20) for digit in digits.draw_sheet(seed, 255, patches=False).digits])
+    counts = np.bincount(
+        [digit for seed in range(20) for digit in digits.draw_sheet(seed, 255, label_patches=False).digits]
+    )
     expected = 20 * 220 / 10
     assert ((counts - expected) ** 2 / expected).sum() < 27.9  # chi squared, 9 degrees of freedom, 0.1 %
 

@@ -19,7 +19,7 @@ from service.grading.judging.courses import covered
 from service.grading.judging.whereabouts import positions
 from sim.backgrounds.centrelines import centrelines
 from sim.recording import Pose, Touch
-from submissions.criteria.places import Area, Course
+from submissions.criteria.places import Area, LineToFollow
 
 coordinates = st.floats(-500, 500, allow_nan=False).map(lambda value: round(value, 3))
 points = st.tuples(coordinates, coordinates)
@@ -264,7 +264,7 @@ def test_driving_against_the_direction_covers_nothing() -> None:
 @given(st.floats(0.1, 1.0), st.floats(0, 40), st.integers(-1, 1))
 @settings(max_examples=25, deadline=None)
 def test_what_is_driven_of_a_circle_is_covered(part: float, off: float, way: int) -> None:
-    course = Course(ellipse=(0, 0, 300, 300))
+    course = LineToFollow(ellipse=(0, 0, 300, 300))
     angles = np.linspace(0, part * 2 * math.pi, 300)
     radius = 300 + way * off
     found = along_line(course, radius * np.column_stack([np.cos(angles), np.sin(angles)]), 50)
@@ -332,7 +332,7 @@ def test_rocking_on_the_start_line_is_no_lap() -> None:
 )
 def test_what_is_no_line_is_refused(table: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match="expected"):
-        Course.model_validate(table)
+        LineToFollow.model_validate(table)
 
 
 def test_named_lines_start_where_the_robots_start() -> None:
@@ -341,7 +341,7 @@ def test_named_lines_start_where_the_robots_start() -> None:
         x, y = starts[f"Line_Following_Test/{name}"]
         assert abs(x - int(name)) <= 2
         assert round(y) == 46
-    assert Course(on="Thruxton_Circuit").length() == pytest.approx(3850, rel=0.01)
+    assert LineToFollow(on="Thruxton_Circuit").length() == pytest.approx(3850, rel=0.01)
     assert all(0 <= y <= 1143 for line in centrelines().values() for _, y in line)
 
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from models import card, shapes
 from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
-from models.views import Shift, Viewer
+from models.images import Photographer, Shift
 from service.commands.models import models_app
 from service.reports.curve_plot import Curve, Panel, draw_curves
 from service.reports.model_plots import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
@@ -24,9 +24,9 @@ from service.reports.model_plots import draw_evaluation_confusion, draw_misread,
 def evaluation() -> Evaluation:
     """Each shape seen three times; two squares and a diamond are taken for something else."""
     read = [[0, 5, 5], [1] * 3, [2] * 3, [3] * 3, [4] * 3, [5, 5, 1]]
-    with Viewer() as viewer:
+    with Photographer() as photographer:
         seen = [
-            Answered(place, 16, viewer.look(place, Shift(noise=16), draw), read[place.label][draw])
+            Answered(place, 16, photographer.image(place, Shift(noise=16), draw), read[place.label][draw])
             for place, draw in itertools.product(shapes.places(), range(3))
         ]
     confusion = np.zeros((6, 6), int)

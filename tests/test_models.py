@@ -14,10 +14,10 @@ from PIL import Image
 from models import Card, card, digits, names, shapes, weights_bytes
 from models.cards import Curve
 from models.evaluation import TASKS, evaluate
+from models.images import Photographer, Place, Shift
 from models.networks import read
 from models.preprocessing import features
 from models.training import TRAINABLE, train
-from models.views import Place, Shift, Viewer
 from sim.backgrounds import floor
 from sim.backgrounds.digits import _digit_images
 from sim.errors import UsageError
@@ -106,8 +106,8 @@ def test_digits_on_unseen_sheets_are_right_93_times_in_100_for_sure(name: str, l
 def test_a_sheet_that_no_card_counts_is_read_as_well() -> None:
     network = read(weights_bytes("digits"))
     places = digits.places("MNIST_Digits", 9)
-    with Viewer() as viewer:
-        greys = [viewer.look(place, Shift()) for place in places]
+    with Photographer() as photographer:
+        greys = [photographer.image(place, Shift()) for place in places]
     answers = network.predict(np.array([features(grey) for grey in greys]))
     assert np.mean(answers == [place.label for place in places]) >= 0.93
 
@@ -132,8 +132,8 @@ def test_training_images_are_what_the_sensor_would_see(
 ) -> None:
     images, labels = handwriting
     place = digits.places(background, 0)[25]
-    with Viewer() as viewer:
-        grey = viewer.look(place, Shift(x=dx, y=dy))
+    with Photographer() as photographer:
+        grey = photographer.image(place, Shift(x=dx, y=dy))
     own = images[np.flatnonzero(labels == place.label)[-100:]]
     assert any(np.array_equal(digits.seen(digit, paper, dx, dy), grey) for digit in own)
 
@@ -162,9 +162,9 @@ def test_places_are_where_the_floor_has_the_label() -> None:
 
 def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
     place = Place("Simple_Shapes", 0, Pose(200, 900, 0), 0)
-    with Viewer() as viewer:
-        first, second = (grey for _, grey in viewer.draws([place], Shift(noise=32), "test", 2))
-        again = next(grey for _, grey in viewer.draws([place], Shift(noise=32), "test", 2))
+    with Photographer() as photographer:
+        first, second = (grey for _, grey in photographer.draws([place], Shift(noise=32), "test", 2))
+        again = next(grey for _, grey in photographer.draws([place], Shift(noise=32), "test", 2))
     assert not np.array_equal(first, second)
     assert np.array_equal(first, again)
 

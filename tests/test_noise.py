@@ -14,7 +14,7 @@ from sim.camera import CachedCamera
 from sim.chance import Stream
 from sim.recording import Pose
 from sim.robot import LightSensor
-from sim.sensors import LightReader, Look
+from sim.sensors import Footprint, LightReader
 from sim.world import Noise
 from submissions.assignment_file import find_assignment
 from submissions.submission import Source, Submission
@@ -35,7 +35,7 @@ def pixels(value: int, amplitude: float, seed: int) -> np.ndarray:
     """What a left sensor's 305 pixels read over a plain floor, shape (ticks, 305, 3)."""
     camera = CachedCamera(np.full((1143, 2362, 3), value, np.uint8))
     reader = LightReader(LightSensor(-20, 30), camera, amplitude, Stream(seed, "left light"))
-    where = Look(500, 500, 510, 633)
+    where = Footprint(500, 500, 510, 633)
     seen = [np.frombuffer(reader.image(where, tick), np.uint8).reshape(20, 20, 4) for tick in range(1, TICKS + 1)]
     camera.close()
     rows, columns = np.mgrid[0:20, 0:20]

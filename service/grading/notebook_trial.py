@@ -87,7 +87,7 @@ def _execute(
         return replace(planned, spec=run)
 
     # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
-    sheet = int(spec.floor.sheet == 0 and not spec.floor.patches)
+    sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
     # Their noise would tell the trial again, were it of the world's seed.
     unmarked = UnmarkedRuns(spec.program.limits, spec.program.output_bytes, spec.seconds, spec.child_seed, sheet)
     planner = NotebookRuns(site, marked_run, unmarked, planned if marking.which is None else PlannedRun())

@@ -110,7 +110,7 @@ def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
     if recording.background in images:
         return images[recording.background]
     try:
-        return floor_of(recording.background, labels=recording.patches, seed=recording.sheet).pixels
+        return floor_of(recording.background, labels=recording.label_patches, seed=recording.sheet).pixels
     except UsageError:
         return None
 

@@ -1,6 +1,6 @@
 """What a report tells of recognition in figures: what became of the images, and each class's precision and recall.
 
-Json texts for a template; everything was counted when the work was marked.
+Plain texts for a template; everything was counted when the work was marked.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ _TEXT_KEPT = 2000
 _FLOATS = ("x", "y", "heading", "left_position", "right_position", "ultrasonic", "gyro")
 _INTEGERS = ("left_sums", "right_sums")
 #: What fields are called in recordings that earlier releases kept.
-_FORMERLY = {"walls": "sandbox"}
+_FORMERLY = {"walls": "sandbox", "patches": "label_patches"}
 _Bytes = NDArray[np.uint8]
 
 

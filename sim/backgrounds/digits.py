@@ -45,7 +45,7 @@ class Sheet:
     digits: tuple[int, ...]
 
 
-def draw_sheet(seed: int, paper: int, *, patches: bool) -> Sheet:
+def draw_sheet(seed: int, paper: int, *, label_patches: bool) -> Sheet:
     """The sheet number ``seed`` on paper of grey ``paper``; each place gets any of the 1000 images, all as likely."""
     images, labels = _digit_images()
     chance = Stream(seed, "digit sheet")
@@ -57,7 +57,7 @@ def draw_sheet(seed: int, paper: int, *, patches: bool) -> Sheet:
         digit = int(labels[chosen])
         digits.append(digit)
         _put(level, images[chosen], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
-        if patches:
+        if label_patches:
             patch = np.full((PATCH_HEIGHT, PATCH_WIDTH), GREY_STEP * digit, dtype=np.uint8)
             _put(level, patch, PATCH_LEFT + PITCH * column, PATCH_TOP + PITCH * row)
     return Sheet(np.repeat(level[:, :, None], 3, axis=2), tuple(digits))

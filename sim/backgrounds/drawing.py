@@ -148,14 +148,14 @@ def shape_outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...],
 UPPER_ROW, LOWER_ROW = (0, 1, 2, 3, 4, 5), (1, 5, 0, 2)
 
 
-def shape_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, patches: bool) -> None:
+def shape_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> None:
     """Six shapes at image row 218, and the unlabelled test row at 418.
 
-    With ``patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
+    With ``label_patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
     """
     for column, code in enumerate(upper):
         draw_shape(canvas, code, 225 + 80 * column, 218)
-        if patches:
+        if label_patches:
             left = 221 + 80 * column
             canvas.rectangle((left, 251, left + 18, 275), grey(LABEL_GREYS[code]))
     for column, code in enumerate(lower):
@@ -164,7 +164,7 @@ def shape_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, pa
 
 def simple_shapes(canvas: Canvas) -> None:
     """The course's shapes, without their patches."""
-    shape_rows(canvas, UPPER_ROW, LOWER_ROW, patches=False)
+    shape_rows(canvas, UPPER_ROW, LOWER_ROW, label_patches=False)
 
 
 def draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
@@ -177,7 +177,7 @@ def draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
 
 def simple_shapes_with_labels(canvas: Canvas) -> None:
     """The course's shapes with their patches."""
-    shape_rows(canvas, UPPER_ROW, LOWER_ROW, patches=True)
+    shape_rows(canvas, UPPER_ROW, LOWER_ROW, label_patches=True)
 
 
 def linear_grey() -> NDArray[np.uint8]:

@@ -75,7 +75,7 @@ class Floor:
     default_pose: Pose
     labels: tuple[FloorLabel, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
-    patches: bool = True  # whether the image shows the grey patches that tell the answer, where it has any
+    label_patches: bool = True  # whether the image shows the grey patches that tell the answer, where it has any
     sheet: int = 0  # the seed of the handwritten digits, on a digit sheet, or of the order of the shapes
 
     def label_at(self, x: float, y: float) -> str | None:
@@ -129,9 +129,9 @@ def _shuffled_shapes(name: str, plan: _ShapesPlan, labels: bool, seed: int) -> F
     chance = Stream(seed, "shapes")
     upper = sorted(drawing.UPPER_ROW, key=chance.integer)
     lower = [chance.integer(100 + column) % len(SHAPES) for column in range(len(drawing.LOWER_ROW))]
-    rows = functools.partial(drawing.shape_rows, upper=upper, lower=lower, patches=labels)
+    rows = functools.partial(drawing.shape_rows, upper=upper, lower=lower, label_patches=labels)
     pixels = _read_only(drawing.paint(rows, drawing.WHITE))
-    return Floor(name, pixels, plan.pose, _shape_labels(upper, lower), patches=labels, sheet=seed)
+    return Floor(name, pixels, plan.pose, _shape_labels(upper, lower), label_patches=labels, sheet=seed)
 
 
 def _digit_labels(shown: tuple[int, ...]) -> tuple[FloorLabel, ...]:
@@ -213,13 +213,15 @@ def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
 @functools.lru_cache(maxsize=12)  # an image is 8 MB, and flags can ask for every floor there is
 def _printed(name: str, plan: _Plan, labels: bool) -> Floor:
     draw = plan.pixels if labels or plan.unlabelled is None else plan.unlabelled
-    return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles, patches=labels)
+    return Floor(name, _read_only(draw()), plan.pose, plan.labels, plan.obstacles, label_patches=labels)
 
 
 @functools.lru_cache(maxsize=4)  # a worker sees ever new seeds
 def _digit_sheet(name: str, plan: _SheetPlan, labels: bool, seed: int) -> Floor:
-    sheet = digits.draw_sheet(seed, plan.paper, patches=labels)
-    return Floor(name, _read_only(sheet.pixels), plan.pose, _digit_labels(sheet.digits), patches=labels, sheet=seed)
+    sheet = digits.draw_sheet(seed, plan.paper, label_patches=labels)
+    return Floor(
+        name, _read_only(sheet.pixels), plan.pose, _digit_labels(sheet.digits), label_patches=labels, sheet=seed
+    )
 
 
 def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:

@@ -16,7 +16,7 @@ class Collects(CriterionBase):
     """The pairs of images that a robot collects are good enough to train with.
 
     A pair is usable if the left image was taken over a pattern and the right one shows that pattern's label
-    patch, so that its grey decodes to the label as in the course (0, 42, 85 ... for shapes, 25 times the digit).
+    label patch, so that its grey decodes to the label as in the course (0, 42, 85 ... for shapes, 25 times the digit).
     ``source`` says which pairs: ``"log"`` those of ``image_data both`` (or ``left`` and ``right`` in turn),
     ``"sent"`` those of ``IMG_DATA``.
 

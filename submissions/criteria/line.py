@@ -10,7 +10,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from submissions.criteria.common import CriterionBase
-from submissions.criteria.places import Course, Part, Range
+from submissions.criteria.places import LineToFollow, Part, Range
 
 
 class Follows(CriterionBase):
@@ -23,7 +23,7 @@ class Follows(CriterionBase):
     """
 
     check: Literal["follows"]
-    line: Course
+    line: LineToFollow
     within: float = Field(default=50.0, gt=0)
     covers: float = Field(default=0.9, gt=0, le=1)
     at_most: float | None = Field(default=None, gt=0)
@@ -46,7 +46,7 @@ class Laps(CriterionBase):
     """
 
     check: Literal["laps"]
-    line: Course
+    line: LineToFollow
     start_line: tuple[float, float, float, float]
     laps: int = Field(default=1, ge=1)
     within: float = Field(default=60.0, gt=0)

@@ -72,7 +72,7 @@ class Area(BaseModel):
         return f"the area with a corner at ({first[0]:g}, {first[1]:g})"
 
 
-class Course(BaseModel):
+class LineToFollow(BaseModel):
     """A line to drive along, in the direction in which it is to be driven.
 
     ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``); ``points`` lists its

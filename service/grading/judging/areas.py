@@ -1,6 +1,6 @@
 """How far points are from an area of the floor: less than 0 inside, more than 0 outside.
 
-Json geometry; what follows from it is judged elsewhere.
+Plain geometry; what follows from it is judged elsewhere.
 """
 
 from __future__ import annotations

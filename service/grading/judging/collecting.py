@@ -14,7 +14,7 @@ from itertools import pairwise
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
-from service.grading.judging.places import look_at, part_at
+from service.grading.judging.places import footprint_at, part_at
 from sim.backgrounds import floor, label_names, names
 from sim.recording import Image, Recording
 from submissions.criteria.collecting import Collects
@@ -72,7 +72,7 @@ def _different(found: Sequence[Pair], recording: Recording) -> list[Pair]:
     known: set[object] = set()
     fresh = []
     for pair in found:
-        where = look_at(recording, "left", pair.image.pose)
+        where = footprint_at(recording, "left", pair.image.pose)
         own: set[object] = {pair.image.left, (where.column, where.row)}
         if own.isdisjoint(known):
             fresh.append(pair)
@@ -107,7 +107,7 @@ def _truth(recording: Recording, image: Image) -> str | None:
     """What the floor has under the left sensor where the image was taken."""
     if image.truth is not None or image.message >= 0 or recording.background not in names():
         return image.truth
-    ground = floor(recording.background, labels=recording.patches, seed=recording.sheet)
+    ground = floor(recording.background, labels=recording.label_patches, seed=recording.sheet)
     return ground.label_at(*part_at(recording, "left", image.pose))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.recording import Floats
-from submissions.criteria.places import Course
+from submissions.criteria.places import LineToFollow
 
 #: How far along the line, at least, the nearest point is looked for from one tick to the next, mm.
 _WINDOW = 100.0
@@ -27,7 +27,7 @@ class Along:
     length: float
 
 
-def along(course: Course, points: Floats, within: float) -> Along | None:
+def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
     """How the path goes along the line from where it first comes ``within`` mm of it; None if it never does.
 
     From then on the nearest point is looked for only near the one before, so that a path that leaves the line and
@@ -65,7 +65,7 @@ def covered(found: Along, within: float, begin: float, end: float) -> float:
 class _Line:
     """The stretches of a line, repeated endlessly if it is closed."""
 
-    def __init__(self, course: Course) -> None:
+    def __init__(self, course: LineToFollow) -> None:
         corners = np.array(course.corners())
         steps = np.diff(corners, axis=0)
         lengths = np.hypot(*steps.T)

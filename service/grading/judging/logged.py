@@ -20,7 +20,7 @@ from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.recording import Datum, Image, Pose, Recording
 from sim.robot import ROBOTS, LightSensor, robot
-from sim.sensors import look
+from sim.sensors import footprint
 from sim.trigonometry import sincos
 from submissions.criteria.logged import Datalog, ImageLog
 
@@ -181,9 +181,9 @@ def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float
 
 def _crop(recording: Recording, sensor: LightSensor, pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """RGB under the sensor, shape (diameter, diameter, 3), black off the floor."""
-    drawn = floor(recording.background, labels=recording.patches, seed=recording.sheet).pixels
+    drawn = floor(recording.background, labels=recording.label_patches, seed=recording.sheet).pixels
     sine, cosine = sincos(math.radians(pose.heading) - math.pi / 2)
-    where = look(sensor, pose.x, pose.y, sine, cosine)
+    where = footprint(sensor, pose.x, pose.y, sine, cosine)
     side = sensor.diameter
     crop = np.zeros((side, side, 3), np.int64)
     top, left = max(where.row, 0), max(where.column, 0)
@@ -211,7 +211,7 @@ def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
     pose = pose_at(recording, tick / 30)
     if floor_share(recording, "left" if side == "left" else "right", pose) < 1:
         return False
-    if side == "left" or recording.background not in GREYS or not recording.patches:
+    if side == "left" or recording.background not in GREYS or not recording.label_patches:
         return True
     pixels = bytes(map(int, csv.split(",")))
     return (

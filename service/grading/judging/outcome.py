@@ -1,6 +1,6 @@
 """How one criterion fared in one trial, and what every kind of judging needs to say so.
 
-Json data and words; who passes is decided in the modules of the kinds, what it is worth in ``marks.py``.
+Plain data and words; who passes is decided in the modules of the kinds, what it is worth in ``marks.py``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from service.grading.judging.outcome import pose_at
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.recording import Pose, Recording
 from sim.robot import ROBOTS, LightSensor, robot
-from sim.sensors import Look, look
+from sim.sensors import Footprint, footprint
 from sim.trigonometry import sincos
 
 Part = Literal["left", "right", "middle"]
@@ -36,14 +36,14 @@ def part_at_time(recording: Recording, part: Part, t: float) -> tuple[float, flo
     return part_at(recording, part, pose_at(recording, t))
 
 
-def look_at(recording: Recording, side: Literal["left", "right"], pose: Pose) -> Look:
+def footprint_at(recording: Recording, side: Literal["left", "right"], pose: Pose) -> Footprint:
     """The window that a light sensor sees; it does not turn with the robot, so it alone decides what is in it."""
-    return look(_sensor(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
+    return footprint(_sensor(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
 
 
 def floor_share(recording: Recording, side: Literal["left", "right"], pose: Pose) -> float:
     """How much of what a light sensor sees is floor, 0 to 1; beside it all is black."""
-    where, diameter = look_at(recording, side, pose), _sensor(recording, side).diameter
+    where, diameter = footprint_at(recording, side, pose), _sensor(recording, side).diameter
     rows, columns = where.row + np.arange(diameter), where.column + np.arange(diameter)
     floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
     mask = sensor_mask(diameter)

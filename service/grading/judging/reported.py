@@ -63,7 +63,7 @@ def label_at_start(recording: Recording) -> str:
     """What the floor has under the left light sensor at the start; ``nothing`` where it has no label."""
     if recording.background not in names():
         return "nothing"
-    ground = floor(recording.background, labels=recording.patches, seed=recording.sheet)
+    ground = floor(recording.background, labels=recording.label_patches, seed=recording.sheet)
     return ground.label_at(*part_at(recording, "left", recording.start)) or "nothing"
 
 

@@ -1,6 +1,6 @@
 """What one image was taken for: the smallest thing that recognition is counted in.
 
-Json data; how an image and its answer are found is ``classification.py``'s.
+Plain data; how an image and its answer are found is ``classification.py``'s.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ class Shift:
     noise: float = 0.0
 
 
-class Viewer:
+class Photographer:
     """A robot that is put down at places. Use it as a context manager."""
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class Viewer:
         self._cameras = Cameras(most=2)
         self._robot = robot("Default_Robot")
 
-    def __enter__(self) -> Viewer:
+    def __enter__(self) -> Photographer:
         return self
 
     def __exit__(
@@ -56,7 +56,7 @@ class Viewer:
         self._cameras.close()
         self._arena.close()
 
-    def look(self, place: Place, shift: Shift, seed: int = 0) -> Grey:
+    def image(self, place: Place, shift: Shift, seed: int = 0) -> Grey:
         """The grey focus of the left light sensor, shape (14, 14)."""
         pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
         camera = self._cameras.camera(_ground(place).pixels)
@@ -67,7 +67,7 @@ class Viewer:
         """Every place ``draws`` times, each time with noise of its own that ``name`` decides; once without noise."""
         for number, place in enumerate(places):
             for draw in range(draws if shift.noise > 0 else 1):
-                yield place, self.look(place, shift, Stream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1)
+                yield place, self.image(place, shift, Stream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1)
 
 
 def _ground(place: Place) -> Floor:
