@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from models.images import Place
+from models.images import LabelledPose
 from models.networks import Plan
 from models.preprocessing import SIDE, Grey, features, luma
 from models.tasks import Examples, Task, Test
@@ -66,12 +66,12 @@ def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
     return np.asarray(view)
 
 
-def places(background: str, sheet: int) -> tuple[Place, ...]:
+def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     """All 220 digits of a sheet, from the upper left row by row: the robot faces up, its left sensor over each."""
     shown = [int(label.label) for label in floor(background, seed=sheet).labels]
     spots = [divmod(number, COLUMNS) for number in range(COLUMNS * ROWS)]
     return tuple(
-        Place(background, sheet, Pose(100 + PITCH * column, 1050 - PITCH * row, 90), digit)
+        LabelledPose(background, sheet, Pose(100 + PITCH * column, 1050 - PITCH * row, 90), digit)
         for digit, (row, column) in zip(shown, spots, strict=True)
     )
 

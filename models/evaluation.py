@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models import digits, networks, shapes
 from models.cards import Card, Curve, Measured, Tally, card, weights_bytes
-from models.images import Photographer, Place, Shift
+from models.images import LabelledPose, Photographer, Shift
 from models.preprocessing import Grey, features
 from models.tasks import Task
 
@@ -39,7 +39,7 @@ class Network(Protocol):
 class Answered:
     """One image of the test: where it was taken, what it shows, and what it was taken for."""
 
-    place: Place
+    place: LabelledPose
     noise: float
     grey: Grey
     answer: int

@@ -20,7 +20,7 @@ from sim.world import Chain, Noise, World
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LabelledPose:
     """Where the robot stands to see one thing, on which floor, and the number of that thing's class."""
 
     background: str
@@ -56,19 +56,21 @@ class Photographer:
         self._cameras.close()
         self._arena.close()
 
-    def image(self, place: Place, shift: Shift, seed: int = 0) -> Grey:
+    def image(self, place: LabelledPose, shift: Shift, seed: int = 0) -> Grey:
         """The grey focus of the left light sensor, shape (14, 14)."""
         pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
         camera = self._cameras.camera(_ground(place).pixels)
         world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, Chain())
         return focus(world.images()[0])
 
-    def draws(self, places: Sequence[Place], shift: Shift, name: str, draws: int) -> Iterator[tuple[Place, Grey]]:
+    def draws(
+        self, places: Sequence[LabelledPose], shift: Shift, name: str, draws: int
+    ) -> Iterator[tuple[LabelledPose, Grey]]:
         """Every place ``draws`` times, each time with noise of its own that ``name`` decides; once without noise."""
         for number, place in enumerate(places):
             for draw in range(draws if shift.noise > 0 else 1):
                 yield place, self.image(place, shift, Stream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1)
 
 
-def _ground(place: Place) -> Floor:
+def _ground(place: LabelledPose) -> Floor:
     return floor(place.background, seed=place.sheet)

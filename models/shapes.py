@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from models.images import Photographer, Place, Shift
+from models.images import LabelledPose, Photographer, Shift
 from models.networks import Plan
 from models.preprocessing import features
 from models.tasks import Examples, Task, Test
@@ -23,9 +23,9 @@ _NOISES = (0, 0, 16, 32, 64, 96, 128, 128)
 _NOISES_ON_THE_SPOT = (32, 64, 96, *[128] * 37)
 
 
-def places() -> tuple[Place, ...]:
+def places() -> tuple[LabelledPose, ...]:
     """Where the course stands the robot: its left sensor is over the middle of each shape."""
-    return tuple(Place("Simple_Shapes", 0, Pose(200 + 80 * code, 900, 0), code) for code in range(len(SHAPES)))
+    return tuple(LabelledPose("Simple_Shapes", 0, Pose(200 + 80 * code, 900, 0), code) for code in range(len(SHAPES)))
 
 
 def _examples() -> Examples:

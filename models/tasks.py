@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.images import Place
+from models.images import LabelledPose
 from models.networks import Plan
 from models.preprocessing import Vector
 
@@ -26,9 +26,9 @@ class Test:
     at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[LabelledPose, ...]
     noises: tuple[tuple[float, int], ...]
-    swept: tuple[Place, ...]
+    swept: tuple[LabelledPose, ...]
     noises_beside: tuple[float, ...]
     draws: int
     words: str

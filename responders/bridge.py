@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, Responder, ResponderSpec
+from responders.conversation import Code, Collected, Conversation, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
@@ -81,7 +81,7 @@ class Bridge:
         arena: Arena,
         camera: LightCamera,
         child: Child,
-        responder: Responder | None,
+        responder: ResponderProcess | None,
         meter: JobMeter,
     ) -> None:
         self._spec = spec

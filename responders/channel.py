@@ -25,7 +25,7 @@ class Channel:
     reordering: float = 0.0
 
 
-class Line:
+class ChannelOfTrial:
     """One trial's channel; the chances of a text depend on its number alone."""
 
     def __init__(self, channel: Channel, seed: int) -> None:

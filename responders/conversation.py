@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from responders import messages, wire
-from responders.channel import Channel, Line
+from responders.channel import Channel, ChannelOfTrial
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -59,7 +59,7 @@ def _nothing_collected() -> Collected:
     return Collected()
 
 
-class Responder:
+class ResponderProcess:
     """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
 
     _schema = wire.RESPONDER
@@ -183,9 +183,11 @@ class Responder:
 class Conversation:
     """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: Chain, responder: Responder | None, meter: JobMeter) -> None:
+    def __init__(
+        self, channel: Channel, seed: int, chain: Chain, responder: ResponderProcess | None, meter: JobMeter
+    ) -> None:
         self._meter = meter
-        self._line = Line(channel, seed)
+        self._line = ChannelOfTrial(channel, seed)
         self._chain = chain
         self._responder = responder
         self._under_way: list[tuple[int, int, int]] = []  # due, order, index of the message

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderSpec
+from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -90,7 +90,7 @@ def call_functions(
             caller.close()
 
 
-class _Caller(Responder):
+class _Caller(ResponderProcess):
     """A responder's process that is asked for functions by their names."""
 
     _schema = wire.CALLS

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, Responder, ResponderSpec
+from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -36,7 +36,7 @@ class NotebookSpec:
     seed: int
 
 
-class NotebookProcess(Responder):
+class NotebookProcess(ResponderProcess):
     """A notebook's process during one execution. Cells and their lines are counted from 1."""
 
     _schema = wire.NOTEBOOK

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from responders import messages
 from responders.bridge import Bridge, TrialSpec
-from responders.conversation import Responder
+from responders.conversation import ResponderProcess
 from responders.faults import stopped
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -39,7 +39,7 @@ def run_trial(
     with sandboxes.private_folder() as folder:
         responder = None
         if spec.responder is not None:
-            responder = Responder(spec.responder, sandboxes, folder, spec.child_seed, meter)
+            responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter)
         try:
             program = sandboxes.spawn("robot", spec.program.limits, meter=meter)
             try:

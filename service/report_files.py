@@ -15,7 +15,7 @@ from service.reports.written import file_stems, write_page
 from service.store import artifacts, batches, grades, intake, policies
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.models import Job, JobState, PlotState, Submission
+from service.store.models import Job, JobState, PlotState, SubmissionRow
 from sim.recording import Verdict
 
 _INDEX = "index.html"
@@ -81,7 +81,7 @@ def _page(store: Store, job_id: str) -> str:
         grading_request = intake.load_grading_request(session, job_id)
         job = session.get_one(Job, job_id)
         released = policies.released(session, job_id)
-        staff_only = session.get_one(Submission, job.submission_id).staff_only
+        staff_only = session.get_one(SubmissionRow, job.submission_id).staff_only
         kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
     files = kept if job.plots is PlotState.DONE else draw(grade, grading_request.assignment)
     plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}

@@ -12,12 +12,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import ErrorDetails
 
 from sim.backgrounds import OBSTACLE_PRESETS
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
+from submissions.strict_table import StrictTable
 from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
@@ -25,13 +26,7 @@ Levels = Annotated[tuple[float, ...], Field(max_length=100)]
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 
 
-class Table(BaseModel):
-    """A table of the file: no unknown keys, no texts where numbers belong."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class HeadTable(Table):
+class HeadTable(StrictTable):
     """The keys before the first table."""
 
     id: str = Slug
@@ -44,7 +39,7 @@ class HeadTable(Table):
     secret: str = Field(default="", max_length=200)  # decides the seeds of scenarios that are not visible
 
 
-class WorldTable(Table):
+class WorldTable(StrictTable):
     background: str = "Empty_Map"
     labels: bool = True
     obstacles: tuple[Rectangle, ...] = ()
@@ -79,7 +74,7 @@ class WorldTable(Table):
         return value
 
 
-class PartsTable(Table):
+class PartsTable(StrictTable):
     program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
     cell: str | int = "last"
@@ -95,7 +90,7 @@ class PartsTable(Table):
         )
 
 
-class ChannelTable(Table):
+class ChannelTable(StrictTable):
     delay: float = Field(default=0.1, ge=0, le=60)
     jitter: float = Field(default=0.0, ge=0, le=60)
     loss: float = Field(default=0.0, ge=0, le=1)
@@ -103,7 +98,7 @@ class ChannelTable(Table):
     reordering: float = Field(default=0.0, ge=0, le=1)
 
 
-class SweepTable(Table):
+class SweepTable(StrictTable):
     """One list of levels for each condition that is varied."""
 
     offset_x: Levels = ()
@@ -123,7 +118,7 @@ class SweepTable(Table):
         return tuple(sorted(_in_range(value, about.most, about.least)))
 
 
-class ScenarioTable(Table):
+class ScenarioTable(StrictTable):
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[tuple[float, float, float], ...] = Field(default=(), min_length=1)
@@ -167,13 +162,13 @@ class ScenarioTable(Table):
         return _in_range(value, 500)
 
 
-class TrainingTable(Table):
+class TrainingTable(StrictTable):
     scenarios: tuple[str, ...] = Field(min_length=1)
     function: str = Field(default="train", pattern=r"^[A-Za-z_]\w*$", max_length=80)
     image: Literal["focus", "whole"] = "focus"
 
 
-class LimitsTable(Table):
+class LimitsTable(StrictTable):
     program_cpu: float = Field(default=5.0, gt=0, le=120)
     responder_cpu: float = Field(default=10.0, gt=0, le=120)
     program_memory_mb: int = Field(default=128, ge=64, le=4096)

@@ -9,13 +9,14 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment_file import AssignmentProblems, assignment_folder, parse
 from submissions.assignment_tables import problem_of
 from submissions.problems import Problems
+from submissions.strict_table import StrictTable
 from submissions.toml_lines import find_lines
 
 EXAMPLES = "examples"
@@ -24,11 +25,7 @@ EXPECTED = "expected.toml"
 REFERENCE = "reference"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Expectation(_Table):
+class Expectation(StrictTable):
     """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks."""
 
     marks: Annotated[Decimal, BeforeValidator(str)]
@@ -37,7 +34,7 @@ class Expectation(_Table):
     feedback: tuple[str, ...] = ()  # each must be in what the student is told
 
 
-class OriginalFigure(_Table):
+class OriginalFigure(StrictTable):
     """What a program reached in the original simulator, beside the reference's measure of that name."""
 
     measure: str
@@ -46,7 +43,7 @@ class OriginalFigure(_Table):
     explained: str = ""  # why ours may be further away
 
 
-class Expected(_Table):
+class Expected(StrictTable):
     """The file ``expected.toml``: a table for each example, and the original's figures."""
 
     examples: dict[str, Expectation]

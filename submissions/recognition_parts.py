@@ -44,7 +44,7 @@ def check_recognition(
     place: Place,
     problems: Problems,
 ) -> None:
-    """Labels on the floor, label patches to decode, a truth for every pose, a sweep to judge along: all must be there."""
+    """Labels on the floor, label patches to decode, a truth for every pose, a sweep to judge along must be there."""
     own = [
         scenario
         for scenario in scenarios

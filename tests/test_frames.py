@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from responders import wire
 from responders.bridge import Bridge, ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, Responder, ResponderSpec
+from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.notebook_executor import PlannedRun, execute_notebook
 from responders.notebook_process import NotebookSpec
 from responders.sandbox import running_child
@@ -193,7 +193,7 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
     folder = tmp_path_factory.mktemp("folder")
     with _child([b'{"do":"ready","error":null}', *frames], folder, meter) as child:
         spec = ResponderSpec(Code("responder.py", ""), {}, LIMITS, 1 << 40)
-        responder = Responder(spec, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
+        responder = ResponderProcess(spec, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
         faults = [responder.load()]
         faults += [responder.answer("PY::x", n, n)[2] for n in range(len(frames)) if responder.alive]
     assert not any(fault.staff for fault in faults if fault is not None), faults

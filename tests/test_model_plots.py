@@ -16,7 +16,7 @@ from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
 from models.images import Photographer, Shift
 from service.commands.models import models_app
-from service.reports.curve_plot import Curve, Panel, draw_curves
+from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves
 from service.reports.model_plots import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
 
 
@@ -88,7 +88,7 @@ def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation
 
 def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
     curve = Curve("x", (3.0,), (0.5,), (0.2,), (0.8,), (12,))
-    figure = draw_curves([Panel("delay", "seconds", (curve,), level=0.8)], "A curve")
+    figure = draw_curves([AccuracyPanel("delay", "seconds", (curve,), level=0.8)], "A curve")
     assert "asked for: 0.8" in texts(figure)
     assert "n = 12 images a point" in texts(figure)
 

@@ -14,7 +14,7 @@ from PIL import Image
 from models import Card, card, digits, names, shapes, weights_bytes
 from models.cards import Curve
 from models.evaluation import TASKS, evaluate
-from models.images import Photographer, Place, Shift
+from models.images import LabelledPose, Photographer, Shift
 from models.networks import read
 from models.preprocessing import features
 from models.training import TRAINABLE, train
@@ -161,7 +161,7 @@ def test_places_are_where_the_floor_has_the_label() -> None:
 
 
 def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
-    place = Place("Simple_Shapes", 0, Pose(200, 900, 0), 0)
+    place = LabelledPose("Simple_Shapes", 0, Pose(200, 900, 0), 0)
     with Photographer() as photographer:
         first, second = (grey for _, grey in photographer.draws([place], Shift(noise=32), "test", 2))
         again = next(grey for _, grey in photographer.draws([place], Shift(noise=32), "test", 2))

@@ -12,7 +12,7 @@ from service.store import batch_control, batches, jobs
 from service.store.engine import Store
 from service.store.intake import GradingRequest, accept_batch, accept_new
 from service.store.lease_reaper import wanting_notices
-from service.store.models import Batch, BatchState, Job, JobState, Lane, Submission
+from service.store.models import Batch, BatchState, Job, JobState, Lane, SubmissionRow
 from sim.errors import UsageError
 
 OTHER = "print('other')\n"
@@ -31,9 +31,9 @@ def _die(store: Store) -> str:
 
 def _states(store: Store) -> list[tuple[int, JobState]]:
     """The student's attempt and the state of every job."""
-    query = select(Submission.attempt, Job.state).join(Job, Job.submission_id == Submission.id)
+    query = select(SubmissionRow.attempt, Job.state).join(Job, Job.submission_id == SubmissionRow.id)
     with store.reading() as session:
-        return [(attempt, state) for attempt, state in session.execute(query.order_by(Submission.id))]
+        return [(attempt, state) for attempt, state in session.execute(query.order_by(SubmissionRow.id))]
 
 
 def test_the_same_batch_again_changes_nothing(store: Store) -> None:

@@ -17,7 +17,7 @@ from service.store import artifacts, grades, jobs
 from service.store.columns import storable
 from service.store.engine import Store
 from service.store.intake import load_grading_request
-from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, Submission
+from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import Line
 
@@ -31,7 +31,7 @@ def _stored(store: Store, grade: Grade) -> str:
     with store.transaction() as session:
         version = {"assignment": grade.assignment, "title": grade.assignment_title, "version": grade.assignment_version}
         session.execute(update(AssignmentVersion).values(**version))
-        session.execute(update(Submission).values(sha256=grade.submission))
+        session.execute(update(SubmissionRow).values(sha256=grade.submission))
     return accepted.job_id
 
 

@@ -19,7 +19,17 @@ from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.jobs import Claim, Fenced, Retry
 from service.store.lease_reaper import note_notices, requeue_lost, wanting_notices
-from service.store.models import Batch, BatchState, CriterionRow, Job, JobState, Lane, PlotState, Submission, TrialRow
+from service.store.models import (
+    Batch,
+    BatchState,
+    CriterionRow,
+    Job,
+    JobState,
+    Lane,
+    PlotState,
+    SubmissionRow,
+    TrialRow,
+)
 from service.store.scheduling import BATCH_EVERY
 
 NO_WAIT = Retry(0.0)
@@ -188,7 +198,7 @@ def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store
     assert _job(store, second).error == f"superseded by {third}"
     _finish(store, claim)
     with store.reading() as session:
-        assert session.scalars(select(Submission.attempt).order_by(Submission.id)).all() == [1, 2, 3]
+        assert session.scalars(select(SubmissionRow.attempt).order_by(SubmissionRow.id)).all() == [1, 2, 3]
 
 
 def _batch(store: Store, name: str, count: int) -> str:
@@ -317,7 +327,9 @@ def test_two_batches_at_once_number_attempts_one_by_one(tmp_path: Path) -> None:
         assert submitter.exitcode == 0
         submitter.close()
     with open_store(settings) as store, store.reading() as session:
-        assert session.scalars(select(Submission.attempt).order_by(Submission.attempt)).all() == list(range(1, 16))
+        assert session.scalars(select(SubmissionRow.attempt).order_by(SubmissionRow.attempt)).all() == list(
+            range(1, 16)
+        )
         queued = select(func.count()).select_from(Job).where(Job.state == JobState.QUEUED)
         assert session.scalar(queued) == 1
 

@@ -13,8 +13,8 @@ from builders import grading_request
 from service.store import batches, grades, jobs, policies, regrades
 from service.store.engine import Store, now
 from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
-from service.store.models import Job, JobState, Lane, Submission
-from service.store.policies import Limits
+from service.store.models import Job, JobState, Lane, SubmissionRow
+from service.store.policies import PolicyLimits
 from service.store.students import Students
 from sim.recording import Verdict
 
@@ -23,7 +23,7 @@ DUE = datetime(2026, 11, 30, 17, 0, tzinfo=UTC)
 DAY = timedelta(days=1)
 
 
-def _set(store: Store, allowed: Limits, assignment: str = "") -> None:
+def _set(store: Store, allowed: PolicyLimits, assignment: str = "") -> None:
     with store.transaction() as session:
         policies.set_policy(session, course_of(session, "default", now(session)), assignment, allowed)
 
@@ -59,7 +59,7 @@ def test_without_a_policy_everything_counts(store: Store) -> None:
 
 
 def test_attempts_are_different_submissions_that_were_graded(store: Store) -> None:
-    _set(store, Limits(attempts=2))
+    _set(store, PolicyLimits(attempts=2))
     # Superseded before it began, a fault of the assignment's or of ours, the same again: none is an attempt.
     assert _request(store, 1).staff_only == ""
     assert _request(store, 2).staff_only == ""
@@ -79,7 +79,7 @@ def test_attempts_are_different_submissions_that_were_graded(store: Store) -> No
 
 
 def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: Store) -> None:
-    _set(store, Limits(attempts=1))
+    _set(store, PolicyLimits(attempts=1))
     first = _request(store, 1)
     _grade_all(store)
     over = _request(store, 2)
@@ -87,7 +87,7 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
     with store.reading() as session:
         job = session.get_one(Job, over.job_id)
         assert (job.state, job.lane) == (JobState.QUEUED, Lane.BATCH)
-        batch = session.get_one(Submission, job.submission_id).batch_id
+        batch = session.get_one(SubmissionRow, job.submission_id).batch_id
     assert batch is not None
     _grade_all(store)
     with store.reading() as session:
@@ -108,15 +108,15 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
     ],
 )
 def test_late_days(store: Store, after: timedelta, days_late: int, over: str) -> None:
-    _set(store, Limits(DUE, late_days=2))
+    _set(store, PolicyLimits(DUE, late_days=2))
     accepted = _request(store, 1, DUE + after)
     with store.reading() as session:
-        assert session.scalars(select(Submission.days_late)).one() == days_late
+        assert session.scalars(select(SubmissionRow.days_late)).one() == days_late
     assert accepted.staff_only == over
 
 
 def test_a_moment_that_nobody_knows_is_in_time_and_staff_may_always(store: Store) -> None:
-    _set(store, Limits(DUE - 10_000 * DAY, attempts=1))
+    _set(store, PolicyLimits(DUE - 10_000 * DAY, attempts=1))
     assert _request(store, 1).staff_only == ""
     _grade_all(store)
     batch = accept_batch(store, "class", [grading_request("ada", "print(2)\n")], [], max_attempts=3)
@@ -124,7 +124,7 @@ def test_a_moment_that_nobody_knows_is_in_time_and_staff_may_always(store: Store
 
 
 def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
-    _set(store, Limits(cool_down_seconds=600))
+    _set(store, PolicyLimits(cool_down_seconds=600))
     assert _request(store, 1, DUE).staff_only == ""
     _grade_all(store)
     over = _request(store, 2, DUE + timedelta(minutes=9))
@@ -134,18 +134,18 @@ def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
 
 
 def test_what_a_person_submits_is_submitted_now(store: Store) -> None:
-    _set(store, Limits(datetime.now(UTC) - DAY, late_days=2, cool_down_seconds=3600))
+    _set(store, PolicyLimits(datetime.now(UTC) - DAY, late_days=2, cool_down_seconds=3600))
     first = accept(store, grading_request("ada", "print(1)\n"), max_attempts=3)
     assert first.staff_only == ""
     _grade_all(store)
     assert "0 min after" in accept(store, grading_request("ada", "print(2)\n"), max_attempts=3).staff_only
     with store.reading() as session:
-        assert session.scalars(select(Submission.days_late)).all() == [2, 2]
+        assert session.scalars(select(SubmissionRow.days_late)).all() == [2, 2]
 
 
 def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store) -> None:
-    _set(store, Limits(DUE, attempts=1))
-    _set(store, Limits(DUE + DAY, attempts=1), "echo-responder")
+    _set(store, PolicyLimits(DUE, attempts=1))
+    _set(store, PolicyLimits(DUE + DAY, attempts=1), "echo-responder")
     _extend(store, "ada", DUE + 3 * DAY, more=1)
     assert _request(store, 1, DUE + DAY).staff_only == ""
     _grade_all(store)
@@ -161,7 +161,7 @@ def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store)
 
 
 def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_published(store: Store) -> None:
-    _set(store, Limits(datetime.now(UTC) - DAY, late_days=0))
+    _set(store, PolicyLimits(datetime.now(UTC) - DAY, late_days=0))
     job_id = _request(store, 1).job_id
     _grade_all(store)
 
@@ -170,9 +170,9 @@ def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_publis
             return policies.released(session, job_id)
 
     assert released() == {"visible", "after_due_date"}
-    _set(store, Limits(datetime.now(UTC) - DAY, late_days=2))
+    _set(store, PolicyLimits(datetime.now(UTC) - DAY, late_days=2))
     assert released() == {"visible"}
-    _set(store, Limits(datetime.now(UTC) - DAY))
+    _set(store, PolicyLimits(datetime.now(UTC) - DAY))
     _extend(store, "somebody else", datetime.now(UTC) + DAY)
     assert released() == {"visible"}
     with store.reading() as session:

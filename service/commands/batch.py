@@ -199,7 +199,7 @@ def _accept(
     return accepted
 
 
-def _hint(known: intake.Known) -> str:
+def _hint(known: intake.AlreadySubmitted) -> str:
     if known.state is JobState.DEAD:
         return f", dead: robomark batch retry {known.batch_id}"
     if known.other_grader and known.batch_id is not None:

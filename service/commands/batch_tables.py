@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from service.store.audit import Entry
+from service.store.audit import AuditEntry
 from service.store.batches import BatchLine, JobLine
 from service.store.models import BatchState, JobState, Standing
 from service.store.policies import in_days
@@ -75,7 +75,7 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
     return Group(table, Text(told)) if shown else Text(told)
 
 
-def history_table(history: Sequence[Entry]) -> Table:
+def history_table(history: Sequence[AuditEntry]) -> Table:
     """Who did what, and when."""
     table = Table("when", "who", "did", "what came of it", box=None, pad_edge=False)
     for entry in history:

@@ -17,7 +17,7 @@ from service.settings import load_settings
 from service.store import audit, policies
 from service.store.engine import Store, now, open_store
 from service.store.intake import DEFAULT_COURSE, course_of
-from service.store.policies import Limits
+from service.store.policies import PolicyLimits
 from service.store.students import Students
 from sim.errors import UsageError
 from submissions.names import shown_name
@@ -42,9 +42,9 @@ def policy(
     cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two submissions.")] = 0.0,
 ) -> None:
     """Set what holds from now on, in place of what held; without options show what holds."""
-    allowed = Limits(_due(due), late_days, attempts, cool_down * 60)
+    allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
     with open_store(load_settings()) as store:
-        if allowed != Limits():
+        if allowed != PolicyLimits():
             with store.transaction() as session:
                 course_id = course_of(session, DEFAULT_COURSE, now(session))
                 policies.set_policy(session, course_id, assignment, allowed)
@@ -69,7 +69,7 @@ def extend(
         course_id = course_of(session, DEFAULT_COURSE, at)
         enrolment_id = Students(session, course_id).enrol(student, at)
         policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
-        detail = {"student": student, **_told(assignment, Limits(due_at, attempts=more_attempts))}
+        detail = {"student": student, **_told(assignment, PolicyLimits(due_at, attempts=more_attempts))}
         audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} times more" if more_attempts else ""
@@ -85,7 +85,7 @@ def _due(text: str | None) -> datetime | None:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _told(assignment: str, allowed: Limits) -> dict[str, object]:
+def _told(assignment: str, allowed: PolicyLimits) -> dict[str, object]:
     due_at = None if allowed.due_at is None else allowed.due_at.isoformat()
     return {"assignment": assignment, "due": due_at, "late_days": allowed.late_days, "attempts": allowed.attempts}
 

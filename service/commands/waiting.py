@@ -11,7 +11,15 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.text import Text
 from sqlalchemy import select
 
@@ -64,11 +72,11 @@ class Waiting:
             state = session.scalar(select(Batch.state).where(Batch.id == self.batch_id))
         return state is BatchState.PAUSED
 
-    def _look(self) -> batches.Progress:
+    def _look(self) -> batches.BatchProgress:
         with self.store.reading() as session:
             return batches.progress(session, self.batch_id)
 
-    def _wait(self, what: str, count: Callable[[batches.Progress], tuple[int, int, float]]) -> None:
+    def _wait(self, what: str, count: Callable[[batches.BatchProgress], tuple[int, int, float]]) -> None:
         """``count`` gives how many there are, how many are done, and how much of the next ones."""
         total, before, _ = count(self._look())
         columns = (

@@ -43,7 +43,7 @@ _IGNORED = "the program's magic line is ignored"
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class GradingProgress:
     """How far a grading has come."""
 
     trials_done: int
@@ -53,10 +53,10 @@ class Progress:
 class Observe(Protocol):
     """Called after each trial and about once a second; raises Cancelled to stop the grading."""
 
-    def __call__(self, progress: Progress, /) -> None: ...
+    def __call__(self, progress: GradingProgress, /) -> None: ...
 
 
-def _nobody(progress: Progress) -> None:
+def _nobody(progress: GradingProgress) -> None:
     """The default observer."""
 
 
@@ -181,7 +181,7 @@ def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
 class _Watch:
     """Turns the many heartbeats of a trial into one call of the observer a second."""
 
-    def __init__(self, observe: Callable[[Progress], None], trials: int) -> None:
+    def __init__(self, observe: Callable[[GradingProgress], None], trials: int) -> None:
         self._observe = observe
         self._trials = trials
         self._done = 0
@@ -197,7 +197,7 @@ class _Watch:
 
     def _tell(self) -> None:
         self._last = time.monotonic()
-        self._observe(Progress(self._done, self._trials))
+        self._observe(GradingProgress(self._done, self._trials))
 
 
 def _parts(submission: Submission, assignment: Assignment) -> _Parts:

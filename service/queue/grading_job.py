@@ -14,7 +14,7 @@ from typing import TypeVar
 import structlog
 from sqlalchemy.exc import DBAPIError
 
-from service.grading.grader import Progress, grade
+from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
 from service.queue.plotting import draw
 from service.settings import Settings
@@ -30,7 +30,7 @@ Result = TypeVar("Result")
 _PROGRESS_SECONDS = 2.0
 
 
-class Outcome(Enum):
+class JobOutcome(Enum):
     """What came of a notice."""
 
     NOTHING_DUE = "nothing due"
@@ -40,31 +40,31 @@ class Outcome(Enum):
     HOST_FAULT = "host fault"  # ours; the job is tried again, or dead
 
 
-def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> Outcome:
+def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> JobOutcome:
     """Claim the job whose turn it is, grade it and store its marks.
 
     Only trouble with the database itself raises: whatever else happens to a claimed job is written into its row.
     """
     claim = jobs.claim(store, worker, settings.lease_seconds)
     if claim is None:
-        return Outcome.NOTHING_DUE
+        return JobOutcome.NOTHING_DUE
     with structlog.contextvars.bound_contextvars(job=claim.job_id, attempt=claim.attempt, worker=worker):
         try:
             _grade(store, settings, runner, claim)
         except Cancelled as error:
             _log.info("job.stopped", reason=str(error))
-            return Outcome.STOPPED
+            return JobOutcome.STOPPED
         except UsageError as error:
             reason = str(error)
             _end(lambda: jobs.give_up(store, claim, reason))
-            return Outcome.UNUSABLE
+            return JobOutcome.UNUSABLE
         except Exception as error:
             # Whatever it was, it was not the student: their faults come back as verdicts.
             _log.exception("job.host_error")
             reason = str(error) if isinstance(error, HostError) else f"{type(error).__name__}: {error}"
             _end(lambda: jobs.fail(store, claim, reason, jobs.Retry(settings.backoff_seconds)))
-            return Outcome.HOST_FAULT
-        return Outcome.GRADED
+            return JobOutcome.HOST_FAULT
+        return JobOutcome.GRADED
 
 
 def plot_next(store: Store, settings: Settings) -> str | None:
@@ -124,7 +124,7 @@ class _Heartbeat:
         """By the database's clock: this machine's own may be wrong."""
         return self._claim.at + timedelta(seconds=self.seconds)
 
-    def __call__(self, progress: Progress, /) -> None:
+    def __call__(self, progress: GradingProgress, /) -> None:
         moment = time.monotonic()
         if progress.trials_done >= progress.trials and self.trials_at is None:
             self.trials_at = self.now()

@@ -45,20 +45,20 @@ class Answer(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownAnswer:
     """What grading the known submission gives: the marks and the hash of each trial's recording."""
 
     marks: str
     chains: tuple[str, ...]
 
 
-def known() -> Known:
+def known() -> KnownAnswer:
     """What a worker must find."""
     told = json.loads(_ANSWER.read_text(encoding="utf-8"))
-    return Known(told["marks"], tuple(told["chains"]))
+    return KnownAnswer(told["marks"], tuple(told["chains"]))
 
 
-def ask(runner: TrialRunner) -> Known | None:
+def ask(runner: TrialRunner) -> KnownAnswer | None:
     """What this process finds; None when a limit of the machine cut it. Raises HostError when it cannot grade."""
     submission, assignment = _question()
     graded = grade(submission, assignment, runner=runner)
@@ -66,11 +66,11 @@ def ask(runner: TrialRunner) -> Known | None:
     return None if cut else found(graded)
 
 
-def found(graded: Grade) -> Known:
-    return Known(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
+def found(graded: Grade) -> KnownAnswer:
+    return KnownAnswer(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
 
 
-def difference(expected: Known, actual: Known) -> str:
+def difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
     """One sentence; empty where they are the same."""
     if actual.chains != expected.chains:
         pairs = zip(expected.chains, actual.chains, strict=False)
@@ -164,7 +164,7 @@ def _question() -> tuple[Submission, Assignment]:
     return read_submission(FOLDER / "submission", asked=assignment.parts), assignment
 
 
-def _start(answer: Known, number: int) -> str:
+def _start(answer: KnownAnswer, number: int) -> str:
     return answer.chains[number - 1][:12] if number <= len(answer.chains) else "none"
 
 

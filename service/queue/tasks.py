@@ -20,7 +20,7 @@ from responders.sandbox.manager import FULL, NONE
 from service.grading.slots import Slots
 from service.grading.trial_runner import TrialRunner
 from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK
-from service.queue.grading_job import Outcome, grade_next, plot_next
+from service.queue.grading_job import JobOutcome, grade_next, plot_next
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
 from service.queue.self_test import Watch
@@ -91,9 +91,9 @@ def grade_notice(task: WarmTask) -> None:
     child = task.child
     with child.watch.busy():
         outcome = grade_next(child.store, child.settings, child.runner, worker_name())
-    if outcome is Outcome.GRADED:
+    if outcome is JobOutcome.GRADED:
         Notifier(task.app, child.store, child.settings).plot()
-    elif outcome is Outcome.HOST_FAULT:
+    elif outcome is JobOutcome.HOST_FAULT:
         # Whatever broke may be something that was kept warm.
         _children.drop()
 

@@ -24,7 +24,7 @@ _HEADS, _SHORT_HEADS = 0.86, 0.42  # for the answers at the top
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ConfusionTable:
     """Counts, one row a truth, one column an answer; ``totals`` are the rows' sums."""
 
     truths: tuple[str, ...]
@@ -33,7 +33,7 @@ class Table:
     totals: tuple[int, ...]
 
 
-def confusion_table(accuracy: Accuracy) -> Table:
+def confusion_table(accuracy: Accuracy) -> ConfusionTable:
     """All labels in their order, then answers that are no label, then ``no answer`` if there was one."""
     seen = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
     truths = tuple(dict.fromkeys((*accuracy.labels, *seen)))
@@ -45,7 +45,7 @@ def confusion_table(accuracy: Accuracy) -> Table:
     columns: tuple[str | None, ...] = (*answers, None) if any(counts[t, None] for t in truths) else answers
     rows = tuple(tuple(counts[truth, column] for column in columns) for truth in truths)
     names = tuple(NO_ANSWER if column is None else column for column in columns)
-    return Table(truths, names, rows, tuple(sum(row) for row in rows))
+    return ConfusionTable(truths, names, rows, tuple(sum(row) for row in rows))
 
 
 def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> Figure:
@@ -62,7 +62,7 @@ def counted(accuracy: Accuracy) -> str:
     return accuracy.counts.of if accuracy.counts is not None else "images"
 
 
-def draw_table(table: Table, title: str, subtitle: str) -> Figure:
+def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     """The confusion matrix of ``table``, whoever counted it."""
     across = len(table.answers) + _TOTALS
     labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
@@ -83,7 +83,7 @@ def draw_table(table: Table, title: str, subtitle: str) -> Figure:
     return figure
 
 
-def _draw_names(axes: Axes, table: Table, size: float) -> None:
+def _draw_names(axes: Axes, table: ConfusionTable, size: float) -> None:
     for row, truth in enumerate(table.truths):
         _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center", rotation=0)
     for column, answer in enumerate(table.answers):
@@ -101,7 +101,7 @@ def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va
     )  # fmt: skip
 
 
-def _draw_cells(axes: Axes, table: Table, size: float) -> None:
+def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
     for row, counts in enumerate(table.counts):
         for column, count in enumerate(counts):
             share = count / table.totals[row] if table.totals[row] else 0.0

@@ -28,7 +28,7 @@ from service.reports.plot_style import (
     font,
     new_figure,
 )  # fmt: skip
-from service.reports.sequence import Conversation, Gap, Step, conversation
+from service.reports.sequence import Gap, SequenceDiagram, Step, conversation
 
 _TIMES = 0.44  # inches for the times at the left
 _FIRST = 0.28  # from there to the robot's lane
@@ -41,7 +41,7 @@ _NARROWEST = 1.5  # inches that a label may take, even if its arrow is shorter
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
+class _MessageRow:
     """A step with its label broken into lines and its height, inches."""
 
     step: Step | Gap
@@ -72,7 +72,7 @@ def draw_conversation(trial: TrialResult, title: str) -> Figure:
     return figure
 
 
-def _subtitle(trial: TrialResult, told: Conversation) -> str:
+def _subtitle(trial: TrialResult, told: SequenceDiagram) -> str:
     if not told.total:
         return f"trial {trial.index + 1}; nothing was sent"
     of = "" if told.shown == told.total else f"{told.shown} of "
@@ -80,7 +80,7 @@ def _subtitle(trial: TrialResult, told: Conversation) -> str:
     return f"trial {trial.index + 1}; {count}; times are seconds after the start"
 
 
-def _lanes(told: Conversation) -> Mapping[str, float]:
+def _lanes(told: SequenceDiagram) -> Mapping[str, float]:
     """Where each party's lane is, inches from the left; robot and responder stand further apart."""
     weights = [0.0, 2.1, *(1.0 for _ in told.parties[2:])]
     room = WIDTH - _TIMES - _FIRST - _EDGE
@@ -95,14 +95,14 @@ def _lanes(told: Conversation) -> Mapping[str, float]:
     return lanes
 
 
-def _row(step: Step | Gap, lanes: Mapping[str, float]) -> _Row:
+def _row(step: Step | Gap, lanes: Mapping[str, float]) -> _MessageRow:
     if isinstance(step, Gap):
         plural = f"{step.what} is" if step.count == 1 else f"{step.what}s are"
-        return _Row(step, (f"{step.count} more {plural} not shown",), 0.34)
+        return _MessageRow(step, (f"{step.count} more {plural} not shown",), 0.34)
     width = max(_NARROWEST, abs(lanes[step.source] - lanes[step.target]) - 0.06)
     label = f"{step.note}: {step.label}" if step.note and step.kind != "lost" else step.label
     lines = tuple(textwrap.wrap(label, int(width * _CHARACTERS), max_lines=2, placeholder="…"))
-    return _Row(step, lines, _LINE * max(1, len(lines)) + _ARROW + _below(step))
+    return _MessageRow(step, lines, _LINE * max(1, len(lines)) + _ARROW + _below(step))
 
 
 def _below(step: Step) -> float:
@@ -121,7 +121,7 @@ def _draw_lanes(axes: Axes, lanes: Mapping[str, float], body: float) -> None:
         )  # fmt: skip
 
 
-def _draw_row(axes: Axes, row: _Row, lanes: Mapping[str, float], y: float) -> None:
+def _draw_row(axes: Axes, row: _MessageRow, lanes: Mapping[str, float], y: float) -> None:
     step = row.step
     if isinstance(step, Gap):
         axes.plot([0.08, WIDTH - 0.08], [y + 0.17, y + 0.17], color=FAINT, linewidth=0.8, linestyle=(0, (1, 3)))

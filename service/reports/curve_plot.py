@@ -52,7 +52,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Panel:
+class AccuracyPanel:
     """What is varied and in which unit, the curves, and the share that is asked for, if one is."""
 
     varied: str
@@ -61,7 +61,7 @@ class Panel:
     level: float | None = None
 
 
-def draw_curves(panels: Sequence[Panel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
+def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
     """The panels under each other, all with the same upright axis from 0 to 1; ``counted`` is what ``n`` counts."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
@@ -77,7 +77,7 @@ def draw_curves(panels: Sequence[Panel], title: str, subtitle: str = "", counted
     return figure
 
 
-def draw_panel(axes: Axes, panel: Panel) -> None:
+def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
     """All curves of one panel into ``axes``, with labelled axes and, where there are several curves, a legend."""
     axes.set_ylim(-0.04, 1.04)
     axes.yaxis.set_major_locator(FixedLocator([0, 0.25, 0.5, 0.75, 1]))

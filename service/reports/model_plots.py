@@ -17,7 +17,7 @@ from models.cards import Tally
 from models.evaluation import Answered, Evaluation
 from models.preprocessing import Grey
 from service.reports import curve_plot
-from service.reports.confusion_plot import Table, draw_table
+from service.reports.confusion_plot import ConfusionTable, draw_table
 from service.reports.plot_style import (
     FAINT,
     FAULT,
@@ -52,7 +52,7 @@ def evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
 def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
     """Who was taken for whom."""
     measured, classes = evaluation.measured, evaluation.card.classes
-    table = Table(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
+    table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
     return draw_table(table, f"{evaluation.card.name}: who was taken for whom", in_words(measured.accuracy))
 
 
@@ -69,7 +69,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
         panels.setdefault(curve.varied, []).append(curve)
     return curve_plot.draw_curves(
         [
-            curve_plot.Panel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
+            curve_plot.AccuracyPanel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
             for varied, curves in panels.items()
         ],
         f"{evaluation.card.name}: how robust it is",

@@ -40,7 +40,7 @@ class CriterionLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class TimelineEntry:
     """One moment of a timeline; ``t`` is empty for a line that says how many were left out."""
 
     t: str
@@ -82,7 +82,7 @@ class Scene:
     which: str
     words: VerdictWords
     plots: tuple[Plot, ...]
-    timeline: tuple[Entry, ...]
+    timeline: tuple[TimelineEntry, ...]
     messages: tuple[MessageLine, ...]
     more_messages: int
     responder_output: str
@@ -138,7 +138,7 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
     )
 
 
-def timeline(recording: Recording) -> tuple[Entry, ...]:
+def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
     """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
     moments = [(line.t, "printed", line.text) for line in recording.printed]
     moments += [(line.t, "said", line.text) for line in recording.spoken]
@@ -149,7 +149,7 @@ def timeline(recording: Recording) -> tuple[Entry, ...]:
     if omitted <= 1:
         return tuple(_entry(*moment) for moment in moments)
     first, last = moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:]
-    gap = Entry("", "", f"{omitted:,} more entries are not shown")
+    gap = TimelineEntry("", "", f"{omitted:,} more entries are not shown")
     return (*(_entry(*moment) for moment in first), gap, *(_entry(*moment) for moment in last))
 
 
@@ -245,8 +245,8 @@ def _channel_words(trial: TrialResult) -> str:
     return "".join(f"; {condition} {level:g}" for condition, level in trial.sweep if condition in ("loss", "delay"))
 
 
-def _entry(t: float, kind: str, text: str) -> Entry:
-    return Entry(f"{t:.2f}", kind, readable(text, 400, lines=8))
+def _entry(t: float, kind: str, text: str) -> TimelineEntry:
+    return TimelineEntry(f"{t:.2f}", kind, readable(text, 400, lines=8))
 
 
 def _share(part: float, whole: float) -> float:

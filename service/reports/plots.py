@@ -17,7 +17,7 @@ from service.grading.grade import AccuracyCurve, CriterionResult, Grade
 from service.reports.audience import BEFORE_PUBLICATION, scenarios, student_view, worst_trial
 from service.reports.confusion_plot import draw_confusion
 from service.reports.conversation_plot import draw_conversation
-from service.reports.curve_plot import Curve, Panel, draw_curves
+from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves
 from service.reports.misread_plot import draw_misread, misread
 from service.reports.path_plot import Pixels, draw_path
 from service.reports.plot_style import png
@@ -91,7 +91,7 @@ def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
     return draw_predictions(result.predictions, plot.title)
 
 
-def _panel(curve: AccuracyCurve) -> Panel:
+def _panel(curve: AccuracyCurve) -> AccuracyPanel:
     about = CONDITIONS[curve.along] if curve.along in CONDITIONS else Varied(curve.along, "", 0, 0)
     levels = curve.levels
     drawn = Curve(
@@ -102,7 +102,7 @@ def _panel(curve: AccuracyCurve) -> Panel:
         tuple(level.high for level in levels),
         tuple(level.n for level in levels),
     )
-    return Panel(about.words, about.unit, (drawn,), curve.asked)
+    return AccuracyPanel(about.words, about.unit, (drawn,), curve.asked)
 
 
 def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:

@@ -40,7 +40,7 @@ _MOST_MARKS = 400  # of one kind; more would be a solid bar
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class ReadingCurve:
     """One reading over time; the second of a panel is drawn dashed."""
 
     label: str
@@ -48,12 +48,12 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Panel:
+class ReadingPanel:
     """Curves that share a unit. ``limits`` None fits them."""
 
     title: str
     height: float
-    curves: tuple[Curve, ...]
+    curves: tuple[ReadingCurve, ...]
     limits: tuple[float, float] | None = None
     ticks: tuple[float, ...] = ()
 
@@ -95,23 +95,25 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     return figure
 
 
-def panels_of(recording: Recording) -> tuple[Panel, ...]:
+def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
     """The panels that ``draw_sensors`` shows, top to bottom."""
     ticks = recording.ticks
     return (
-        Panel(
+        ReadingPanel(
             "Reflected light, red 0–255",
             1.25,
-            (Curve("left", ticks.left_rgb[:, 0]), Curve("right", ticks.right_rgb[:, 0])),
+            (ReadingCurve("left", ticks.left_rgb[:, 0]), ReadingCurve("right", ticks.right_rgb[:, 0])),
             (-10, 265),
             (0, 64, 128, 192, 255),
         ),
-        Panel("Ultrasonic, cm", 0.62, (Curve("distance", ticks.ultrasonic / 10),), (-12, 267), (0, 100, 200)),
-        Panel("Gyro, degrees clockwise", 0.62, (Curve("angle", ticks.gyro),)),
-        Panel(
+        ReadingPanel(
+            "Ultrasonic, cm", 0.62, (ReadingCurve("distance", ticks.ultrasonic / 10),), (-12, 267), (0, 100, 200)
+        ),
+        ReadingPanel("Gyro, degrees clockwise", 0.62, (ReadingCurve("angle", ticks.gyro),)),
+        ReadingPanel(
             "Wheel encoders, degrees",
             0.75,
-            (Curve("left", ticks.left_position), Curve("right", ticks.right_position)),
+            (ReadingCurve("left", ticks.left_position), ReadingCurve("right", ticks.right_position)),
         ),
     )
 
@@ -154,7 +156,7 @@ def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
         side.set_visible(False)
 
 
-def _draw_panel(axes: Axes, panel: Panel, times: NDArray[np.float64], end: float) -> None:
+def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end: float) -> None:
     axes.set_xlim(0, end)
     for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
         axes.plot(times, curve.values, color=colour, linewidth=width, dashes=dashes or (None, None))
@@ -172,7 +174,7 @@ def _draw_panel(axes: Axes, panel: Panel, times: NDArray[np.float64], end: float
                   font=font(8))  # fmt: skip
 
 
-def _fitted(panel: Panel) -> tuple[float, float]:
+def _fitted(panel: ReadingPanel) -> tuple[float, float]:
     values = np.concatenate([curve.values for curve in panel.curves])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
@@ -182,7 +184,7 @@ def _fitted(panel: Panel) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _name_curves(figure: Figure, panel: Panel, y: float) -> None:
+def _name_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
     right = WIDTH - _RIGHT_EDGE
     width, height = figure.get_size_inches()
     for curve, text_x, colour in zip(panel.curves, (right - 0.86, right - 0.30), (LEFT, RIGHT), strict=True):

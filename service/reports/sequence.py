@@ -45,7 +45,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
-class Conversation:
+class SequenceDiagram:
     """``parties`` are those that take part, robot and responder always. ``total`` counts all exchanges."""
 
     parties: tuple[str, ...]
@@ -64,7 +64,7 @@ class _Exchange:
 
 def conversation(
     recording: Recording, most_exchanges: int = MOST_EXCHANGES, most_steps: int = MOST_STEPS
-) -> Conversation:
+) -> SequenceDiagram:
     """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
 
     Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
@@ -86,7 +86,7 @@ def conversation(
         steps.append(Gap(skipped))
     named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
     parties = tuple(party for party in PARTIES if party in named or party in ("robot", "responder"))
-    return Conversation(parties, tuple(steps), len(kept), len(exchanges))
+    return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
 
 
 def troubled(message: Message) -> bool:

@@ -16,7 +16,7 @@ from service.store.models import Audit
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class AuditEntry:
     """One thing that somebody did."""
 
     at: datetime
@@ -41,7 +41,7 @@ def note(session: Session, actor: str, action: str, subject: str, subject_id: st
     )
 
 
-def entries(session: Session, subject: str, subject_id: str) -> list[Entry]:
+def entries(session: Session, subject: str, subject_id: str) -> list[AuditEntry]:
     """All that was done to a row, in order."""
     query = select(Audit).where(Audit.subject == subject, Audit.subject_id == subject_id).order_by(Audit.id)
-    return [Entry(row.at, row.actor, row.action, dict(row.detail)) for row in session.scalars(query)]
+    return [AuditEntry(row.at, row.actor, row.action, dict(row.detail)) for row in session.scalars(query)]

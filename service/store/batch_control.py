@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
 from service.store.engine import Store, now
-from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, Submission
+from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, SubmissionRow
 from sim.errors import UsageError
 
 #: Who it is said to be where nobody was named.
@@ -80,14 +80,14 @@ def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retrie
             _refuse_cancelled(_state(session, batch_id), batch_id)
             of_batch = Job.batch_id == batch_id
         dead = (of_batch, Job.state == JobState.DEAD)
-        newer = aliased(Submission)
+        newer = aliased(SubmissionRow)
         outdated = exists().where(
-            newer.enrolment_id == Submission.enrolment_id,
-            newer.assignment == Submission.assignment,
-            newer.attempt > Submission.attempt,
+            newer.enrolment_id == SubmissionRow.enrolment_id,
+            newer.assignment == SubmissionRow.assignment,
+            newer.attempt > SubmissionRow.attempt,
             newer.staff_only.is_(None),
         )
-        of_newest = select(Submission.id).where(~outdated)
+        of_newest = select(SubmissionRow.id).where(~outdated)
         before = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
         at = now(session)
         values = {"state": JobState.QUEUED, "attempt": 0, "progress": 0.0, "error": None}

@@ -75,7 +75,7 @@ class BatchLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class BatchProgress:
     """How far jobs have come; ``partial`` is what the running ones have done, in jobs."""
 
     jobs: int
@@ -120,7 +120,7 @@ def job_lines(session: Session, batch_id: str) -> list[JobLine]:
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
         which = (Job.batch_id == batch_id, Job.suspect.is_(None))
     else:
-        ids = select(models.Submission.id).where(models.Submission.batch_id == batch_id)
+        ids = select(models.SubmissionRow.id).where(models.SubmissionRow.batch_id == batch_id)
         which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
     query = _job_lines().where(*which).order_by(Enrolment.student, Job.id)
     return [_line(row) for row in session.execute(query)]
@@ -134,13 +134,13 @@ def job_line(session: Session, job_id: str) -> JobLine:
     return _line(row)
 
 
-def progress(session: Session, batch_id: str) -> Progress:
+def progress(session: Session, batch_id: str) -> BatchProgress:
     """How far a batch has come."""
     of_batch = Job.batch_id == batch_id
     states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
     running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
     waiting = select(func.count()).select_from(Job).where(of_batch, Job.plots == PlotState.DUE)
-    return Progress(
+    return BatchProgress(
         jobs=sum(states.values()),
         ended=sum(count for state, count in states.items() if state not in UNFINISHED),
         partial=session.scalar(running) or 0.0,
@@ -175,16 +175,16 @@ def _job_lines() -> Select[
         select(
             Job,
             Enrolment.student,
-            models.Submission.source,
+            models.SubmissionRow.source,
             AssignmentVersion,
-            models.Submission.attempt,
+            models.SubmissionRow.attempt,
             accuracy,
-            models.Submission.staff_only,
-            models.Submission.days_late,
+            models.SubmissionRow.staff_only,
+            models.SubmissionRow.days_late,
             unjudged,
             surprises,
         )
-        .join(models.Submission, Job.submission_id == models.Submission.id)
+        .join(models.SubmissionRow, Job.submission_id == models.SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
     )

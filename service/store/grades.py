@@ -27,7 +27,7 @@ from service.grading.grade import (
 )
 from service.store import artifacts, recordings
 from service.store.codec import decode, encode
-from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job, Submission, TrialRow
+from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job, SubmissionRow, TrialRow
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
 from submissions.seeds import PUBLIC
@@ -77,9 +77,9 @@ def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> N
 def load(session: Session, job_id: str) -> Grade:
     """The grade of a job. Raises UsageError when it has none."""
     query = (
-        select(Job, Submission.sha256, Enrolment.student, AssignmentVersion)
-        .join(Submission, Job.submission_id == Submission.id)
-        .join(Enrolment, Submission.enrolment_id == Enrolment.id)
+        select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id == job_id)
     )

@@ -75,7 +75,7 @@ class AcceptedBatch:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class AlreadySubmitted:
     """A submission that changes nothing: the newest of its student is the same, for the same assignment."""
 
     job_id: str
@@ -90,7 +90,7 @@ class AcceptedNew:
     """What was new of a batch, and what was not; no batch was made when nothing was."""
 
     batch: AcceptedBatch | None
-    known: tuple[Known, ...]
+    known: tuple[AlreadySubmitted, ...]
     refused: tuple[tuple[str, str], ...] = ()
 
 
@@ -175,8 +175,8 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
     Raises UsageError for an unknown job, HostError where what was kept cannot be read.
     """
     query = (
-        select(models.Submission.packed, models.Submission.source, AssignmentVersion.content)
-        .join(Job, Job.submission_id == models.Submission.id)
+        select(models.SubmissionRow.packed, models.SubmissionRow.source, AssignmentVersion.content)
+        .join(Job, Job.submission_id == models.SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id == job_id)
     )
@@ -244,15 +244,15 @@ def _enrolled(
     return items, tuple(refused)
 
 
-def _known(session: Session, item: _Item) -> Known | None:
+def _known(session: Session, item: _Item) -> AlreadySubmitted | None:
     grading_request = item.packed.grading_request
     newest = session.scalar(
-        select(models.Submission)
+        select(models.SubmissionRow)
         .where(
-            models.Submission.enrolment_id == item.enrolment_id,
-            models.Submission.assignment == grading_request.assignment.id,
+            models.SubmissionRow.enrolment_id == item.enrolment_id,
+            models.SubmissionRow.assignment == grading_request.assignment.id,
         )
-        .order_by(models.Submission.attempt.desc())
+        .order_by(models.SubmissionRow.attempt.desc())
         .limit(1)
     )
     if newest is None or newest.sha256 != grading_request.submission.sha256:
@@ -276,7 +276,7 @@ def _known(session: Session, item: _Item) -> Known | None:
     if job is None:
         return None
     other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
-    return Known(job.id, job.batch_id, grading_request.submission.student, job.state, other_grader)
+    return AlreadySubmitted(job.id, job.batch_id, grading_request.submission.student, job.state, other_grader)
 
 
 def _accept_batch(
@@ -295,15 +295,15 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     grading_request = packed.grading_request
     submission, assignment = grading_request.submission, grading_request.assignment
     version_id = keep(session, packed.frozen, at)
-    of_student = (models.Submission.enrolment_id == enrolment_id, models.Submission.assignment == assignment.id)
-    earlier = session.scalar(select(func.max(models.Submission.attempt)).where(*of_student)) or 0
+    of_student = (models.SubmissionRow.enrolment_id == enrolment_id, models.SubmissionRow.assignment == assignment.id)
+    earlier = session.scalar(select(func.max(models.SubmissionRow.attempt)).where(*of_student)) or 0
     ruling = Ruling()
     if not terms.anew:
         ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
     job_id = new_id()
     if not ruling.over:
-        _supersede(session, select(models.Submission.id).where(*of_student), job_id, at)
-    row = models.Submission(
+        _supersede(session, select(models.SubmissionRow.id).where(*of_student), job_id, at)
+    row = models.SubmissionRow(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
         batch_id=terms.batch_id,

@@ -167,7 +167,7 @@ class Batch(Base):
     created_at: Mapped[datetime]
 
 
-class Submission(Base):
+class SubmissionRow(Base):
     """What a student submitted; ``attempt`` counts within the student and the assignment."""
 
     __tablename__ = "submission"

@@ -22,7 +22,7 @@ _NOT_THE_STUDENTS = (Verdict.ASSIGNMENT_ERROR.value, Verdict.HOST_ERROR.value)
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class PolicyLimits:
     """What one student may do. ``attempts`` counts different submissions; None is no limit, and no due date."""
 
     due_at: datetime | None = None
@@ -44,7 +44,7 @@ class Ruling:
     over: str = ""
 
 
-def limits(session: Session, enrolment_id: int, assignment: str) -> Limits:
+def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
     """The policy for the assignment, else the course's, with what this student is allowed beyond it."""
     course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
     policy = _policy(session, course_id, assignment)
@@ -94,14 +94,14 @@ def released(session: Session, job_id: str) -> frozenset[str]:
     seen = set(_ALWAYS)
     if job.published_at is not None:
         seen |= {"after_published", "after_due_date"}
-    assignment = session.get_one(models.Submission, job.submission_id).assignment
+    assignment = session.get_one(models.SubmissionRow, job.submission_id).assignment
     closed_at = _closed_for_all(session, job.enrolment_id, assignment)
     if closed_at is not None and now(session) > closed_at:
         seen.add("after_due_date")
     return frozenset(seen)
 
 
-def set_policy(session: Session, course_id: int, assignment: str, allowed: Limits) -> None:
+def set_policy(session: Session, course_id: int, assignment: str, allowed: PolicyLimits) -> None:
     """Make ``allowed`` the policy of a course for an assignment, or with an empty one for all that have none."""
     row = session.scalar(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment))
     if row is None:
@@ -111,7 +111,7 @@ def set_policy(session: Session, course_id: int, assignment: str, allowed: Limit
     row.attempts, row.cool_down_seconds = allowed.attempts, allowed.cool_down_seconds
 
 
-def policies(session: Session, course_id: int) -> dict[str, Limits]:
+def policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
     """The policies of a course, by assignment."""
     rows = session.scalars(select(Policy).where(Policy.course_id == course_id).order_by(Policy.assignment))
     return {row.assignment: _limits(row) for row in rows}
@@ -128,15 +128,15 @@ def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetim
     row.due_at, row.more_attempts = due_at, more_attempts
 
 
-def _policy(session: Session, course_id: int | None, assignment: str) -> Limits:
+def _policy(session: Session, course_id: int | None, assignment: str) -> PolicyLimits:
     """The policy of the assignment itself, else the course's."""
     query = select(Policy).where(Policy.course_id == course_id, Policy.assignment.in_(("", assignment)))
     row = session.scalar(query.order_by(func.length(Policy.assignment).desc()).limit(1))
-    return Limits() if row is None else _limits(row)
+    return PolicyLimits() if row is None else _limits(row)
 
 
-def _limits(row: Policy) -> Limits:
-    return Limits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds)
+def _limits(row: Policy) -> PolicyLimits:
+    return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds)
 
 
 def _extension(session: Session, enrolment_id: int, assignment: str) -> Extension | None:
@@ -160,7 +160,7 @@ def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> dat
 
 def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:
     """When the different submissions came that count as attempts: begun, and not ended by a fault of ours."""
-    submission = models.Submission
+    submission = models.SubmissionRow
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
     query = (
         select(func.coalesce(submission.submitted_at, submission.created_at), submission.sha256)

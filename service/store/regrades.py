@@ -25,7 +25,7 @@ from service.store.models import (
     JobState,
     Lane,
     Standing,
-    Submission,
+    SubmissionRow,
     TrialRow,
 )
 from service.store.versions import freeze, keep
@@ -145,7 +145,9 @@ def publish(store: Store, batch_id: str, *, actor: str) -> Published:
         for job in session.scalars(query.order_by(Job.queued_at, Job.id).with_for_update()):
             of_submission.setdefault(job.submission_id, []).append(job)
         hidden = set(
-            session.scalars(select(Submission.id).where(Submission.id.in_(ids), Submission.staff_only.is_not(None)))
+            session.scalars(
+                select(SubmissionRow.id).where(SubmissionRow.id.in_(ids), SubmissionRow.staff_only.is_not(None))
+            )
         )
         published = replaced = 0
         for submission_id, jobs in of_submission.items():

@@ -21,7 +21,7 @@ from service.store.models import (
     Job,
     JobState,
     PlotState,
-    Submission,
+    SubmissionRow,
     TrialRow,
     Worker,
 )
@@ -35,8 +35,8 @@ _NOT_REPEATABLE = (Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Ver
 def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
     """Alike for two jobs only where their grades must be: the seeds follow from the assignment and the secret."""
     query = (
-        select(Submission.sha256, AssignmentVersion.sha256)
-        .join(Job, Job.submission_id == Submission.id)
+        select(SubmissionRow.sha256, AssignmentVersion.sha256)
+        .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id == job_id)
     )
@@ -102,7 +102,7 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
 
 def _notes(session: Session, source: Job, job_id: str) -> list[str]:
     """What was noted when this submission was read, then by the grading: another's folder may have their name."""
-    packed = select(Submission.packed).join(Job, Job.submission_id == Submission.id)
+    packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     theirs, own = (
         unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)
     )

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from sim.backgrounds.drawing import HEIGHT
-from sim.backgrounds.tracks import Line, Point, lines_of
+from sim.backgrounds.tracks import Point, TrackLine, lines_of
 
 #: The lines of Line_Following_Test in the order of the data file. The name is the x where the line starts, with
 #: ``high`` for the ones that start half-way up; the broken line, in three parts, is not among them.
@@ -28,7 +28,7 @@ def centrelines() -> Mapping[str, tuple[Point, ...]]:
     return MappingProxyType(found)
 
 
-def _upwards(line: Line) -> tuple[Point, ...]:
+def _upwards(line: TrackLine) -> tuple[Point, ...]:
     """From the lower end on, cut off where it leaves the floor."""
     points = [(x, HEIGHT - y) for x, y in line.points]
     if points[0][1] > points[-1][1]:

@@ -24,17 +24,19 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class TrackLine:
     """A centreline in image pixels, and the width of the line drawn along it."""
 
     width: float
     points: tuple[Point, ...]
 
 
-def lines_of(file_name: str) -> tuple[Line, ...]:
+def lines_of(file_name: str) -> tuple[TrackLine, ...]:
     """The centrelines in a data file of this package."""
     text = resources.files(__package__).joinpath(file_name).read_text(encoding="utf-8")
-    return tuple(Line(line["width"], tuple((x, y) for x, y in line["points"])) for line in json.loads(text)["lines"])
+    return tuple(
+        TrackLine(line["width"], tuple((x, y) for x, y in line["points"])) for line in json.loads(text)["lines"]
+    )
 
 
 class SmoothCanvas:

@@ -11,8 +11,8 @@ from pydantic import Field, field_validator, model_validator
 
 from sim.errors import UsageError
 from submissions.criteria.common import CriterionBase, Texts, one_or_many
-from submissions.criteria.parts import Table
 from submissions.magics import Flags, parse_magic
+from submissions.strict_table import StrictTable
 
 #: The words that stand for a construct; any other is a name.
 CONSTRUCTS = (
@@ -94,7 +94,7 @@ class SourceRules(CriterionBase):
         return self
 
 
-class ExpectedCall(Table):
+class ExpectedCall(StrictTable):
     """A call of a function, and what it must return: exactly ``returns``, or one of ``one_of``."""
 
     function: str = ""  # the criterion's, if not given

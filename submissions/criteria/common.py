@@ -8,7 +8,9 @@ from __future__ import annotations
 from decimal import Decimal
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from submissions.strict_table import StrictTable
 
 Texts = tuple[str, ...]
 
@@ -27,10 +29,8 @@ def not_blank(value: Texts) -> Texts:
     return value
 
 
-class CriterionBase(BaseModel):
+class CriterionBase(StrictTable):
     """What every criterion has. ``scenarios`` names those it looks at; all, if empty."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # from the title, if not given
     title: str = Field(min_length=1, max_length=200)

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from submissions.criteria.common import CriterionBase
 from submissions.criteria.places import Range, ordered
+from submissions.strict_table import StrictTable
 
 
-class Motion(BaseModel):
+class AskedMotion(StrictTable):
     """What a move can be asked to be. Each is [least, most]; all that are given must hold.
 
     ``forward`` and ``sideways`` (to the left) are how far the robot gets, seen from where and how it stood
@@ -21,8 +22,6 @@ class Motion(BaseModel):
     its heading changes, degrees anticlockwise, ``turn_size`` the same without regard to the direction;
     ``seconds`` is how long it moves.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     forward: Range | None = None
     sideways: Range | None = None
@@ -42,7 +41,7 @@ class Motion(BaseModel):
         return any(value is not None for value in given)
 
 
-class NamedMotion(Motion):
+class NamedMotion(AskedMotion):
     """A move in a list of moves; ``name`` is what the feedback calls it."""
 
     name: str = Field(default="", max_length=80)
@@ -56,7 +55,7 @@ class NamedMotion(Motion):
         return self
 
 
-class Displacement(Motion, CriterionBase):
+class Displacement(AskedMotion, CriterionBase):
     """What came of the whole run: where the end is, seen from the start.
 
     Beside what a move can be asked: ``left_wheel`` and ``right_wheel`` are [least, most] of the wheels'

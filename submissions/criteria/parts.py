@@ -5,16 +5,8 @@ A criterion itself is in the module of its family.
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
 #: left, bottom, right, top, mm
 Zone = tuple[float, float, float, float]
-
-
-class Table(BaseModel):
-    """A table inside a criterion: no unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 def zone_with_room(zone: Zone) -> Zone:

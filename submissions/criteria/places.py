@@ -9,9 +9,10 @@ import itertools
 import math
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from sim.backgrounds.centrelines import centrelines
+from submissions.strict_table import StrictTable
 
 #: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.
 Part = Literal["robot", "pen", "left_light", "right_light"]
@@ -28,10 +29,8 @@ def ordered(value: Range | None) -> Range | None:
     return value
 
 
-class Area(BaseModel):
+class Area(StrictTable):
     """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str = Field(default="", max_length=80)
     rectangle: tuple[float, float, float, float] | None = None  # left, bottom, right, top
@@ -72,7 +71,7 @@ class Area(BaseModel):
         return f"the area with a corner at ({first[0]:g}, {first[1]:g})"
 
 
-class LineToFollow(BaseModel):
+class LineToFollow(StrictTable):
     """A line to drive along, in the direction in which it is to be driven.
 
     ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``); ``points`` lists its
@@ -80,8 +79,6 @@ class LineToFollow(BaseModel):
     angle to another, degrees anticlockwise from the right (the second less than the first: clockwise).
     ``closed`` joins the end to the beginning; Thruxton's circuit is closed anyway.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     on: str | None = None
     points: tuple[Point, ...] | None = None

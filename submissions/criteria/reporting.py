@@ -10,7 +10,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_serializer, field_validator, model_validator
 
 from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
-from submissions.criteria.parts import Table, Zone, zone_with_room
+from submissions.criteria.parts import Zone, zone_with_room
+from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
 
@@ -93,7 +94,7 @@ class Sequence(CriterionBase):
         return self
 
 
-class EventAt(Table):
+class EventAt(StrictTable):
     """A text, and the zone that the sensor must be in when it comes."""
 
     text: Texts = Field(min_length=1)  # any of these

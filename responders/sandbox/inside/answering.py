@@ -21,7 +21,7 @@ from .lockdown import Grants
 _NOTED = ("parser", "agent", "logger")
 
 
-class Responder:
+class ResponderRole:
     """The student's module, and the calls inside it that the sequence diagram shows."""
 
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:

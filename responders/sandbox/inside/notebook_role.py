@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from . import cell_source, student_code
-from .answering import Responder
+from .answering import ResponderRole
 from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
 from .shell import Shell
@@ -24,7 +24,7 @@ _SHOWN = 2000
 _ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
 
 
-class RunRequester(Responder):
+class NotebookRole(ResponderRole):
     """A notebook: its cells share one namespace, one clock and one file name; line numbers run on from cell to cell."""
 
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:

@@ -9,10 +9,10 @@ import contextlib
 import importlib
 
 from . import model_files, source_reader  # noqa: F401
-from .answering import Responder
+from .answering import ResponderRole
 from .frames import Wire
 from .lockdown import Grants
-from .notebook_role import RunRequester
+from .notebook_role import NotebookRole
 
 #: What answering takes.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
@@ -66,5 +66,5 @@ def _ask_the_machine() -> None:
 def run(wire: Wire, grants: Grants) -> None:
     """Receive a module or a notebook, run it, and answer."""
     spec = wire.receive()
-    requester = RunRequester if "cells" in spec else Responder
+    requester = NotebookRole if "cells" in spec else ResponderRole
     requester(wire, grants, spec).run()

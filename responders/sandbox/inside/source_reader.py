@@ -14,7 +14,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from . import cell_source
-from .source_walk import Mention, Place, Unit, Walk
+from .source_walk import Mention, SourcePlace, Unit, Walk
 from .source_words import CONSTRUCTS
 from .withheld import rule_for
 
@@ -32,7 +32,7 @@ _SHOWING = frozenset({"matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", 
 
 Answer = list[Any] | None
 #: Of each kind of mention, the first place of each name.
-Places = Mapping[str, Mapping[str, Place]]
+Places = Mapping[str, Mapping[str, SourcePlace]]
 
 
 def read(files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]]) -> dict[str, Any]:
@@ -137,7 +137,7 @@ class _Reading:
 # what is run
 
 
-def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mention, Place]]:
+def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mention, SourcePlace]]:
     """What is mentioned by code that can be run at all; ``looped`` is true where a loop leads to it.
 
     A function is run if its name is used by what is run, whoever's function of that name it is; all are if something
@@ -190,8 +190,8 @@ _USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
 _AVOIDED = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
 
 
-def _places(mentions: Iterable[tuple[Mention, Place]]) -> Places:
-    found: dict[str, dict[str, Place]] = defaultdict(dict)
+def _places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
+    found: dict[str, dict[str, SourcePlace]] = defaultdict(dict)
     for mention, place in mentions:
         for kind in (mention.kind, "looped") if mention.kind == "call" and mention.looped else (mention.kind,):
             found[kind][mention.name] = min(place, found[kind].get(mention.name, place))
@@ -228,7 +228,7 @@ def _module(rule: str) -> str:
 
 def _doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
     """What could be what a rule avoids, or hide it: the file, the line and the words, in the order of the files."""
-    found: dict[Place, str] = {}
+    found: dict[SourcePlace, str] = {}
     for kind in ("doubt", "any_name"):
         for what, place in places[kind].items():
             found.setdefault(place, what)
@@ -238,7 +238,7 @@ def _doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
     return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(found.items())]
 
 
-def _look_alikes(places: Places, rule: str) -> Iterable[tuple[str, Place]]:
+def _look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePlace]]:
     if rule.endswith("()"):
         yield from ((name, place) for name, place in places["unsure"].items() if _is_called(name, rule))
         owner, _, last = rule.removesuffix("()").rpartition(".")
@@ -249,5 +249,5 @@ def _look_alikes(places: Places, rule: str) -> Iterable[tuple[str, Place]]:
             yield from ((name, place) for name, place in places[kind].items() if f".{_module(rule)}." in f"{name}.")
 
 
-def _answer(place: Place | None) -> Answer:
+def _answer(place: SourcePlace | None) -> Answer:
     return None if place is None else [place.file[:_LONGEST_NAME], place.line]

@@ -55,7 +55,7 @@ class Mention(NamedTuple):
     looped: bool
 
 
-class Place(NamedTuple):
+class SourcePlace(NamedTuple):
     """A file's name, as messages have it, and a line."""
 
     file: str
@@ -74,7 +74,7 @@ class Unit:
     made_in: Unit | None = None
     made: bool = True  # its definition can be come to
     always: bool = False  # it is run without being named
-    mentions: dict[Mention, Place] = field(default_factory=dict)
+    mentions: dict[Mention, SourcePlace] = field(default_factory=dict)
     units: list[Unit] = field(default_factory=list)
 
 
@@ -116,7 +116,7 @@ class Walk:
 
     def _add(self, kind: str, name: str, node: ast.AST, here: _Here) -> None:
         if name:
-            place = Place(self._file, getattr(node, "lineno", 0))
+            place = SourcePlace(self._file, getattr(node, "lineno", 0))
             self._unit.mentions.setdefault(Mention(kind, name, here.live, here.looped), place)
 
     def _by_text(self, text: str, node: ast.AST, here: _Here) -> None:

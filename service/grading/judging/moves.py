@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from service.grading.grade import Measure
 from service.grading.judging.whereabouts import place_at, relative_to, robot_of, standing, stretches, travel
 from sim.recording import Recording
-from submissions.criteria.motion import Motion
+from submissions.criteria.motion import AskedMotion
 
 #: What differs by less than this share between the wheels is straight.
 _STRAIGHT = 0.1
@@ -82,7 +82,7 @@ def straight(recording: Recording) -> NDArray[np.bool_]:
     return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~standing(recording)
 
 
-def misses(wanted: Motion, move: Move) -> str | None:
+def misses(wanted: AskedMotion, move: Move) -> str | None:
     """In what a move is not as wanted, ``a turn of 85 to 95°, but it was 80°``; None if it is."""
     asked = (
         ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),

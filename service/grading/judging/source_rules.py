@@ -25,7 +25,7 @@ _UNREADABLE = "it cannot be read"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class SourcePlace:
     """A file beside the part, or a cell of a notebook (empty: the part itself), and a line."""
 
     file: str
@@ -43,11 +43,11 @@ class SourceAnswers:
     can do more than their text shows.
     """
 
-    uses: tuple[Place | None, ...] = ()
-    avoids: tuple[Place | None, ...] = ()
-    in_loop: tuple[Place | None, ...] = ()
-    defines: tuple[Place | None, ...] = ()
-    speech: tuple[Place | None, ...] = ()
+    uses: tuple[SourcePlace | None, ...] = ()
+    avoids: tuple[SourcePlace | None, ...] = ()
+    in_loop: tuple[SourcePlace | None, ...] = ()
+    defines: tuple[SourcePlace | None, ...] = ()
+    speech: tuple[SourcePlace | None, ...] = ()
     doubts: tuple[str, ...] = ()
     error: str = ""
     unread: str = ""
@@ -141,10 +141,10 @@ def _words(rule: str) -> str:
     return f"a {rule} loop" if rule in ("for", "while") else rule
 
 
-def _places(told: Any, rules: Sequence[str]) -> tuple[Place | None, ...]:
+def _places(told: Any, rules: Sequence[str]) -> tuple[SourcePlace | None, ...]:
     """Raises one of Python's errors for what is no answer to each of the rules."""
     return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
 
 
-def _place(file: Any, line: Any) -> Place:
-    return Place(str(file)[:60], int(line))
+def _place(file: Any, line: Any) -> SourcePlace:
+    return SourcePlace(str(file)[:60], int(line))

@@ -1,0 +1,14 @@
+"""The base of every table that an instructor writes: no unknown keys, and no texts where numbers belong.
+
+What a table means is said where it is defined.
+"""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class StrictTable(BaseModel):
+    """Frozen, and refused where it has a key too many or a number that is none."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
