@@ -28,7 +28,7 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     return replace(
         grade,
         criteria=tuple(
-            replace(_without_hidden_trials(result, new_index), for_staff="")
+            replace(_without_hidden_trials(result, new_index), for_staff="", unjudged="")
             for result in grade.criteria
             if result.visibility in released
         ),
