@@ -87,7 +87,7 @@ class _Killer:
 @pytest.fixture
 def plain_rig() -> Iterator[Rig]:
     """Without bubblewrap, in which a child's number is another."""
-    from responders.sandbox.manager import Walls
+    from responders.sandbox.zygote import Walls
 
     with Rig(Walls(bubblewrap=False)) as made:
         yield made
