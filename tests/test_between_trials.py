@@ -17,7 +17,8 @@ import pytest
 from builders import echo
 from responders.sandbox import traces
 from responders.sandbox.inside import grants
-from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import Walls
 from service.doctor import examine
 from service.grading.grader import grade
 from service.grading.rig import Rig

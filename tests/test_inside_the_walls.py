@@ -14,7 +14,8 @@ from PIL import Image
 from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
-from responders.sandbox.manager import Sandboxes, Walls
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import Walls
 
 _DATA = """
 import numpy as np

@@ -18,10 +18,11 @@ from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_play import Played, Stage, never_ran, play_notebook
 from responders.notebook_process import NotebookOrder
 from responders.sandbox.control_group import ControlGroup
-from responders.sandbox.manager import FULL, Sandboxes, Walls
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.running_child import ChildLimits, KilledFromOutside
+from responders.sandbox.zygote import FULL, Walls
 from responders.training import Named, TrainingOrder, train_and_name
 from responders.trial import run_trial
 from service.grading.slots import Slots

@@ -16,7 +16,7 @@ import structlog
 from celery import Task, current_app, shared_task, signals
 
 from responders.sandbox import control_group
-from responders.sandbox.manager import FULL, NONE
+from responders.sandbox.zygote import FULL, NONE
 from service.grading.rig import Rig
 from service.grading.slots import Slots
 from service.queue.canaries import Watch

@@ -20,6 +20,7 @@ from service.store import artifacts, canaries, copies, grades, phases
 from service.store.engine import Store, now
 from service.store.installation import secret_of
 from service.store.models import UNFINISHED, Job, JobState, PlotState
+from service.store.plain import to_plain
 from service.store.turns import next_job
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
@@ -134,6 +135,7 @@ def finish(
             "cache_key": copies.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
             "walls": grade.walls,
             "notes": list(grade.notes),
+            "cost": grade.cost and to_plain(grade.cost),
             "plots": PlotState.DUE,
             "plots_due_at": at,
         }
