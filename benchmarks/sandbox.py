@@ -17,9 +17,10 @@ from pathlib import Path
 from benchmarks.measurement import Measurement
 from responders import wire
 from responders.sandbox.inside import grants, lockdown
-from responders.sandbox.manager import Role, Sandboxes
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.zygote import Role
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder": ChildLimits(2, 512 << 20)}
 _SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}

@@ -35,9 +35,10 @@ from filter_machine import listed
 from responders import wire
 from responders.sandbox import manager
 from responders.sandbox.inside import lockdown
-from responders.sandbox.manager import NONE, Isolation, Role, Sandboxes
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
+from responders.sandbox.zygote import NONE, Isolation, Role
 from sim.recording import Verdict
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)

@@ -87,6 +87,21 @@ def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runn
     assert any("NameError: name 'tank_drvie' is not defined (line 1)" in problem for problem in problems)
 
 
+def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_path: Path, runner: TrialRunner) -> None:
+    """Even where it costs no marks."""
+    write_new(tmp_path / "task")
+    file = tmp_path / "task" / "assignment.toml"
+    own = '\n[[criterion]]\nid = "own"\ntitle = "O"\nmarks = 0\ncheck = "python"\nfile = "check.py"\n'
+    file.write_text(file.read_text() + own)
+    (tmp_path / "task" / "check.py").write_text("def check(trial): return trial['printed'][99] == 'done'\n")
+    problems = check_examples(str(tmp_path / "task"), runner=runner).problems
+    said = "own could not be judged: The assignment's own check fails: check.py: IndexError: list index out of range"
+    assert [problem.partition(" (")[0] for problem in problems] == [f"reference: {said}", f"stops-short: {said}"]
+    failed = robomark("assignments", "check", str(tmp_path / "task"))
+    assert failed.returncode == 2
+    assert "own could not be judged" in failed.stdout + failed.stderr
+
+
 def test_ids_are_listed_whole_on_a_narrow_screen(tmp_path: Path) -> None:
     listed = robomark("assignments", "list").stdout
     assert all(name in listed for name in catalogue())

@@ -30,8 +30,9 @@ from battery import (
     run,
     unread,
 )
-from responders.sandbox import manager, private_folders
-from responders.sandbox.manager import Isolation, Role, Sandboxes
+from responders.sandbox import private_folders, zygote
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import Isolation, Role
 
 ATTACKS = attacks()
 MEMORIES = memories()
@@ -158,7 +159,7 @@ def tree(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """What is readable of ours, with more in it to leave a trace on."""
     with tempfile.TemporaryDirectory() as made:
         folder = readable_tree(Path(made))
-        monkeypatch.setattr(manager, "_package_folder", lambda name: folder / name)
+        monkeypatch.setattr(zygote, "_package_folder", lambda name: folder / name)
         yield folder
 
 

@@ -17,7 +17,8 @@ import pytest
 from builders import echo
 from responders.sandbox import traces
 from responders.sandbox.inside import grants
-from responders.sandbox.manager import Isolation, Sandboxes
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import Isolation
 from service.doctor import examine
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner

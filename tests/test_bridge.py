@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from responders.channel import Channel, Line
-from responders.sandbox.manager import NONE
+from responders.sandbox.zygote import NONE
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import SECOND, Verdict

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,8 @@ from service.grading.judging.outcome import Outcome
 from service.grading.judging.source_rules import SourceAnswers, judge_source
 from service.grading.static_analysis import SubmittedParts, analyse
 from service.grading.trial_runner import TrialRunner
-from sim.errors import AssignmentError
+from service.reports.audience import student_view
+from service.reports.text import plain_text
 from sim.recording import Verdict
 from submissions.assignment import Assignment, Limits, Parts, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
@@ -386,11 +389,87 @@ def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Pa
         ("def check(", "SyntaxError"),
     ],
 )
-def test_a_check_that_fails_is_the_instructors_mistake(
+def test_a_check_that_fails_leaves_its_line_unjudged(
     check: str, words: str, tmp_path: Path, runner: TrialRunner
 ) -> None:
-    with pytest.raises(AssignmentError, match=words):
-        checked(tmp_path / "a", check, runner)
+    (result,) = checked(tmp_path / "a", check, runner).criteria
+    assert result.marks == 0
+    assert result.message == "This could not be judged; staff will look at it."
+    assert re.search(words, result.unjudged)
+    assert result.unjudged in result.for_staff
+
+
+#: A check that takes on trust what it reads, beside a line that anybody earns who comes to the end.
+TRUSTING = """
+import json, re
+def check(trial):
+    kind, _, text = trial["printed"][0][1].partition(" ")
+    if kind == "number": return {"passed": int(text) > 0}
+    if kind == "score": return {"passed": False, "score": 10 ** int(text)}
+    if kind == "measure": return {"passed": True, "measures": {"it": 10 ** int(text)}}
+    if kind == "ratio": return {"passed": 1 / float(text) > 2}
+    if kind == "pattern": return bool(re.fullmatch(r"(\\w+\\s?)+\\$", text))
+    if kind == "json": return {"passed": bool(json.loads(text))}
+    if kind == "echo": return {"passed": False, "message": text * 100_000}
+    if kind == "room": return len([0] * 10 ** int(text)) > 0
+    if kind == "words": return {"passed": text.split()[3] == "x"}
+    if kind == "print":
+        for _ in range(10 ** int(text)): print("x" * 1000)
+    return True
+"""
+MISLEADING = (
+    "number x",
+    "number " + "9" * 5000,
+    "score 400",
+    "score 5000",
+    "measure 5000",
+    "ratio 0",
+    "ratio nan nan",
+    "pattern " + "a" * 60 + "!",
+    "json " + "[" * 5000,
+    "echo " + "y" * 100,
+    "room 12",
+    "words few",
+    "print 9",
+)
+
+
+@pytest.fixture(scope="module")
+def trusting(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
+    folder = tmp_path_factory.mktemp("trusting")
+    ended = '[[criterion]]\nid = "ended"\ntitle = "E"\nmarks = 2\ncheck = "finishes"\n'
+    limits = "[limits]\nresponder_cpu = 1\nresponder_memory_mb = 128\noutput_bytes = 50000\n"
+    (folder / "assignment.toml").write_text(HEAD.replace("[parts]", f"{limits}[parts]") + ended)
+    (folder / "check.py").write_text(TRUSTING)
+    return read_assignment(folder)
+
+
+@pytest.mark.parametrize("text", MISLEADING, ids=lambda text: text[:12])
+def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
+    text: str, trusting: Assignment, runner: TrialRunner
+) -> None:
+    result = grade(Submission("ada", Source("robot.py", f"print({text!r})")), trusting, runner=runner)
+    asked, ended = result.criteria
+    assert asked.marks == 0
+    assert asked.unjudged
+    assert ended.marks == 2
+    assert not ended.unjudged
+    told = plain_text(result)
+    assert "For staff: Could not be judged: " in told
+    shown = plain_text(student_view(result))
+    assert "This could not be judged; staff will look at it." in shown
+    assert asked.unjudged[:30] not in shown
+
+
+def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
+    trusting: Assignment, runner: TrialRunner
+) -> None:
+    few = replace(trusting, limits=replace(trusting.limits, all_cpu=0.5))
+    program = Source("robot.py", "print('json [1]')\nwhile True: pass")
+    asked, ended = grade(Submission("ada", program), few, runner=runner).criteria
+    assert ended.marks == 0
+    assert not asked.unjudged
+    assert asked.evidence[0].passed
 
 
 # what does not fit together

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,13 @@ from responders.bridge import Bridge
 from responders.conversation import Conversation
 from responders.sandbox.meter import JobLimits, JobMeter
 from running import run_program
+from service.grading.grader import grade
 from service.grading.slots import Slots
 from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled, HostError
 from sim.recording import Verdict
+from submissions.assignment_file import find_assignment
+from submissions.submission import Source, Submission
 
 HONEST = 'from time import sleep\nprint("PY::a")\nsleep(1)\ntank_drive.on_for_seconds(20, 20, 1)\n'
 BUSY = f"sum(range(10**7))\n{HONEST}"
@@ -83,7 +87,7 @@ class _Killer:
 @pytest.fixture
 def plain_runner() -> Iterator[TrialRunner]:
     """Without bubblewrap, in which a child's number is another."""
-    from responders.sandbox.manager import Isolation
+    from responders.sandbox.zygote import Isolation
 
     with TrialRunner(Isolation(bubblewrap=False)) as made:
         yield made
@@ -248,6 +252,26 @@ def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner:
     verdicts = [run_program(runner, HONEST, responder=responder, meter=meter).verdict for _ in range(4)]
     assert verdicts[0] is Verdict.FINISHED
     assert verdicts[-1] is Verdict.STALLED
+
+
+def test_a_grade_has_what_its_trials_cost_and_is_compared_without(runner: TrialRunner) -> None:
+    asked = find_assignment("echo-responder")
+    program = Source("robot.py", f"{NAP}print('PY::x')\n")
+    submission = Submission("ada", program, Source("responder.py", ECHO))
+    first, second = (grade(submission, asked, runner=runner) for _ in range(2))
+    cost = first.cost
+    assert cost is not None
+    assert cost.spent is not None
+    assert cost.limits.cpu_seconds == asked.limits.all_cpu_of(len(first.trials))
+    assert cost.limits.sleep_seconds == asked.limits.all_sleep
+    # The nap, but for the half second of each process that is free.
+    assert 0.3 * len(first.trials) < cost.spent.sleep_seconds < cost.limits.sleep_seconds
+    assert 0 < cost.spent.cpu_seconds < cost.limits.cpu_seconds
+    assert 256 < cost.spent.kept_bytes < cost.limits.kept_bytes
+    assert second.cost is not None
+    assert (second.marks, second.criteria) == (first.marks, first.criteria)
+    assert replace(second, trials=()) == replace(first, trials=())
+    assert second.cost != cost
 
 
 def test_computing_in_all_trials_together_is_counted(runner: TrialRunner) -> None:

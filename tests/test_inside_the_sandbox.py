@@ -14,7 +14,8 @@ from PIL import Image
 from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
-from responders.sandbox.manager import Isolation, Sandboxes
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import Isolation
 
 _DATA = """
 import numpy as np

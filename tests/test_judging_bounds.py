@@ -346,8 +346,9 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
     before, bad, after = judge_within(bounds, _criteria("before", "bad", "after"), trials, StaticAnalysis())
     assert [result.marks for result in (before, bad, after)] == [2, 0, 2]
     assert bad.max_marks == 2
-    assert bad.message == "This could not be judged within the limits that judging has; staff will look at it."
+    assert bad.message == "This could not be judged; staff will look at it."
     assert bad.unjudged.startswith(cause)
+    assert bad.for_staff == f"Could not be judged: {bad.unjudged}."
     assert not before.unjudged
     assert not after.unjudged
     assert [signal.getsignal(number) for number in (signal.SIGPROF, signal.SIGALRM)] == [signal.SIG_DFL] * 2

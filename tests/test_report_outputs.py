@@ -12,9 +12,12 @@ import pytest
 from rich.console import Console
 
 import report_builders as build
+from responders.sandbox.meter import JobLimits, Spent
+from service.grading.grade import Cost, Grade
 from service.reports.audience import student_view, worst_trial
 from service.reports.csv_output import marks_csv, moodle_csv
 from service.reports.gradescope import gradescope_document, gradescope_text
+from service.reports.html import staff_report, student_report
 from service.reports.json_output import json_document, json_text
 from service.reports.junit import junit_text
 from service.reports.rich_text import rich_report
@@ -108,10 +111,7 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
 
 def test_terminals_get_no_control_codes_from_students() -> None:
     grade = build.hostile_grade()
-    console = Console(file=io.StringIO(), width=100, color_system=None)
-    console.print(rich_report(grade))
-    assert isinstance(console.file, io.StringIO)
-    for shown in (plain_text(grade), console.file.getvalue()):
+    for shown in (plain_text(grade), _on_a_terminal(grade)):
         assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(shown)
         assert "[red]x[/red]" in shown
 
@@ -162,3 +162,31 @@ def test_marks_are_not_rounded_on_the_way() -> None:
     grade = build.line_follower_grade()
     tenth = replace(grade.criteria[0], marks=Decimal("0.1"))
     assert json_document(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2")))))["marks"] == 0.3
+
+
+def _on_a_terminal(grade: Grade) -> str:
+    console = Console(file=io.StringIO(), width=100, color_system=None)
+    console.print(rich_report(grade))
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+COSTLY = replace(build.shape_grade(), cost=Cost(JobLimits(64 << 20, 240.0, 20.0), Spent(150_000, 3.21, 0.04)))
+FIGURES = "Used 3.2 of 240 s of CPU, 0 of 20 s of sleep, 0.1 of 64 MB of output."
+LIMITS = "All trials together may use 240 s of CPU, 20 s of sleep and 64 MB of output."
+
+
+def test_staff_read_what_was_used_and_students_what_may_be() -> None:
+    viewed = student_view(COSTLY)
+    for_staff = (plain_text(COSTLY), _on_a_terminal(COSTLY), staff_report(COSTLY, {}))
+    assert all(FIGURES in page and LIMITS not in page for page in for_staff)
+    for_students = (plain_text(viewed), _on_a_terminal(viewed), student_report(COSTLY, {}))
+    assert all(LIMITS in page and "of 240 s" not in page for page in for_students)
+    assert all("of 240 s" not in text for text in (gradescope_text(COSTLY), moodle_csv([COSTLY])))
+    assert json_document(COSTLY)["cost"]["spent"] == {"kept_bytes": 150_000, "cpu_seconds": 3.21, "sleep_seconds": 0.04}
+    assert json_document(viewed)["cost"] == {"limits": json_document(COSTLY)["cost"]["limits"], "spent": None}
+
+
+def test_of_a_grade_that_was_given_before_this_was_measured_nothing_is_said() -> None:
+    assert all(word not in plain_text(build.shape_grade()) for word in ("Used ", "together"))
+    assert "cost" not in json_document(build.shape_grade())

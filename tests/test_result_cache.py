@@ -10,8 +10,9 @@ from sqlalchemy import update
 
 import report_builders
 from builders import comparable, echo, grading_request
+from responders.sandbox.meter import JobLimits, Spent
 from service.commands.batch_tables import remarks
-from service.grading.grade import Grade
+from service.grading.grade import Cost, Grade
 from service.store import artifacts, batches, grades, jobs, metrics, self_tests
 from service.store.engine import Store
 from service.store.installation import secret_of
@@ -44,8 +45,9 @@ def _job(store: Store, job_id: str) -> Job:
 
 
 def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Store) -> None:
+    cost = Cost(JobLimits(), Spent(4000, 3.25, 0.5))
     _accept(store, "ada")
-    first = _grade_next(store)
+    first = _grade_next(store, replace(GRADE, cost=cost))
     jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"image")])
     second = _accept(store, "bob")
     assert second.copied_from == first
@@ -55,6 +57,7 @@ def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Sto
     with store.reading() as session:
         original, copy = grades.load(session, first), grades.load(session, second.job_id)
         assert comparable(replace(copy, student=original.student)) == comparable(original)
+        assert copy.cost == original.cost == cost
         assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"image"
         assert batches.job_line(session, second.job_id).copied_from == first
     # A copy is not copied: what is named is always the grade that was run.

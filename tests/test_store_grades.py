@@ -12,7 +12,8 @@ from sqlalchemy import select, text, update
 
 import report_builders
 from builders import accept_one, comparable
-from service.grading.grade import Grade
+from responders.sandbox.meter import JobLimits, Spent
+from service.grading.grade import Cost, Grade
 from service.store import artifacts, grades, jobs
 from service.store.columns import storable
 from service.store.engine import Store
@@ -52,6 +53,18 @@ def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -
         back = grades.load(session, job_id)
     assert comparable(back) == comparable(grade)
     assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
+
+
+def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> None:
+    cost = Cost(JobLimits(1 << 20, 240.0, 20.0), Spent(1 << 18, 3.25, 0.5))
+    grade = replace(report_builders.shape_grade(), cost=cost)
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        back = grades.load(session, job_id)
+    assert back.cost == cost
+    other = replace(grade, cost=Cost(cost.limits, Spent(1 << 18, 3.5, 0.0)))
+    assert other == grade
+    assert hash(other.cost) != hash(cost)
 
 
 def test_hostile_texts_go_in_and_the_recordings_keep_them(store: Store) -> None:

@@ -68,6 +68,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             graded = grades.load(session, ada.id)
             assert (graded.student, graded.marks, ada.standing) == ("ada", Decimal("1.00"), Standing.STANDS)
             assert len(graded.trials[0].recording.ticks) > 10
+            assert graded.cost is None
             assert bob.student == "Bob 🤖"
             assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
             assert intake.load_grading_request(session, ada.id).submission.program is not None

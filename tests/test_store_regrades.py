@@ -12,6 +12,7 @@ from sqlalchemy import select, update
 
 import report_builders
 from builders import echo, grading_request
+from service.commands.batch_tables import unjudged_words
 from service.grading.grade import Grade
 from service.store import audit, batch_control, batches, grades, jobs, regrades
 from service.store.engine import Store
@@ -63,13 +64,13 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
     batch = _batch(store, "ada", "bob")
     _grade_all(store)
     before = _standing(store, batch)
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 0, 0, 0, 0)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 0, 0, 0, 0, 0)
     again = _regrade(store, batch, _better(GRADE), changed=True)
     assert _standing(store, batch) == before
     with store.reading() as session:
         assert regrades.unpublished_regrades(session, batch) == 2
         assert batches.batch(session, again).regrade_of == batch
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 2, 0, 0, 0)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 2, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert set(after.values()).isdisjoint(before.values())
     with store.reading() as session:
@@ -92,6 +93,57 @@ def test_a_regrade_can_be_published_by_its_own_batch_too(store: Store) -> None:
     with store.reading() as session:
         assert session.get_one(Job, line).batch_id == again
     assert len(_changes(store, again)) == 1
+
+
+def _unjudged(grade: Grade) -> Grade:
+    first = replace(grade.criteria[0], marks=Decimal(0), unjudged="it took more than 11 s of computing")
+    return replace(grade, criteria=(first, *grade.criteria[1:]))
+
+
+def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
+    batch = _batch(store, "ada", "bob")
+    for claimed in (_unjudged(GRADE), GRADE):
+        claim = jobs.claim(store, "worker", 60)
+        assert claim is not None
+        jobs.finish(store, claim, grades.prepare(claimed), datetime.now(UTC))
+    with store.reading() as session:
+        lines = batches.job_lines(session, batch)
+    (left,) = [line for line in lines if line.unjudged]
+    assert unjudged_words(lines).startswith("1 submission has criteria that could not be judged")
+    assert f": {left.student};" in unjudged_words(lines)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 0, 0, 0, 0, 1)
+    with store.reading() as session:
+        assert session.get_one(Job, left.id).published_at is None
+    assert regrades.publish(store, batch, actor="staff", anyway=True) == regrades.Published(1, 0, 0, 0, 0, 0)
+    with store.reading() as session:
+        assert session.get_one(Job, left.id).published_at is not None
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(0, 0, 0, 0, 0, 0)
+
+
+def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    before = _standing(store, batch)
+    _regrade(store, batch, _unjudged(GRADE))
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 0, 0, 0, 0, 1)
+    assert _standing(store, batch) == before
+    _regrade(store, batch, _better(GRADE))
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
+    assert len(_standing(store, batch)) == 1
+    assert _standing(store, batch) != before
+
+
+def test_a_whole_regrade_takes_the_place_of_what_could_not_be_judged(store: Store) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store, _unjudged(GRADE))
+    before = _standing(store, batch)
+    _regrade(store, batch)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
+    after = _standing(store, batch)
+    assert len(after) == 1
+    assert after != before
+    with store.reading() as session:
+        assert session.get_one(Job, before["ada"]).standing is Standing.KEPT
 
 
 def test_of_several_regrades_the_newest_stands(store: Store) -> None:
@@ -172,7 +224,7 @@ def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
     (change,) = _changes(store, _regrade(store, batch, changed=True))
     assert (change.before, change.after) == (None, GRADE.marks)
     assert "had no grade" in change.reason
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
 
 
 def test_a_newer_submission_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:

@@ -1,7 +1,7 @@
 """A control group (version 2) for each slot of a worker, where systemd or a container lets the worker have some.
 
 An extra: it holds what no limit on a single process holds, and says whose fault it is when the kernel kills for want
-of memory. Which processes belong into one is ``manager.py``'s.
+of memory. Which processes belong into one is ``zygote.py``'s.
 """
 
 from __future__ import annotations

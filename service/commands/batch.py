@@ -17,7 +17,7 @@ from rich.text import Text
 from service.commands.batch_control import BatchId, cancel, pause, resume, retry
 from service.commands.batch_export import export
 from service.commands.batch_regrade import publish, regrade
-from service.commands.batch_tables import changes_table, history_table, marks_table, summary
+from service.commands.batch_tables import changes_table, history_table, marks_table, summary, unjudged_words
 from service.commands.batch_waiting import marks_awaited
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
@@ -143,6 +143,8 @@ def status(batch: BatchId) -> None:
         console.print(f"{pace.per_minute:.0f} a minute, {pace.left} left", highlight=False)
     _print_problems(line.problems, console)
     console.print(marks_table(lines) if line.regrade_of is None else changes_table(changes))
+    if unjudged := unjudged_words(lines):
+        console.print(Text(unjudged))
     if waiting:
         console.print(f"{waiting} regrades are done and not published: robomark batch publish {line.id}")
     if history:

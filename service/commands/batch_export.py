@@ -17,6 +17,7 @@ from typing import Annotated
 import typer
 
 from service.commands.batch_control import BatchId
+from service.commands.batch_tables import unjudged_words
 from service.grading.grade import Grade
 from service.home import for_the_user
 from service.reports.csv_output import marks_csv, moodle_csv
@@ -73,6 +74,8 @@ def export(
         graded = _exported(lines, published=published)
         if waiting:
             print(f"robomark: {waiting} regrades are not published: these are the grades that stand", file=sys.stderr)
+        if unjudged := unjudged_words(graded):
+            print(f"robomark: {unjudged}", file=sys.stderr)
         if each is not None and output is not None:
             _write_each(store, graded, each, output)
             return

@@ -56,17 +56,23 @@ def regrade(
         raise HostError(f"{len(dead)} of {len(changes)} could not be graded; {dead[0].student}: {dead[0].reason}")
 
 
-def publish(batch: BatchId) -> None:
+def publish(
+    batch: BatchId,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
+    ] = False,
+) -> None:
     """Let the newest grades of a batch stand, and release them to the students."""
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
-        done = regrades.publish(store, batch_id, actor=audit.this_user())
+        done = regrades.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
     left = [
         f"{count} {what}"
         for count, what in (
             (done.unfinished, "not graded yet"),
             (done.dead, "could not be graded"),
             (done.staff_only, "over a limit and for staff only"),
+            (done.unjudged, "with criteria that could not be judged (--anyway publishes them)"),
         )
         if count
     ]

@@ -20,6 +20,9 @@ _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
 )
 
+#: Students that a sentence names.
+_MOST_NAMED = 10
+
 
 def summary(line: BatchLine) -> str:
     """How many jobs of a batch are in each state."""
@@ -97,6 +100,16 @@ def remarks(line: JobLine) -> list[str]:
         "published": line.published_at is not None,
     }
     return [remark for remark, holds in told.items() if holds]
+
+
+def unjudged_words(lines: Sequence[JobLine]) -> str:
+    """Whose grades lack the judgement of a criterion; empty where none does."""
+    students = [line.student for line in lines if line.unjudged]
+    if not students:
+        return ""
+    told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
+    whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
+    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
 
 
 def _worth_a_row(change: Change) -> bool:

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from responders.sandbox.manager import FULL, NONE
+from responders.sandbox.zygote import FULL, NONE
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner

@@ -111,10 +111,11 @@ def _usual(name: str, assignment: Assignment) -> Expectation | None:
 
 
 def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | None) -> list[str]:
+    found = [f"{result.id} could not be judged: {result.unjudged}" for result in graded.criteria if result.unjudged]
     if wanted is None:
-        return ["has no table in expected.toml"]
+        return [*found, "has no table in expected.toml"]
     known = {result.id for result in graded.criteria}
-    found = [
+    found += [
         f'expected.toml says it loses "{name}", expected the id of a criterion: {", ".join(sorted(known))}'
         for name in wanted.loses or ()
         if name not in known

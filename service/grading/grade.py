@@ -5,9 +5,10 @@ Nothing here judges or simulates; ``judge.py`` and ``grader.py`` make grades, re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 
+from responders.sandbox.meter import JobLimits, Spent
 from sim.recording import Image, Pose, Recording, Verdict
 from submissions.seeds import PUBLIC
 
@@ -165,6 +166,14 @@ class TrialResult:
 
 
 @dataclass(frozen=True, slots=True)
+class Cost:
+    """What all trials may cost together and, for staff, what they did."""
+
+    limits: JobLimits
+    spent: Spent | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Grade:
     """The marks of one job. ``sandbox`` says which layers stood around the student's code."""
 
@@ -179,6 +188,7 @@ class Grade:
     grader_version: str
     notes: tuple[str, ...] = ()
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
+    cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
 
     @property
     def marks(self) -> Decimal:

@@ -16,7 +16,7 @@ from responders.channel import Channel
 from responders.conversation import Code, ResponderSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from service.grading.grade import CriterionResult, Grade, TrialResult
+from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.notebook_trial import Marking, NotebookToRun, run_notebook_trial
 from service.grading.static_analysis import SubmittedParts, analyse, does_without, reads_program, responder_limits
@@ -134,6 +134,7 @@ def grade(
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *parts.notes, *_cell_notes(parts, results), *_unjudged_notes(criteria)),
         secret_sha256=secret.sha256,
+        cost=Cost(meter.limits, meter.spent),
     )
 
 

@@ -15,8 +15,8 @@ from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
-from service.grading.judging.function_checks import calls_of, checked
-from service.grading.judging.outcome import Outcome, fault_words
+from service.grading.judging.function_checks import calls_of
+from service.grading.judging.outcome import fault_words
 from service.grading.judging.source_rules import SPEECH, SourceAnswers
 from sim.chance import Stream
 from sim.recording import Pose, Recording
@@ -59,7 +59,7 @@ class StaticAnalysis:
     answers: Mapping[str, SourceAnswers] = field(default_factory=dict)
     flags: Flags = field(default_factory=Flags)
     called: Mapping[str, Called] = field(default_factory=dict)
-    checks: Mapping[tuple[str, int], Outcome] = field(default_factory=dict)
+    checks: Mapping[tuple[str, int], Returned] = field(default_factory=dict)
     sandbox: str = ""
 
 
@@ -85,14 +85,13 @@ def analyse(
     caller: Caller,
     meter: JobMeter,
 ) -> StaticAnalysis:
-    """Everything that the criteria ask for beside the recordings.
-
-    Raises AssignmentError when a check of the instructor's fails, HostError when the machine does.
-    """
+    """Everything that the criteria ask for beside the recordings. Raises HostError when the machine fails."""
     sources = {"program": submitted.program, "responder": submitted.responder}
     answers: dict[str, SourceAnswers] = {}
     called: dict[str, Called] = {}
-    checks: dict[tuple[str, int], Outcome] = {}
+    checks: dict[tuple[str, int], Returned] = {}
+    # What the instructor's checks cost is not the submission's, and what that has left is not theirs.
+    own = JobMeter(meter.limits, meter.heartbeat)
     for criterion in assignment.criteria:
         if isinstance(criterion, SourceRules) and sources[criterion.part] is not None:
             answers[criterion.id] = _answers(criterion, submitted, assignment, caller, meter)
@@ -101,7 +100,7 @@ def analyse(
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, meter)
+                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
     return StaticAnalysis(answers, submitted.flags, called, checks, sandbox)
 
@@ -218,7 +217,7 @@ def _called(
 
 def _check(
     criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: Caller, meter: JobMeter
-) -> Outcome:
+) -> Returned:
     limits = assignment.limits
     called = caller.call(
         Code(criterion.file, assignment.given_parts[criterion.file]),
@@ -229,7 +228,7 @@ def _check(
         trial.seed,
         meter,
     )
-    return checked(criterion, called.returned[0] if called.returned else Returned(fault=called.fault))
+    return called.returned[0] if called.returned else Returned(fault=called.fault)
 
 
 def _pose(pose: Pose) -> dict[str, float]:

@@ -18,10 +18,11 @@ from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.control_group import ControlGroup
-from responders.sandbox.manager import FULL, Isolation, Sandboxes
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.running_child import ChildLimits, KilledFromOutside
+from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
 from service.grading.slots import Slots

@@ -16,7 +16,7 @@ import structlog
 from celery import Task, current_app, shared_task, signals
 
 from responders.sandbox import control_group
-from responders.sandbox.manager import FULL, NONE
+from responders.sandbox.zygote import FULL, NONE
 from service.grading.slots import Slots
 from service.grading.trial_runner import TrialRunner
 from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK

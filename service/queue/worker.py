@@ -17,7 +17,8 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from responders.sandbox import control_group
-from responders.sandbox.manager import FULL, NONE, Sandboxes
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.zygote import FULL, NONE
 from service.home import keep_private, open_home
 from service.queue.celery_app import NO_SANDBOX, QUEUES, make_celery
 from service.queue.logs import configure_logging

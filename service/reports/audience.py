@@ -17,7 +17,7 @@ BEFORE_PUBLICATION = frozenset({"visible"})
 
 
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> Grade:
-    """``grade`` without what is for staff, and the criteria and trials whose visibility is not in ``released``.
+    """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
 
     Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
     the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
@@ -28,11 +28,12 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     return replace(
         grade,
         criteria=tuple(
-            replace(_without_hidden_trials(result, new_index), for_staff="")
+            replace(_without_hidden_trials(result, new_index), for_staff="", unjudged="")
             for result in grade.criteria
             if result.visibility in released
         ),
         trials=tuple(grade.trials[index] for index in kept),
+        cost=grade.cost and replace(grade.cost, spent=None),
     )
 
 

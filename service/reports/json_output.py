@@ -6,6 +6,7 @@ It shows all of the grade it is given; pass it a student's view where a student 
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from decimal import Decimal
 from typing import Any
 
@@ -49,6 +50,7 @@ def json_document(grade: Grade) -> dict[str, Any]:
             for trial in grade.trials
         ],
         "accuracy": _accuracy(grade.accuracy),
+        **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
 
 

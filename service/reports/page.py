@@ -14,6 +14,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.text import cost_words
 from service.reports.verdict_words import VerdictWords, grade_words, verdict_words
 from sim.recording import Fault, Message, Recording, Verdict
 from submissions.submission import Submission
@@ -109,6 +110,7 @@ class Page:
     trials: tuple[TrialLine, ...]
     more_trials: int
     notes: tuple[str, ...]
+    cost: str
     weak_sandbox: bool
 
 
@@ -134,6 +136,7 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
+        cost=cost_words(grade),
         weak_sandbox=PROCESS_LIMITS in grade.sandbox,
     )
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from service.grading.grade import Grade
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.readable import number, one_line, readable
-from service.reports.text import accuracy_words
+from service.reports.text import accuracy_words, cost_words
 from service.reports.verdict_words import grade_words
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
@@ -30,6 +30,7 @@ def rich_report(grade: Grade) -> RenderableType:
     if grade.accuracy is not None:
         parts.append(Text(accuracy_words(grade)))
     parts += [Text(f"Note: {readable(note, 300)}", style="dim") for note in grade.notes[:20]]
+    parts += [Text(cost_words(grade), style="dim")] if grade.cost else []
     parts.append(Text(f"sandbox: {one_line(grade.sandbox)}", style="dim"))
     return Group(*parts)
 

@@ -13,6 +13,7 @@ from service.reports.readable import number, one_line, readable
 from service.reports.verdict_words import grade_words
 
 _WIDTH = 96
+_MEGABYTE = 1 << 20
 
 
 def plain_text(grade: Grade) -> str:
@@ -34,6 +35,7 @@ def plain_text(grade: Grade) -> str:
         lines += ["", accuracy_words(grade)]
     for note in grade.notes[:20]:
         lines += _wrapped(f"Note: {readable(note, 300)}", indent=6)
+    lines += ["", *_wrapped(cost_words(grade))] if grade.cost else []
     lines += ["", f"sandbox: {one_line(grade.sandbox)}", ""]
     return "\n".join(line.rstrip() for line in lines)
 
@@ -46,6 +48,23 @@ def accuracy_words(grade: Grade) -> str:
     return (
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
         f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
+    )
+
+
+def cost_words(grade: Grade) -> str:
+    """One sentence with what all trials cost together, or may cost where that is not told; empty if nobody knows."""
+    if grade.cost is None:
+        return ""
+    limits, spent = grade.cost.limits, grade.cost.spent
+    if spent is None:
+        return (
+            f"All trials together may use {limits.cpu_seconds:g} s of CPU, {limits.sleep_seconds:g} s of sleep and "
+            f"{limits.kept_bytes >> 20} MB of output."
+        )
+    return (
+        f"Used {round(spent.cpu_seconds, 1):g} of {limits.cpu_seconds:g} s of CPU, "
+        f"{round(spent.sleep_seconds, 1):g} of {limits.sleep_seconds:g} s of sleep, "
+        f"{round(spent.kept_bytes / _MEGABYTE, 1):g} of {limits.kept_bytes >> 20} MB of output."
     )
 
 

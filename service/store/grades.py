@@ -17,6 +17,7 @@ from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
     Confidence,
+    Cost,
     Counts,
     CriterionResult,
     Evidence,
@@ -101,6 +102,7 @@ def load(session: Session, job_id: str) -> Grade:
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
+        cost=None if job.cost is None else decode(Cost, job.cost),
     )
 
 

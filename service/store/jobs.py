@@ -17,6 +17,7 @@ from sqlalchemy import CursorResult, Update, select, update
 from sqlalchemy.orm import Session
 
 from service.store import artifacts, grades, phases, result_cache, self_tests
+from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
 from service.store.models import UNFINISHED, Job, JobState, PlotState
@@ -134,6 +135,7 @@ def finish(
             "cache_key": result_cache.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
             "sandbox": grade.sandbox,
             "notes": list(grade.notes),
+            "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,
             "plots_due_at": at,
         }

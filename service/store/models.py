@@ -236,6 +236,7 @@ class Job(Base):
     grader_version: Mapped[str | None]
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
+    cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 
     #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.
     phases: Mapped[Any] = mapped_column(default=dict)

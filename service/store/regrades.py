@@ -5,7 +5,7 @@ The old grades stay and stand until somebody publishes the new ones. Nothing is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
@@ -82,6 +82,7 @@ class Published:
     unfinished: int
     dead: int
     staff_only: int
+    unjudged: int
 
 
 def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> Regraded:
@@ -130,10 +131,11 @@ def changes(session: Session, batch_id: str) -> list[Change]:
     return [_change(session, after, earlier, student) for after, earlier, student in session.execute(query)]
 
 
-def publish(store: Store, batch_id: str, *, actor: str) -> Published:
+def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
     """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
 
-    A grade that is suspect, or of a submission over a limit, is not published. Raises UsageError for an unknown batch.
+    A grade that is suspect, or of a submission over a limit, is not published; nor is one with a criterion that could not
+    be judged, unless ``anyway``. Raises UsageError for an unknown batch.
     """
     with store.transaction() as session:
         at = now(session)
@@ -149,9 +151,10 @@ def publish(store: Store, batch_id: str, *, actor: str) -> Published:
                 select(SubmissionRow.id).where(SubmissionRow.id.in_(ids), SubmissionRow.staff_only.is_not(None))
             )
         )
+        unjudged = set() if anyway else _unjudged(session, batch_id)
         published = replaced = 0
         for submission_id, jobs in of_submission.items():
-            stands, another = _let_stand(jobs)
+            stands, another = _let_stand(jobs, unjudged)
             replaced += another
             if stands is not None and stands.published_at is None and submission_id not in hidden:
                 stands.published_at, stands.published_by = at, actor
@@ -163,6 +166,7 @@ def publish(store: Store, batch_id: str, *, actor: str) -> Published:
             sum(job.state in UNFINISHED for job in jobs),
             sum(job.state is JobState.DEAD for job in jobs),
             len(hidden),
+            sum(job.id in unjudged and job.published_at is None for job in jobs),
         )
         audit.note(session, actor, "publish", "batch", batch_id, published=published, replaced=replaced)
         return result
@@ -174,6 +178,17 @@ def unpublished_regrades(session: Session, batch_id: str) -> int:
     proposed = (Job.standing == Standing.PROPOSED, Job.state == JobState.DONE, Job.suspect.is_(None))
     query = select(Job.submission_id).where(Job.submission_id.in_(ids), *proposed).distinct()
     return len(session.scalars(query).all())
+
+
+def _unjudged(session: Session, batch_id: str) -> set[str]:
+    """The jobs for the submissions of a batch that have a criterion that could not be judged."""
+    ids = select(Job.submission_id).where(Job.batch_id == batch_id)
+    query = (
+        select(CriterionRow.job_id)
+        .join(Job, CriterionRow.job_id == Job.id)
+        .where(Job.submission_id.in_(ids), CriterionRow.unjudged.is_not(None))
+    )
+    return set(session.scalars(query))
 
 
 def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
@@ -211,12 +226,12 @@ def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int
     )
 
 
-def _let_stand(jobs: Sequence[Job]) -> tuple[Job | None, bool]:
+def _let_stand(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, bool]:
     """The grade of one submission that stands from now on, and whether it took another's place.
 
-    What is older than the newest regrade gives way to it; one that is not graded yet stays a proposal.
+    What is older than the newest regrade gives way to it; one not graded yet, or ``unjudged``, stays a proposal.
     """
-    done = [job for job in jobs if job.state is JobState.DONE and job.suspect is None]
+    done = [job for job in jobs if job.state is JobState.DONE and job.suspect is None and job.id not in unjudged]
     proposed = [job for job in done if job.standing is Standing.PROPOSED]
     if not proposed:
         return next((job for job in done if job.standing is Standing.STANDS), None), False

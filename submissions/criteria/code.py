@@ -150,7 +150,8 @@ class PythonCheck(CriterionBase):
     [time, text]), ``messages``, ``datalog``, ``images``, ``image_log``. It returns True or False, or a dict with
     ``passed``, ``message`` (a sentence for the student), ``score`` from 0 to 1 and ``measures`` (name to number).
 
-    It runs inside the walls, like student code. If it fails, nobody is marked: the assignment is wrong.
+    It runs inside the sandbox, like student code. If it fails in a trial, the line is not judged for that
+    submission and staff are told why; the other lines stand.
     """
 
     check: Literal["python"]

@@ -14,7 +14,8 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from . import cell_source
-from .source_walk import Mention, SourcePlace, Unit, Walk
+from .source_units import Mention, SourcePlace, Unit
+from .source_walk import Walk
 from .source_words import CONSTRUCTS
 from .withheld import rule_for
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from . import cell_source
@@ -23,6 +22,7 @@ from .source_names import (
     truth,
 )
 from .source_scopes import Naming
+from .source_units import Mention, SourcePlace, Unit
 from .source_words import (
     CONSTRUCTS,
     DOUBTFUL,
@@ -38,44 +38,6 @@ from .source_words import (
 )
 
 _DEEPEST = 8
-
-
-class Mention(NamedTuple):
-    """Something that stands in a file; ``live`` if the code that is run with its unit can come to it.
-
-    The kinds are ``construct``, ``function`` (it is defined), ``name``, ``call``, ``handed_on`` (kept or given away),
-    ``base`` (something of it is asked for), ``unsure`` (handed on, if it is not a name of the text's own), ``import``,
-    ``through`` (something of a module), ``taken`` (out of a module), ``doubt`` and ``any_name``, which is doubt about
-    what may take anything by its name.
-    """
-
-    kind: str
-    name: str
-    live: bool
-    looped: bool
-
-
-class SourcePlace(NamedTuple):
-    """A file's name, as messages have it, and a line."""
-
-    file: str
-    line: int
-
-
-@dataclass(eq=False, slots=True)
-class Unit:
-    """Code that is run at one go: a file's or a function's own. ``owner`` is the class that it is a method of.
-
-    Of each mention the first place is kept.
-    """
-
-    name: str
-    owner: str = ""
-    made_in: Unit | None = None
-    made: bool = True  # its definition can be come to
-    always: bool = False  # it is run without being named
-    mentions: dict[Mention, SourcePlace] = field(default_factory=dict)
-    units: list[Unit] = field(default_factory=list)
 
 
 class _Here(NamedTuple):

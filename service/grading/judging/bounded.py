@@ -24,7 +24,7 @@ from typing import Any, NoReturn
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
 from service.grading.static_analysis import StaticAnalysis
-from sim.errors import HostError
+from sim.errors import HostError, RobomarkError
 from sim.recording import Image
 from submissions.assignment import Assignment
 from submissions.criteria import Criterion, Ranking
@@ -162,6 +162,8 @@ class _Judging:
             return judge_one(criterion, self.assignment, self.trials, self.analysis, self.results)
         except MemoryError:
             return _unjudged(criterion, f"it took more than {self.bounds.memory_bytes >> 20} MB of memory")
+        except RobomarkError as error:
+            return _unjudged(criterion, str(error).rstrip(".")[:_LONGEST_CAUSE])
         except Exception as error:
             return _unjudged(criterion, f"{type(error).__name__}: {error}"[:_LONGEST_CAUSE])
 
@@ -289,9 +291,10 @@ def _unjudged(criterion: Criterion, cause: str) -> CriterionResult:
         title=criterion.title,
         marks=Decimal(0),
         max_marks=criterion.marks,
-        message="This could not be judged within the limits that judging has; staff will look at it.",
+        message="This could not be judged; staff will look at it.",
         visibility=criterion.visibility,
         unjudged=cause,
+        for_staff=f"Could not be judged: {cause}.",
     )
 
 

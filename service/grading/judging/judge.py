@@ -16,7 +16,7 @@ from service.grading.judging.circuits import judge_circuits
 from service.grading.judging.collecting import judge_collects
 from service.grading.judging.drawing import judge_drawing
 from service.grading.judging.ending import judge_finishes, judge_pose
-from service.grading.judging.function_checks import judge_functions
+from service.grading.judging.function_checks import checked, judge_functions
 from service.grading.judging.line import judge_follows, judge_laps
 from service.grading.judging.logged import judge_datalog, judge_image_log
 from service.grading.judging.marks import earned, share_of
@@ -127,7 +127,7 @@ def judge(
 
     ``analysis`` is what is known of the submission beside the recordings. A trial that was cut short is judged by
     what was reached. Raises HostError for a trial that this machine spoilt, because such a trial must be run
-    again, not marked.
+    again, not marked, and AssignmentError where a check of the instructor's failed.
     """
     refuse_spoilt(trials)
     results: dict[str, CriterionResult] = {}
@@ -209,7 +209,7 @@ def _outcome(
     results: Mapping[str, CriterionResult],
 ) -> Outcome:
     if isinstance(criterion, PythonCheck):
-        return analysis.checks[criterion.id, place]
+        return checked(criterion, analysis.checks[criterion.id, place])
     if isinstance(criterion, Ranking):
         return judge_ranking(criterion, place, results.get(criterion.of))
     return _JUDGES[type(criterion)](criterion, trial)

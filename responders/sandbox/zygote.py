@@ -1,0 +1,346 @@
+"""A process with imports loaded, from which the children of one role are forked, and the sandbox that stand round them.
+
+Nothing of the worker's reaches it: it is a fresh process with a clean environment. Which zygotes a worker has is
+``manager.py``'s; listening to a child and stopping it is ``running_child.py``'s.
+"""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import functools
+import importlib.util
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from responders import wire
+from responders.sandbox import bubblewrap
+from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.private_folders import PrivateFolders
+from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
+from sim.errors import HostError
+
+Role = Literal["robot", "responder"]
+Play = Literal["role", "battery"]
+
+_START_SECONDS = 60.0
+_END_SECONDS = 0.5
+_FILE_BYTES = 4 << 20
+_RECYCLE_AFTER = 1000
+#: How a zygote tells that a child has ended: the wait status, seconds and microseconds of the user's and the system's.
+_ENDED = struct.Struct("=i4x4q")
+_BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
+_FOLDERS: dict[Role, tuple[str, str]] = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
+ROLES: tuple[Role, ...] = tuple(_FOLDERS)
+
+
+class SandboxMissing(HostError):
+    """This machine cannot put up the sandbox that student code needs."""
+
+
+class _ZygoteEnded(KilledFromOutside):
+    """A zygote is gone, and with it every child of its."""
+
+
+@dataclass(frozen=True, slots=True)
+class Isolation:
+    """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter.
+
+    The doorkeeper and bubblewrap are added where they work, and done without where they do not.
+    """
+
+    landlock: int = 99
+    seccomp: bool = True
+    doorkeeper: bool = True
+    bubblewrap: bool = True
+
+
+#: What every grading needs.
+FULL = Isolation()
+#: Limits on the process and nothing else: for development only.
+NONE = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
+
+
+def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
+    """What grades and reports say of the layers that stood."""
+    layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
+    layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
+    layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
+    policy = standing["policy"]
+    return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
+
+
+class Zygote:
+    """A process with the imports of one role loaded, but those that it is ``without``; children are forked from it."""
+
+    def __init__(
+        self,
+        role: Role,
+        sandbox: Isolation,
+        folders: PrivateFolders,
+        group: ControlGroup | None = None,
+        without: tuple[str, ...] = (),
+    ) -> None:
+        self._role = role
+        self._group = group
+        self._without = without
+        self._sandbox = sandbox
+        self._folders = folders
+        self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
+        self._forks = 0
+        #: Why bubblewrap does not stand round it; None when it does.
+        self.without_bubblewrap: str | None = "not asked for"
+        #: Why its children can name any path; None when a doorkeeper decides about those.
+        self.without_doorkeeper: str | None = "no child has been forked"
+        self.children_cpu_seconds = 0.0  # of all children that are gone
+        self._control: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def spawn(
+        self,
+        limits: ChildLimits,
+        folder: Path | None = None,
+        meter: JobMeter | None = None,
+        play: Play = "role",
+        blamed: bool = False,
+    ) -> Child:
+        """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
+        if folder is not None and folder.parent != self._folders.path:
+            raise ValueError(f"{folder} is not a private folder")
+        if self._forks >= _RECYCLE_AFTER:
+            self.close()
+        self._forks += 1
+        for attempt in (1, 2):
+            try:
+                return self._spawn(limits, folder, meter or JobMeter(), play, blamed)
+            except (OSError, EOFError, _ZygoteEnded) as error:
+                self.close()
+                if attempt == 2:
+                    raise HostError(f"the {self._role} zygote does not answer ({error})") from error
+        raise AssertionError
+
+    def try_isolation(self) -> str:
+        """Let a child try the short battery of escapes; which layers held. Raises SandboxMissing if one did not."""
+        if not self._sandbox.landlock and not self._sandbox.seccomp:
+            child = self.spawn(_BATTERY_LIMITS)
+            child.close()
+            return child.sandbox
+        child = self.spawn(_BATTERY_LIMITS, play="battery")
+        try:
+            told = child.receive(wire.BATTERY)
+        except ChildStopped as stop:
+            raise _sandbox_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
+        finally:
+            child.close()
+        if told["through"] and self._sandbox.landlock and self._sandbox.seccomp:
+            raise _sandbox_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
+        refused = told["tried"] - len(told["through"])
+        return f"{child.sandbox} (battery {told['version']}: {refused} of {told['tried']} refused)"
+
+    def reap(self, pid: int) -> int:
+        """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
+        try:
+            ended, _ = self._ask({"do": "reap", "pid": pid})
+            status, *used = _ENDED.unpack_from(ended)
+            self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
+            return int(status)
+        except (OSError, EOFError, struct.error) as error:
+            # Its children died with it, and that is no fault of a student's.
+            self.close()
+            raise _ZygoteEnded(f"the {self._role} zygote ended while a program ran") from error
+
+    def close(self) -> None:
+        if self._control is not None:
+            self._control.close()
+            self._control = None
+        if self._process is not None:
+            # It ends by itself then, and its doorkeeper after it, unless it is stuck.
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_SECONDS)
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+        if self._folders_inside >= 0:
+            os.close(self._folders_inside)
+            self._folders_inside = -1
+        self._forks = 0
+
+    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, play: Play, blamed: bool) -> Child:
+        self._start()
+        descriptors = []
+        if folder is not None:
+            # Opened as the zygote sees it: with name spaces of its own, our path to it leads nowhere there.
+            descriptors = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            data, received = self._ask(
+                {
+                    "do": "spawn",
+                    "play": play,
+                    "cpu": limits.cpu_seconds,
+                    "memory": limits.memory_bytes,
+                    "without": limits.without,
+                    "file_size": _FILE_BYTES,
+                    "folder": folder is not None,
+                    "landlock": self._sandbox.landlock,
+                    "seccomp": self._sandbox.seccomp,
+                    "doorkeeper": self._sandbox.doorkeeper,
+                },
+                [theirs.fileno(), *descriptors],
+            )
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+            for fd in descriptors:
+                os.close(fd)
+        answer = json.loads(data)
+        if "missing" in answer:
+            ours.close()
+            raise _sandbox_missing(answer["missing"])
+        inside = answer["pid"]  # what the zygote calls it
+        reap = functools.partial(self.reap, inside)
+        child = Child(reap, _pid(received[0]), received[0], ours, limits, folder)
+        try:
+            _try_to_signal(received[0])
+            self._check_isolation(child)
+        except BaseException:
+            child.close()
+            raise
+        child.begin(meter, blamed, self._group.watch() if self._group is not None else None)
+        return child
+
+    def _check_isolation(self, child: Child) -> None:
+        """The child's first words, before any student code: every layer asked for must stand."""
+        try:
+            standing = child.receive(wire.SANDBOX)
+        except ChildStopped as stop:
+            raise EOFError(stop.message) from None
+        if standing["missing"] is not None:
+            raise _sandbox_missing(standing["missing"])
+        if bool(standing["landlock"]) != bool(self._sandbox.landlock) or standing["seccomp"] != self._sandbox.seccomp:
+            raise _sandbox_missing("a layer that was asked for does not stand")
+        self.without_doorkeeper = standing["without_doorkeeper"]
+        child.sandbox = stamp(standing, self.without_bubblewrap is None, self._group is not None)
+
+    def _start(self) -> None:
+        """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
+        if self._process is not None and self._process.poll() is None:
+            return
+        here = Path(__file__).resolve().parent
+        roots = [own_modules(self._role)]
+        if self._sandbox.bubblewrap:
+            wrapping = bubblewrap.wrapping([str(here), *roots], self._folders.path)
+            self.without_bubblewrap = bubblewrap.why_not(wrapping)
+            if self.without_bubblewrap is None and self._exec(wrapping, here, roots):
+                return
+            self.without_bubblewrap = self.without_bubblewrap or "what Python needs cannot be seen in it"
+        if not self._exec([], here, roots):
+            raise HostError(f"the {self._role} zygote did not start")
+
+    def _exec(self, wrapping: list[str], here: Path, roots: list[str]) -> bool:
+        """Whether it comes to be ready."""
+        self.close()
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        code = (
+            "import os, sys; os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
+            "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5].split(), sys.argv[6:])"
+        )
+        joining = self._group.joining if self._group is not None else []
+        without = " ".join(self._without)
+        arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), without, *roots]
+        try:
+            self._process = subprocess.Popen(
+                [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
+                pass_fds=(theirs.fileno(),),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                cwd="/",
+                env={
+                    "PATH": "/usr/bin:/bin",
+                    "LANG": "C.UTF-8",
+                    "OPENBLAS_NUM_THREADS": "1",
+                    "OMP_NUM_THREADS": "1",
+                    "MKL_NUM_THREADS": "1",
+                    "MALLOC_ARENA_MAX": "2",
+                    "LOKY_MAX_CPU_COUNT": "1",
+                    "JOBLIB_MULTIPROCESSING": "0",
+                    "PYTHONHASHSEED": "0",
+                    "ORT_DISABLE_TELEMETRY": "1",
+                },
+            )
+        finally:
+            theirs.close()
+        self._control = ours
+        try:
+            _, received = self._answer()
+        except (OSError, EOFError):
+            self.close()
+            return False
+        self._folders_inside = received[0]
+        return True
+
+    def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
+        if self._control is None:
+            raise EOFError("it is not running")
+        payload = array.array("i", descriptors or [])
+        ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
+        self._control.sendmsg([json.dumps(order).encode()], ancillary)
+        return self._answer()
+
+    def _answer(self) -> tuple[bytes, list[int]]:
+        if self._control is None:
+            raise EOFError("it is not running")
+        if not select.select([self._control], [], [], _START_SECONDS)[0]:
+            raise EOFError("no answer")
+        data, received, _, _ = self._control.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
+        if not data:
+            raise EOFError("it ended")
+        found = array.array("i")
+        for _, _, part in received:
+            found.frombytes(part[: len(part) - len(part) % 4])
+        return data, list(found)
+
+
+def _pid(pidfd: int) -> int:
+    """What we call the process; in name spaces of its own it has another number."""
+    lines = Path(f"/proc/self/fdinfo/{pidfd}").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Pid:"))
+
+
+def _try_to_signal(pidfd: int) -> None:
+    try:
+        signal.pidfd_send_signal(pidfd, 0)
+    except OSError as error:
+        raise _sandbox_missing(f"pidfd_send_signal: {error.strerror}") from None
+
+
+def _sandbox_missing(what: str) -> SandboxMissing:
+    return SandboxMissing(
+        f"this machine cannot enclose student code: {what}; "
+        "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
+    )
+
+
+def own_modules(role: Role) -> str:
+    """The folder with what a role's children import of ours."""
+    package, folder = _FOLDERS[role]
+    return str(_package_folder(package) / folder)
+
+
+def _package_folder(name: str) -> Path:
+    specification = importlib.util.find_spec(name)
+    assert specification is not None
+    assert specification.submodule_search_locations
+    return Path(specification.submodule_search_locations[0]).resolve()

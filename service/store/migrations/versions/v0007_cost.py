@@ -1,0 +1,21 @@
+"""What all trials of a job cost together, beside what they may cost; unknown of earlier grades."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+from service.store.columns import SafeJson
+from service.store.migrate import refuse_downgrade
+
+revision = "0007"
+down_revision = "0006"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.add_column("job", sa.Column("cost", SafeJson(), nullable=True))
+
+
+downgrade = refuse_downgrade
