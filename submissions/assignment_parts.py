@@ -336,7 +336,7 @@ def packaged_models() -> tuple[str, ...]:
 
 
 def packaged_model(name: str) -> bytes | None:
-    """The bytes of a packaged network, to be loaded by student code inside the walls; None if there is none."""
+    """The bytes of a packaged network, to be loaded by student code inside the sandbox; None if there is none."""
     if name not in packaged_models():
         return None
     card = json.loads((_weights_folder() / f"{name}.json").read_text("utf-8"))

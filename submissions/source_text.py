@@ -1,6 +1,6 @@
 """From the bytes of a Python file, in whatever encoding it was saved, to its text.
 
-Whether the text is Python is for the interpreter to say, inside the walls; here it only becomes readable.
+Whether the text is Python is for the interpreter to say, inside the sandbox; here it only becomes readable.
 """
 
 from __future__ import annotations

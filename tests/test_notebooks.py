@@ -178,8 +178,8 @@ def two_programs(which: str) -> str:
 
 def test_marked_by_tag_by_number_or_the_last(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("one"), "x = 1", two_programs("two"), two_programs("three")]
-    for cell, expected in (("2", "two"), ('"last"', "three"), ('"tag:hand in"', "one")):
-        result = graded(tmp_path, runner, cells, f"cell = {cell}", tags={2: ["hand in"]})
+    for cell, expected in (("2", "two"), ('"last"', "three"), ('"tag:the end"', "one")):
+        result = graded(tmp_path, runner, cells, f"cell = {cell}", tags={2: ["the end"]})
         assert spoken(result.trials[0].recording) == [expected]
 
 
