@@ -37,6 +37,7 @@ from responders.sandbox.zygote import Role, Walls
 ATTACKS = attacks()
 MEMORIES = memories()
 WALLED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
+OLD_KERNEL_LONG = [pytest.param(*each, marks=pytest.mark.long if each == WALLED[2] else ()) for each in WALLED]
 
 #: The machine's name is one that bubblewrap makes up.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
@@ -90,7 +91,7 @@ def own_user() -> Iterator[Sandboxes]:
         yield made
 
 
-@pytest.mark.parametrize(("setting", "role"), WALLED, ids=lambda value: value)
+@pytest.mark.parametrize(("setting", "role"), OLD_KERNEL_LONG, ids=lambda value: value)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
 def test_the_walls_hold(
     attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
@@ -117,6 +118,7 @@ def test_the_walls_hold_inside_bubblewrap(attack: Attack, wrapped: Sandboxes, tm
         assert targets.harm() == []
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
 @pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
@@ -133,7 +135,7 @@ def test_the_walls_hold_round_a_user_of_its_own(
 @pytest.mark.parametrize(
     ("attack", "setting"),
     [
-        pytest.param(attack, setting, id=f"{attack.id}-{setting}")
+        pytest.param(attack, setting, id=f"{attack.id}-{setting}", marks=[] if setting == "none" else pytest.mark.long)
         for attack in ATTACKS
         for setting in SETTINGS
         if setting not in ("full", "full-1") and setting in GETS_THROUGH[attack.stopped_by]
@@ -203,7 +205,12 @@ def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
 @pytest.mark.parametrize(
     ("attack", "setting"),
     [
-        pytest.param(attack, setting, id=f"{attack.id}-{setting}", marks=[] if setting == "none" else pytest.mark.long)
+        pytest.param(
+            attack,
+            setting,
+            id=f"{attack.id}-{setting}",
+            marks=[] if (attack.stopped_by, setting) == (tools.DOORKEEPER, "none") else pytest.mark.long,
+        )
         for attack in MEMORIES
         for setting in sorted(GETS_THROUGH[attack.stopped_by])
     ],
