@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
-.PHONY: setup demo test test-long test-all lint bench lock wheel clean
+.PHONY: setup demo test test-fast test-long test-all lint format bench lock wheel clean
 
 setup: $(VENV)/.ready
 
@@ -27,6 +27,10 @@ demo: setup
 test: setup lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long"
 
+# What needs no worker, no sandbox and no second process: under a minute.
+test-fast: setup
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long" $(FAST)
+
 test-long: setup
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m long
 
@@ -37,6 +41,10 @@ lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+format: setup
+	$(BIN)/ruff check --fix-only --quiet .
+	$(BIN)/ruff format .
 
 bench: setup
 	$(BIN)/python -m benchmarks
