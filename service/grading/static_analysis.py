@@ -15,9 +15,8 @@ from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
-from service.grading.judging.function_checks import calls_of
-from service.grading.judging.outcome import fault_words
-from service.grading.judging.source_rules import SPEECH, SourceAnswers
+from service.grading.judging.code import SPEECH, SourceAnswers, calls_of
+from service.grading.judging.words import fault_words
 from sim.chance import Stream
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment

@@ -28,7 +28,7 @@ from submissions.criteria.line import Follows, Laps
 from submissions.criteria.logged import Datalog, ImageLog
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
 from submissions.criteria.path import Circuits, Closest, KeepsOut, Spread, StaysInside, TouchesNothing, Visits
-from submissions.criteria.reporting import Events, Reports, Sequence
+from submissions.criteria.reporting import Events, Reports, WordSequence
 from submissions.criteria.stopping import StopOn
 from submissions.criteria.texts import Messages, Prints, Replies, Says
 from submissions.criteria.timing import Ranking, Timing
@@ -63,7 +63,6 @@ __all__ = [
     "Reports",
     "Robustness",
     "Says",
-    "Sequence",
     "SourceRules",
     "Spread",
     "StaysInside",
@@ -71,6 +70,7 @@ __all__ = [
     "Timing",
     "TouchesNothing",
     "Visits",
+    "WordSequence",
 ]
 
 Criterion = Annotated[
@@ -85,7 +85,7 @@ Criterion = Annotated[
     | EndPose
     | StopOn
     | Reports
-    | Sequence
+    | WordSequence
     | Events
     | Datalog
     | ImageLog
@@ -124,7 +124,7 @@ SCHEMAS: dict[str, type[CriterionBase]] = {
     "pose": EndPose,
     "stop_on": StopOn,
     "reports": Reports,
-    "sequence": Sequence,
+    "sequence": WordSequence,
     "events": Events,
     "datalog": Datalog,
     "image_log": ImageLog,

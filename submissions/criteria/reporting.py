@@ -58,7 +58,7 @@ class Reports(CriterionBase):
         return not_blank(value)
 
 
-class Sequence(CriterionBase):
+class WordSequence(CriterionBase):
     """Words come one after the other, however they are spread over what is said or printed.
 
     ``words`` are compared without regard to case and punctuation; one in a list of its own may be any of that

@@ -16,11 +16,11 @@ from models.intervals import wilson
 from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Prediction, TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.judging.labels import LabelFinder
-from service.grading.judging.outcome import quoted
 from service.grading.judging.patterns import Side, by_pattern
 from service.grading.judging.samples import Sample
 from service.grading.judging.tally import Reply, ReplyStatus, reply_to
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
+from service.grading.judging.words import quoted
 from sim.recording import Image, Line, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import Recognition

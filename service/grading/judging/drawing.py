@@ -14,9 +14,9 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import pen_down, place_at, positions, stretches, travel
 from service.grading.judging.moves import straight
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.whereabouts import pen_down, place_at, positions, stretches, travel
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 

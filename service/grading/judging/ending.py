@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.areas import distance_to
-from service.grading.judging.outcome import Outcome, cut, failed, fault_words, passed
+from service.grading.judging.geometry import distance_to
+from service.grading.judging.outcome import Outcome, cut, failed, passed
+from service.grading.judging.words import fault_words
 from sim.recording import Fault, Recording, Verdict
 from submissions.criteria import EndPose, Finishes
 

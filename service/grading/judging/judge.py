@@ -12,33 +12,24 @@ from types import MappingProxyType
 from typing import Any
 
 from service.grading.grade import CriterionResult, Evidence, Shown, TrialResult
-from service.grading.judging.circuits import judge_circuits
+from service.grading.judging.code import checked, judge_functions, judge_source
 from service.grading.judging.collecting import judge_collects
 from service.grading.judging.drawing import judge_drawing
 from service.grading.judging.ending import judge_finishes, judge_pose
-from service.grading.judging.function_checks import checked, judge_functions
 from service.grading.judging.line import judge_follows, judge_laps
 from service.grading.judging.logged import judge_datalog, judge_image_log
 from service.grading.judging.marks import earned, share_of
 from service.grading.judging.motion import judge_displacement, judge_encounters, judge_excursions, judge_moves
 from service.grading.judging.outcome import Outcome
-from service.grading.judging.path import (
-    judge_closest,
-    judge_keeps_out,
-    judge_stays_inside,
-    judge_touches_nothing,
-    judge_visits,
-)
+from service.grading.judging.path import judge_keeps_out, judge_stays_inside, judge_touches_nothing, judge_visits
+from service.grading.judging.point import judge_circuits, judge_closest, judge_spread, spread_words
 from service.grading.judging.recognition import judge_recognition
 from service.grading.judging.replies import judge_replies
-from service.grading.judging.reported import judge_reports
-from service.grading.judging.sequences import judge_events, judge_word_sequence
-from service.grading.judging.source_rules import judge_source
-from service.grading.judging.spread import judge_spread, spread_words
+from service.grading.judging.reporting import judge_events, judge_reports, judge_word_sequence
 from service.grading.judging.stopping import judge_stop_on
 from service.grading.judging.texts import judge_messages, judge_prints, judge_says
 from service.grading.judging.timing import judge_ranking, judge_timing
-from service.grading.judging.trial_words import early_end, place_words, shown_words
+from service.grading.judging.words import early_end, place_words, shown_words
 from service.grading.static_analysis import StaticAnalysis
 from sim.errors import HostError
 from sim.recording import Verdict
@@ -71,7 +62,6 @@ from submissions.criteria import (
     Reports,
     Robustness,
     Says,
-    Sequence,
     SourceRules,
     Spread,
     StaysInside,
@@ -79,6 +69,7 @@ from submissions.criteria import (
     Timing,
     TouchesNothing,
     Visits,
+    WordSequence,
 )
 
 #: How each kind of criterion is judged in one trial; classification, which pools its trials, is apart.
@@ -92,7 +83,7 @@ _JUDGES: Mapping[type, Callable[[Any, TrialResult], Outcome]] = MappingProxyType
         EndPose: judge_pose,
         Collects: judge_collects,
         StopOn: judge_stop_on,
-        Sequence: judge_word_sequence,
+        WordSequence: judge_word_sequence,
         Events: judge_events,
         Datalog: judge_datalog,
         ImageLog: judge_image_log,

@@ -11,10 +11,10 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.courses import Along, along, covered
+from service.grading.judging.geometry import Along, along, covered, place_at, positions
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.path import PART_NAMES
-from service.grading.judging.whereabouts import place_at, positions
+from sim.recorded import seconds_at
 from sim.recording import Floats
 from submissions.criteria.line import Follows, Laps
 
@@ -41,7 +41,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
         Measure("share covered", share),
         Measure("farthest off", float(offsets[farthest]), "mm"),
         Measure("mean off", float(offsets.mean()), "mm"),
-        Measure("seconds to the end", (found.first + on_it - 1) / 30, "s"),
+        Measure("seconds to the end", seconds_at(found.first + on_it - 1), "s"),
         Measure("share on one side", one_side),
     )
     score = Fraction(min(share / criterion.covers, 1.0)).limit_denominator(1000)
@@ -160,7 +160,7 @@ def _crossings(criterion: Laps, points: Floats, found: Along) -> list[_Crossing]
         where = place[row - 1] + share * (place[row] - place[row - 1])
         before, after = found.progress[row - 1 - found.first], found.progress[row - found.first]
         if 0 <= where <= 1 and after > before:
-            crossings.append(_Crossing((row - 1 + share) / 30, row, float(before + share * (after - before))))
+            crossings.append(_Crossing(seconds_at(row - 1 + share), row, float(before + share * (after - before))))
     return crossings
 
 

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import place_at, positions, standing, stretches, times, travel
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.whereabouts import place_at, positions, robot_of, standing, stretches, times, travel
 from sim.camera import HEIGHT, WIDTH
+from sim.recorded import TICKS_PER_SECOND, robot_of
 from sim.recording import Floats, Recording
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
@@ -334,7 +335,7 @@ def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> 
     """Those of the falls after which all that was asked came in order, and in time."""
     ahead, turned = travel(recording)
     motion = _Motion(-np.minimum(ahead, 0), turned, standing(recording))
-    ends = np.searchsorted(times(recording), np.array(falls) / 30 + criterion.seconds, side="right") - 1
+    ends = np.searchsorted(times(recording), np.array(falls) / TICKS_PER_SECOND + criterion.seconds, side="right") - 1
     return [row for row, end in zip(falls, ends.tolist(), strict=True) if _all_came(criterion.then, motion, row, end)]
 
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
-from service.grading.judging.outcome import listed
-from service.grading.judging.places import part_at
+from service.grading.judging.geometry import part_at
 from service.grading.judging.samples import Sample
+from service.grading.judging.words import listed
 from sim.recording import Recording
 
 How = Literal["first", "any", "majority"]

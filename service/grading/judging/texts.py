@@ -12,7 +12,9 @@ from fractions import Fraction
 from responders.messages import JSON, PY
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
-from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import listed, quoted
+from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording
 from submissions.criteria import Messages, Prints, Replies, Says
 from submissions.criteria.expressions import found_in

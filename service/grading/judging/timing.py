@@ -12,6 +12,7 @@ import numpy as np
 from service.grading.grade import CriterionResult, Evidence, Measure, TrialResult
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import spoken_until
+from sim.recorded import seconds_at
 from sim.recording import Recording
 from submissions.criteria.timing import Ranking, Timing
 
@@ -86,4 +87,4 @@ def _moving(recording: Recording) -> float:
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
     changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
-    return int(np.logical_or.reduce(changes).sum()) / 30
+    return seconds_at(int(np.logical_or.reduce(changes).sum()))

@@ -9,8 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from service.grading.grade import TrialResult
+from service.grading.judging.geometry import part_at
 from service.grading.judging.label_patches import decoded
-from service.grading.judging.places import part_at
 from sim.backgrounds import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment

@@ -1,0 +1,275 @@
+"""Judging the code that was submitted: what its text has, what its functions return, what a check in Python says.
+
+Texts are read and functions called inside the sandbox; what came back is data, compared here and nothing more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from typing import Any
+
+from responders.function_calls import Called, FunctionCall, Returned
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import fault_words, quoted
+from sim.errors import AssignmentError
+from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
+from submissions.magics import Flags
+
+#: What makes the robot speak.
+SPEECH = ("say()", "speak()")
+#: More that is wrong would give_up the first.
+_MOST_TOLD = 4
+_UNREADABLE = "it cannot be read"
+
+
+@dataclass(frozen=True, slots=True)
+class SourcePlace:
+    """A file beside the part, or a cell of a notebook (empty: the part itself), and a line."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
+
+
+@dataclass(frozen=True, slots=True)
+class SourceAnswers:
+    """Where a part has what each rule of a criterion names, in the order of the rules; None where it has it not.
+
+    ``error``: why it cannot be read. ``unread``: a file beside it that cannot be, and why. ``doubts`` are places that
+    can do more than their text shows.
+    """
+
+    uses: tuple[SourcePlace | None, ...] = ()
+    avoids: tuple[SourcePlace | None, ...] = ()
+    in_loop: tuple[SourcePlace | None, ...] = ()
+    defines: tuple[SourcePlace | None, ...] = ()
+    speech: tuple[SourcePlace | None, ...] = ()
+    doubts: tuple[str, ...] = ()
+    error: str = ""
+    unread: str = ""
+
+    @classmethod
+    def read(cls, told: Any, criterion: SourceRules) -> SourceAnswers:
+        """From what the reader in the sandbox returned, which is not believed to have any form."""
+        try:
+            name, why, line = told["unread"] or ("", "", None)
+            where = f" (line {int(line)})" if line is not None else ""
+            answers = (
+                _places(told["uses"], criterion.uses),
+                _places(told["avoids"], criterion.avoids),
+                _places(told["in_loop"], criterion.in_loop),
+                _places(told["defines"], criterion.defines),
+                _places(told["shown"], SPEECH),
+            )
+            doubts = tuple(f"{_place(file, line)} has {str(what)[:80]}" for file, line, what in told["doubts"])
+        except (LookupError, TypeError, ValueError, OverflowError):
+            return cls(error=_UNREADABLE)
+        if why and not name:
+            return cls(error=f"{str(why)[:200]}{where}")
+        return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(why)[:200]}" if name else "")
+
+
+def judge_source(
+    criterion: SourceRules, answers: SourceAnswers | None, flags: Flags, trials: Sequence[TrialResult] = ()
+) -> Outcome:
+    """``trials`` are those that the program was driven in."""
+    whose = "your program" if criterion.part == "program" else "your responder"
+    if answers is None:
+        return failed(f"Expected {whose} to be submitted, but it was not.")
+    if answers.error:
+        return failed(f"Expected {whose} to be readable as Python, but: {answers.error}.")
+    wrong: list[str] = []
+    for rule, place in zip(criterion.uses, answers.uses, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to use {_words(rule)}, but it does not, or not where it is run")
+    for rule, place in zip(criterion.avoids, answers.avoids, strict=True):
+        but = f"{place} has it" if place is not None else _spoke(rule, answers, trials) or answers.unread
+        if but:
+            wrong.append(f"Expected {whose} to do without {_words(rule)}, but {but}")
+    for rule, place in zip(criterion.in_loop, answers.in_loop, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to call {rule} inside a loop, but it does not, or not where it is run")
+    for rule, place in zip(criterion.defines, answers.defines, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to define a function {rule}, but it does not")
+    asked = _missing_flags(criterion, flags)
+    wrong += [f"Expected the magic line of {whose} to have {told}, but it does not" for told in asked if told]
+    for_staff = _for_staff(criterion, answers)
+    if not wrong:
+        return passed(f"The text of {whose} is as expected.", for_staff=for_staff)
+    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(asked)
+    message = f"{'. '.join(wrong[:_MOST_TOLD])}."
+    return failed(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
+
+
+def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
+    """That the robot spoke although the text shows no call that does it; a rule may mean one and not the other."""
+    meant = [fnmatchcase(call, rule) for call in SPEECH]
+    shown = any(place is not None for place in answers.speech)
+    if not rule.endswith("()") or not any(meant) or shown:
+        return ""
+    spoke = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
+    return "the robot spoke when it was run" if spoke else ""
+
+
+def _for_staff(criterion: SourceRules, answers: SourceAnswers) -> str:
+    """Where to look for what is avoided, as its text does not show all that it can do."""
+    if not criterion.avoids or not answers.doubts:
+        return ""
+    return f"Can do more than its text shows: {'; '.join(answers.doubts)}."
+
+
+def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
+    """For each flag that is asked for the flag if it is missing, else nothing."""
+    if not criterion.flags:
+        return []
+    wanted = flags_in(criterion.flags)
+    values = [
+        "" if flags.values.get(short) == value else f"-{short} {value}"
+        for short, value in sorted(wanted.values.items())
+    ]
+    return values + ["" if short in flags.switches else f"-{short}" for short in sorted(wanted.switches)]
+
+
+def _words(rule: str) -> str:
+    if rule not in CONSTRUCTS:
+        return rule
+    return f"a {rule} loop" if rule in ("for", "while") else rule
+
+
+def _places(told: Any, rules: Sequence[str]) -> tuple[SourcePlace | None, ...]:
+    """Raises one of Python's errors for what is no answer to each of the rules."""
+    return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
+
+
+def _place(file: Any, line: Any) -> SourcePlace:
+    return SourcePlace(str(file)[:60], int(line))
+
+
+_LONGEST_MESSAGE = 500
+_MOST_MEASURES = 20
+
+
+def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
+    """What has to be called for the criterion."""
+    return tuple(
+        FunctionCall(call.function or criterion.function, call.arguments, call.named) for call in criterion.calls
+    )
+
+
+def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
+    if called is None:
+        return failed("Expected a responder to be submitted, but it was not.")
+    if called.fault is not None:
+        return failed(f"Expected the responder to be loaded, but: {fault_words(called.fault)}.")
+    scores: list[Fraction] = []
+    first = ""
+    for call, gave in zip(criterion.calls, called.returned, strict=True):
+        score, what = _compare(criterion, call, gave)
+        scores.append(score)
+        if score < Fraction(str(criterion.at_least)) and not first:
+            first = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
+    share = sum(scores, Fraction(0)) / len(scores)
+    measures = (Measure("right", float(share)),)
+    if not first:
+        some = f"{float(share):.0%} right" if criterion.each else f"{len(scores)} of {len(scores)} calls right"
+        return passed(f"The functions returned what they must: {some}.", measures=measures)
+    right = sum(score == 1 for score in scores)
+    tally = f" ({right} of {len(scores)} calls right)" if len(scores) > 1 else ""
+    return failed(f"{first}{tally}.", score=share, measures=measures)
+
+
+def checked(criterion: PythonCheck, gave: Returned) -> Outcome:
+    """The outcome that an instructor's check returned. Raises AssignmentError when it failed or returned nonsense."""
+    if gave.fault is not None:
+        raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")
+    told = {"passed": gave.value} if isinstance(gave.value, bool) else gave.value
+    returned = f"{criterion.file}: check returned {quoted(as_text(gave.value))}"
+    wrong = f"The assignment's own check fails: {returned}, expected True, False or a dict"
+    if not isinstance(told, dict) or not isinstance(told.get("passed"), bool):
+        raise AssignmentError(f'{wrong} with "passed".')
+    score, measures = told.get("score", 0), told.get("measures", {})
+    message = told.get("message") or ("As expected." if told["passed"] else "Not as expected.")
+    numbers = [score, *measures.values()] if isinstance(measures, dict) else [None]
+    if not isinstance(message, str) or not all(map(_is_number, numbers)):
+        raise AssignmentError(f"{wrong}: message is a text, score a number, measures maps names to numbers.")
+    message = " ".join(message.split())[:_LONGEST_MESSAGE]
+    kept = tuple(Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES])
+    if told["passed"]:
+        return passed(message, measures=kept)
+    return failed(message, score=Fraction(str(score)), measures=kept)
+
+
+def _compare(criterion: Functions, call: ExpectedCall, gave: Returned) -> tuple[Fraction, str]:
+    """The part of a call that is right, and what happened."""
+    if gave.fault is not None:
+        return Fraction(0), f"it did not: {fault_words(gave.fault)}"
+    value = gave.value
+    if criterion.path is not None:
+        value = at_path(parsed(value), criterion.path) if isinstance(value, str) else NOTHING
+        if value is NOTHING:
+            return Fraction(0), f"there is nothing at {criterion.path} in {quoted(as_text(gave.value))}"
+    what = f"it returned {_shown(value)}"
+    if criterion.each:
+        return _entries_right(criterion, call.returns, value), what
+    wanted = call.one_of or (call.returns,)
+    return Fraction(any(_same(criterion, value, each) for each in wanted)), what
+
+
+def _entries_right(criterion: Functions, wanted: Sequence[Any], value: Any) -> Fraction:
+    if not isinstance(value, list):
+        return Fraction(0)
+    right = sum(_same(criterion, got, each) for got, each in zip(value, wanted, strict=False))
+    return Fraction(right, max(len(wanted), len(value)))
+
+
+def _same(criterion: Functions, found: Any, wanted: Any) -> bool:
+    """Equal in JSON's sense, numbers within the tolerance, texts but for runs of spaces."""
+    if isinstance(found, bool) or isinstance(wanted, bool):
+        return found is wanted
+    if _is_number(found) and _is_number(wanted):
+        return abs(float(found) - float(wanted)) <= criterion.tolerance + 1e-12
+    if isinstance(found, str) and isinstance(wanted, str):
+        one, other = " ".join(found.split()), " ".join(wanted.split())
+        return one.casefold() == other.casefold() if criterion.ignore_case else one == other
+    if isinstance(found, list) and isinstance(wanted, list | tuple):
+        return len(found) == len(wanted) and all(
+            _same(criterion, got, each) for got, each in zip(found, wanted, strict=True)
+        )
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        return found.keys() == wanted.keys() and all(_same(criterion, found[key], wanted[key]) for key in wanted)
+    return found is None and wanted is None
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def _call_words(criterion: Functions, call: ExpectedCall) -> str:
+    arguments = [repr(value) for value in call.arguments]
+    arguments += [f"{name}={value!r}" for name, value in call.named.items()]
+    text = ", ".join(arguments)
+    return f"{call.function or criterion.function}({text if len(text) <= 80 else text[:77] + '...'})"
+
+
+def _wanted(call: ExpectedCall) -> str:
+    return " or ".join(map(_shown, call.one_of or (call.returns,)))
+
+
+def _shown(value: Any) -> str:
+    """Texts in quotes, all else as it is, shortened."""
+    told = quoted(as_text(value))
+    return told if isinstance(value, str) else told[1:-1]
