@@ -7,74 +7,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
 
 from responders.function_calls import Called, FunctionCall, Returned
-from service.grading.grade import Measure, TrialResult
+from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
+from service.grading.judging.case import Case
+from service.grading.judging.judges import by_trial, judges_case, once
 from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words, quoted
 from sim.errors import AssignmentError
 from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
 from submissions.magics import Flags
 
-#: What makes the robot speak.
-SPEECH = ("say()", "speak()")
 #: More that is wrong would give_up the first.
 _MOST_TOLD = 4
-_UNREADABLE = "it cannot be read"
 
 
-@dataclass(frozen=True, slots=True)
-class SourcePlace:
-    """A file beside the part, or a cell of a notebook (empty: the part itself), and a line."""
-
-    file: str
-    line: int
-
-    def __str__(self) -> str:
-        return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
+@judges_case(SourceRules)
+def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
+    driven = case.trials if criterion.part == "program" else ()
+    answers = case.analysis.answers.get(criterion.id)
+    return once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
 
 
-@dataclass(frozen=True, slots=True)
-class SourceAnswers:
-    """Where a part has what each rule of a criterion names, in the order of the rules; None where it has it not.
+@judges_case(Functions)
+def judge_functions(criterion: Functions, case: Case) -> CriterionResult:
+    return once(criterion, _returned(criterion, case.analysis.called.get(criterion.id)))
 
-    ``error``: why it cannot be read. ``unread``: a file beside it that cannot be, and why. ``doubts`` are places that
-    can do more than their text shows.
-    """
 
-    uses: tuple[SourcePlace | None, ...] = ()
-    avoids: tuple[SourcePlace | None, ...] = ()
-    in_loop: tuple[SourcePlace | None, ...] = ()
-    defines: tuple[SourcePlace | None, ...] = ()
-    speech: tuple[SourcePlace | None, ...] = ()
-    doubts: tuple[str, ...] = ()
-    error: str = ""
-    unread: str = ""
-
-    @classmethod
-    def read(cls, told: Any, criterion: SourceRules) -> SourceAnswers:
-        """From what the reader in the sandbox returned, which is not believed to have any form."""
-        try:
-            name, why, line = told["unread"] or ("", "", None)
-            where = f" (line {int(line)})" if line is not None else ""
-            answers = (
-                _places(told["uses"], criterion.uses),
-                _places(told["avoids"], criterion.avoids),
-                _places(told["in_loop"], criterion.in_loop),
-                _places(told["defines"], criterion.defines),
-                _places(told["shown"], SPEECH),
-            )
-            doubts = tuple(f"{_place(file, line)} has {str(what)[:80]}" for file, line, what in told["doubts"])
-        except (LookupError, TypeError, ValueError, OverflowError):
-            return cls(error=_UNREADABLE)
-        if why and not name:
-            return cls(error=f"{str(why)[:200]}{where}")
-        return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(why)[:200]}" if name else "")
+@judges_case(PythonCheck)
+def judge_python_check(criterion: PythonCheck, case: Case) -> CriterionResult:
+    return by_trial(criterion, case, lambda index, _: _checked(criterion, case.analysis.checks[criterion.id, index]))
 
 
 def judge_source(
@@ -145,15 +112,6 @@ def _words(rule: str) -> str:
     return f"a {rule} loop" if rule in ("for", "while") else rule
 
 
-def _places(told: Any, rules: Sequence[str]) -> tuple[SourcePlace | None, ...]:
-    """Raises one of Python's errors for what is no answer to each of the rules."""
-    return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
-
-
-def _place(file: Any, line: Any) -> SourcePlace:
-    return SourcePlace(str(file)[:60], int(line))
-
-
 _LONGEST_MESSAGE = 500
 _MOST_MEASURES = 20
 
@@ -165,7 +123,7 @@ def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
     )
 
 
-def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
+def _returned(criterion: Functions, called: Called | None) -> Outcome:
     if called is None:
         return failed("Expected a responder to be submitted, but it was not.")
     if called.fault is not None:
@@ -187,7 +145,7 @@ def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
     return failed(f"{first}{tally}.", score=share, measures=measures)
 
 
-def checked(criterion: PythonCheck, gave: Returned) -> Outcome:
+def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
     """The outcome that an instructor's check returned. Raises AssignmentError when it failed or returned nonsense."""
     if gave.fault is not None:
         raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")

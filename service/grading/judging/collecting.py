@@ -13,6 +13,7 @@ from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import footprint_at, part_at
+from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import quoted
@@ -38,6 +39,7 @@ class Pair:
         return self.truth if self.truth is not None and self.truth == self.decoded else None
 
 
+@judges(Collects)
 def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     recording = trial.recording
     found = pairs(recording, criterion.source, trial.light_noise)

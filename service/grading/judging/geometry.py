@@ -18,8 +18,7 @@ from sim.recording import Floats, Pose, Recording
 from sim.robot import LightSensor
 from sim.sensors import Footprint, footprint
 from sim.trigonometry import sincos
-from submissions.criteria.parts import Zone
-from submissions.criteria.places import Area, LineToFollow, Part
+from submissions.criteria.places import Area, LineToFollow, Part, Zone
 
 Side = Literal["left", "right"]
 #: A light sensor's middle, or the axle's.

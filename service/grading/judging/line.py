@@ -12,6 +12,7 @@ import numpy as np
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import Along, along, covered, place_at, positions
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.path import PART_NAMES
 from sim.recorded import seconds_at
@@ -19,6 +20,7 @@ from sim.recording import Floats
 from submissions.criteria.line import Follows, Laps
 
 
+@judges(Follows)
 def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
     """The part of the line that counts begins where it is first come upon; of a closed line all counts."""
     recording = trial.recording
@@ -85,6 +87,7 @@ class _Crossing:
     progress: float
 
 
+@judges(Laps)
 def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
     """A lap is from one crossing of the start line to a later one; the path between two ticks is straight."""
     recording = trial.recording

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import Side, floor_share, footprint_at, light_of
+from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.backgrounds import Floor
@@ -26,6 +27,7 @@ from submissions.criteria.logged import Datalog, ImageLog, Instrument
 Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
 
 
+@judges(Datalog)
 def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     name = criterion.series
@@ -58,6 +60,7 @@ def _there(count: int) -> str:
     return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
 
 
+@judges(ImageLog)
 def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     log = recording.image_log

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import place_at, positions, standing, stretches, times, travel
+from service.grading.judging.judges import judges
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.camera import HEIGHT, WIDTH
@@ -27,6 +28,7 @@ _NOTICEABLE = 5.0
 _REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
 
 
+@judges(Displacement)
 def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     """From the start to the end; the wheels' positions are those that the program would read at the end."""
     recording = trial.recording
@@ -66,6 +68,7 @@ def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     return passed(f"From start to end the robot {whole}.", t, end, measures)
 
 
+@judges(Moves)
 def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     """Each move that is asked for is looked for among those that were made."""
     recording = trial.recording
@@ -94,6 +97,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     return passed(f"The robot moved as asked: it {told}.", *place_at(recording, made[-1].last), measures)
 
 
+@judges(Excursions)
 def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     """Peaks of the way along the start's heading, and how near the start the robot came after each."""
     recording = trial.recording
@@ -155,6 +159,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     )
 
 
+@judges(Encounters)
 def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     """Each fall of the reading below the threshold, and what the robot did in the seconds after it."""
     recording = trial.recording

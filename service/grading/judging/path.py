@@ -11,6 +11,7 @@ import numpy as np
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import distance_to, place_at, positions, standing, stretches
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
 from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
@@ -31,6 +32,7 @@ PART_NAMES = {
 }
 
 
+@judges(Visits)
 def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     """Each place after the one before it (or at any time); a place is visited when its edge is reached."""
     recording = trial.recording
@@ -77,6 +79,7 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
 
 
+@judges(StaysInside)
 def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     recording = trial.recording
     points = _driven(recording, criterion.of)
@@ -104,6 +107,7 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     return passed(f"{_upper(who)} stayed in {where}.", recording.end_t, recording.end, measures)
 
 
+@judges(KeepsOut)
 def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     """The measure is the least distance to any of the areas."""
     recording = trial.recording
@@ -134,6 +138,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     )
 
 
+@judges(TouchesNothing)
 def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
     recording = trial.recording
     touches = recording.touches

@@ -11,16 +11,19 @@ from fractions import Fraction
 
 import numpy as np
 
-from service.grading.grade import Measure, TrialResult
+from service.grading.grade import CriterionResult, Measure, TrialResult
+from service.grading.judging.case import Case, Indexed
 from service.grading.judging.geometry import headings, place_at, positions, stretches, to_segment
+from service.grading.judging.judges import by_trial, judges, judges_case, summary
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
-from submissions.criteria.path import Circuits, Closest, Spread
+from submissions.criteria.point import Circuits, Closest, Spread
 
 _FAR = 10_000.0
 _TURN = 2.0
 
 
+@judges(Closest)
 def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
     """The least distance of the robot's middle to a point, and how it began to turn with regard to it."""
     recording = trial.recording
@@ -100,6 +103,7 @@ _NO_BOUND = 100
 _CORNER = 30.0
 
 
+@judges(Circuits)
 def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     recording = trial.recording
     round_it = rounds(positions(recording, criterion.of), criterion.x, criterion.y)
@@ -191,7 +195,19 @@ def _corners(turned: Floats) -> int:
     return sum(abs(float(smooth[last] - smooth[first])) >= _CORNER for first, last in stretches(fast))
 
 
-def judge_spread(criterion: Spread, trial: TrialResult) -> Outcome:
+@judges_case(Spread)
+def judge_spread(criterion: Spread, case: Case) -> CriterionResult:
+    """An observation: where nothing was lost, all that was observed is told."""
+
+    def told(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
+        if trials and all(outcome.passed for outcome in outcomes):
+            return _spread_words(criterion, [trial for _, trial in trials])
+        return summary(trials, outcomes)
+
+    return by_trial(criterion, case, lambda _, trial: _ended(criterion, trial), told)
+
+
+def _ended(criterion: Spread, trial: TrialResult) -> Outcome:
     """Distance of the end from the point, mm."""
     recording = trial.recording
     distance = _distance(criterion, trial)
@@ -208,7 +224,7 @@ def judge_spread(criterion: Spread, trial: TrialResult) -> Outcome:
     return passed(f"The robot {told}.", recording.end_t, recording.end, measures)
 
 
-def spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
+def _spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
     """Least, mean and greatest distance for each level of motor noise."""
     levels = sorted({trial.motor_noise for trial in trials})
     told = []

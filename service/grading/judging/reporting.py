@@ -10,6 +10,7 @@ from fractions import Fraction
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import in_zone, part_at, part_at_time, zone_words
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import Token, find_words, listed, quoted, spoken_until, tokens_of, words_of
 from sim.recorded import floor_of, pose_at
@@ -21,6 +22,7 @@ Entry = float | str
 _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
 
 
+@judges(Reports)
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     wanted = _expected_entries(criterion, trial)
     who = "the responder" if criterion.source == "reply" else "the program"
@@ -170,6 +172,7 @@ def _entries(entries: Sequence[Entry]) -> str:
 _SPEECH_ROUNDING = 0.011  # a waiting program looks every 10 ms
 
 
+@judges(WordSequence)
 def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
     recording = trial.recording
     lines = recording.spoken if criterion.source == "speech" else recording.printed
@@ -215,6 +218,7 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
     return passed(f"The robot {past} {shown}.", first.t, pose_at(recording, first.t), measures)
 
 
+@judges(Events)
 def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     """Each event is looked for after the one before it; the first mention at the right place counts.
 

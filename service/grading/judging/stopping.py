@@ -11,6 +11,7 @@ from typing import Literal
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import floor_share, in_zone, part_at, zone_words
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, cut, failed, passed
 from sim.recorded import seconds_at
 from sim.recording import Recording, Verdict
@@ -21,6 +22,7 @@ Side = Literal["left", "right"]
 _MM = 0.01  # less than this in a tick is no movement
 
 
+@judges(StopOn)
 def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = cut(recording)

@@ -6,7 +6,7 @@ What went wrong is said by the modules of the families.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -44,6 +44,7 @@ _NUMBERS = {word: str(number) for number, word in enumerate(_SMALL)} | {
 }
 #: Longest text of a student's that is taken apart.
 _MOST = 20_000
+_MOST_OF_AN_ANSWER = 10_000
 _WORD = re.compile(r"[^\W_]+")
 #: A number as Python writes it, or a word. Runs of digits are possessive: what was read of them is not read again.
 _TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]++")
@@ -149,3 +150,34 @@ def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
             return ""
         return f" The program was still running when the time was up, at {fault.t:g} s."
     return f" The run ended early, at {fault.t:.2f} s."
+
+
+class LabelFinder:
+    """Finds labels and their other names in a text, the longest first, as whole words."""
+
+    def __init__(self, labels: Iterable[str], aliases: Mapping[str, Sequence[str]]) -> None:
+        self._names: dict[str, str] = {}
+        for label in labels:
+            self._names[_spelled(label)] = label
+        for label, others in aliases.items():
+            for name in (label, *others):
+                self._names.setdefault(_spelled(name), self.canonical(label))
+        longest_first = sorted((name for name in self._names if name), key=len, reverse=True)
+        alternatives = "|".join(map(re.escape, longest_first))
+        self._pattern = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)") if alternatives else None
+
+    def canonical(self, label: str) -> str:
+        """The label as the criterion spells it."""
+        return self._names.get(_spelled(label), label)
+
+    def labels_in(self, text: str) -> list[str]:
+        """The different labels that a text names, in the order in which it names them."""
+        if self._pattern is None:
+            return []
+        found = self._pattern.findall(_spelled(text[:_MOST_OF_AN_ANSWER]))
+        return list(dict.fromkeys(self._names[name] for name in found))
+
+
+def _spelled(text: str) -> str:
+    """Without case, hyphens, underscores and extra spaces."""
+    return " ".join(re.sub(r"[-‐-―_]", " ", text).casefold().split())
