@@ -1,6 +1,6 @@
 """What is found out about a submission without driving: what its text has, values of its functions, a check's answers.
 
-All of it is found inside the sandbox; what it is worth is decided in the modules of the kinds.
+All of it is found inside the sandbox; what it is worth is decided in the modules of the families.
 """
 
 from __future__ import annotations

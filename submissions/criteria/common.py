@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from sim.backgrounds import Floor
+from sim.errors import UsageError
 from submissions.strict_table import StrictTable
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class Surroundings:
                 yield scenario
 
 
-class Misfit(ValueError):
+class Misfit(UsageError):
     """What a criterion asks and the assignment does not have: the key that asks, and what is wrong with it."""
 
     def __init__(self, key: str, sentence: str) -> None:
