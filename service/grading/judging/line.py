@@ -1,6 +1,6 @@
 """Judging how well a line was followed, and how fast a circuit was driven.
 
-Where the path was along the line is worked out in ``courses.py``.
+Where the path was along the line is worked out in ``geometry.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Judging where the robot went: through places, within areas, clear of them, and how near a point.
 
-Going round a point is judged in ``circuits.py``, following a line in ``line.py``.
+Going round a point is judged in ``point.py``, following a line in ``line.py``.
 """
 
 from __future__ import annotations
