@@ -13,7 +13,7 @@ from typing import Literal
 
 from sim.chance import Stream
 from sim.recording import Pose
-from submissions.criteria import Criterion
+from submissions.criteria import AnyCriterion
 from submissions.seeds import PUBLIC, Secret, world_seed
 from submissions.sweep import NO_SWEEP, Coordinates, Sweep
 
@@ -77,6 +77,11 @@ class Scenario:
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
 
+    def varies(self, condition: str) -> bool:
+        """Whether its trials differ in a condition that can be swept; noise that is listed counts as well."""
+        noises = {"light_noise": self.light_noise, "motor_noise": self.motor_noise}
+        return len(getattr(self.sweep, condition) or noises.get(condition, ())) > 1
+
 
 @dataclass(frozen=True, slots=True)
 class Training:
@@ -135,7 +140,7 @@ class Assignment:
     world: WorldSpec
     parts: Parts
     scenarios: tuple[Scenario, ...]
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[AnyCriterion, ...]
     limits: Limits = Limits()
     section: str = ""  # where in the course's materials the task is set
     description: str = ""

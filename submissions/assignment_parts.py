@@ -12,15 +12,12 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar, cast
 
-from pydantic import BaseModel
-
-from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, names
+from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, label_names, names
 from sim.errors import UsageError
 from sim.recording import Pose
 from sim.robot import usual_robot
-from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, WorldSpec
+from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment_tables import (
     HeadTable,
     LimitsTable,
@@ -30,23 +27,19 @@ from submissions.assignment_tables import (
     WorldTable,
     did_you_mean,
     listed,
-    read_table,
 )
-from submissions.code_parts import check_code, check_given, check_ranks, check_sources, runs_no_robot
-from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies, Reports
+from submissions.criteria.common import Surroundings
+from submissions.criterion_parts import check_given, read_criteria, sources_of
+from submissions.document import checked_table, no_double, tables_of, texts_in
 from submissions.problems import Problems
-from submissions.recognition_parts import check_recognition, check_reports, checked_training, completed
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 from submissions.toml_lines import Path as Place
-
-T = TypeVar("T", bound=BaseModel)
 
 _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
-_LISTS_OF_TEXTS = {"equals", "starts_with", "contains", "in_order", "to", "to_starts_with", "scenarios", "truth"}
 
 Files = Mapping[str, bytes]
 
@@ -57,23 +50,28 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         if key not in _HEAD and key not in _TABLES:
             known = (*_HEAD, *_TABLES)
             problems.add((key,), f'"{key[:60]}" is not a key here, expected {listed(known)}{did_you_mean(key, known)}')
-    head = _table(HeadTable, {k: v for k, v in document.items() if k in _HEAD}, (), problems)
-    world_table = _table(WorldTable, document.get("world", {}), ("world",), problems)
-    parts = _table(PartsTable, document.get("parts", {}), ("parts",), problems)
-    limits = _table(LimitsTable, document.get("limits", {}), ("limits",), problems)
+    head = checked_table(HeadTable, {k: v for k, v in document.items() if k in _HEAD}, (), problems)
+    world_table = checked_table(WorldTable, document.get("world", {}), ("world",), problems)
+    parts = checked_table(PartsTable, document.get("parts", {}), ("parts",), problems)
+    limits = checked_table(LimitsTable, document.get("limits", {}), ("limits",), problems)
     ground = _ground(world_table or _background_alone(document), files, problems)
     world = _world(world_table, ground, files, problems) if world_table and ground else None
-    robotless = runs_no_robot(document)
+    robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
-    aliases = head.aliases if head else {}
-    criteria = _criteria(document, scenarios, ground, parts, aliases, files, problems)
+    around = Surroundings(
+        scenarios=[scenario for scenario in scenarios if scenario],
+        ground=ground,
+        without=_nobodys(parts),
+        files=files,
+        aliases=head.aliases if head else {},
+    )
+    criteria = read_criteria(document, around, robotless, problems)
     training = None
     if "training" in document:
-        training_table = _table(TrainingTable, document["training"], ("training",), problems)
-        training = checked_training(training_table, scenarios, ground, problems) if training_table else None
-    check_ranks(criteria, problems)
-    given_parts = check_sources(criteria, files, problems)
-    check_given(document, given_parts.keys(), problems)
+        training_table = checked_table(TrainingTable, document["training"], ("training",), problems)
+        training = _training(training_table, scenarios, ground, problems) if training_table else None
+    check_given(document, problems)
+    given_parts = sources_of(criteria, files, problems)
     given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
@@ -107,15 +105,6 @@ def _version(files: Files, given: Mapping[str, bytes]) -> str:
         for name in sorted(group):
             digest.update(f"{kind}:{len(name.encode())}:{name}:{len(group[name])}:".encode() + group[name])
     return digest.hexdigest()
-
-
-def _table(schema: type[T], table: object, place: Place, problems: Problems) -> T | None:
-    result = read_table(schema, table)
-    if isinstance(result, schema):
-        return result
-    for problem in cast(list[Any], result):
-        problems.add((*place, *problem.path), problem.sentence)
-    return None
 
 
 def _background_alone(document: Mapping[str, object]) -> WorldTable:
@@ -179,13 +168,13 @@ def _sheet(table: WorldTable) -> int | None:
 
 
 def _scenarios(document: Mapping[str, object], ground: Floor | None, problems: Problems) -> Sequence[Scenario | None]:
-    tables = _tables_of(document, "scenario", problems)
+    tables = tables_of(document, "scenario", problems)
     seen: dict[str, int] = {}
     scenarios = []
     for number, raw in enumerate(tables):
         place = ("scenario", number)
-        table = _table(ScenarioTable, raw, place, problems)
-        _no_double(raw, seen, place, "scenario", problems)
+        table = checked_table(ScenarioTable, raw, place, problems)
+        no_double(raw, seen, place, "scenario", problems)
         scenarios.append(_scenario(table, ground, place, problems) if table else None)
     return scenarios
 
@@ -216,65 +205,8 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
     )
 
 
-def _criteria(
-    document: Mapping[str, object],
-    scenarios: Sequence[Scenario | None],
-    ground: Floor | None,
-    parts: PartsTable | None,
-    aliases: Mapping[str, tuple[str, ...]],
-    files: Files,
-    problems: Problems,
-) -> tuple[Criterion, ...]:
-    criteria: list[Criterion] = []
-    seen: dict[str, int] = {}
-    scenario_ids = _texts([raw.get("id") for raw in _list_of_tables(document.get("scenario"))])
-    for number, raw in enumerate(_tables_of(document, "criterion", problems)):
-        place = ("criterion", number)
-        check = raw.get("check")
-        if check not in SCHEMAS:
-            hint = did_you_mean(check, SCHEMAS) if isinstance(check, str) else ""
-            said = f'check is "{str(check)[:60]}"' if "check" in raw else "check is missing"
-            problems.add((*place, "check"), f"{said}, expected {listed(SCHEMAS)}{hint}")
-            continue
-        criterion = _table(SCHEMAS[cast(str, check)], raw, place, problems)
-        for key in _LISTS_OF_TEXTS & {key for key, value in raw.items() if value == []}:
-            problems.add((*place, key), f"{key} is an empty list and asks for nothing, expected at least one text")
-        for index, name in enumerate(_texts(raw.get("scenarios"))):
-            if name not in scenario_ids:
-                problems.add(
-                    (*place, "scenarios", index),
-                    f'scenarios names "{name[:60]}", expected the id of a scenario{did_you_mean(name, scenario_ids)}',
-                )
-        if criterion is None:
-            continue
-        named = criterion.model_copy(update={"id": criterion.id or _slug(criterion.title)})
-        if isinstance(named, Recognition):
-            named = completed(named, aliases, files, place, problems)
-        _no_double({"id": named.id}, seen, place, "criterion", problems)
-        _check_criterion(cast(Criterion, named), scenarios, ground, parts, place, problems)
-        check_code(cast(Criterion, named), parts, runs_no_robot(document), files, place, problems)
-        criteria.append(cast(Criterion, named))
-    return tuple(criteria)
-
-
-def _check_criterion(
-    criterion: Criterion,
-    scenarios: Sequence[Scenario | None],
-    ground: Floor | None,
-    parts: PartsTable | None,
-    place: Place,
-    problems: Problems,
-) -> None:
-    """What a criterion asks must be there: a responder, and what recognition needs."""
-    needs_responder = isinstance(criterion, Recognition | Replies) or (
-        isinstance(criterion, Messages) and (criterion.json_queue or criterion.queue_grows)
-    )
-    if needs_responder and parts is not None and parts.responder == "none":
-        problems.add((*place, "check"), 'check needs a responder, but parts has responder = "none", expected one')
-    if isinstance(criterion, Reports):
-        check_reports(criterion, scenarios, place, problems)
-    if isinstance(criterion, Recognition):
-        check_recognition(criterion, scenarios, ground, place, problems)
+def _nobodys(parts: PartsTable | None) -> frozenset[str]:
+    return frozenset(part for part in ("program", "responder") if parts and getattr(parts, part) == "none")
 
 
 def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
@@ -302,7 +234,7 @@ def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Pro
 
 def _given(document: Mapping[str, object], files: Files, problems: Problems) -> dict[str, bytes]:
     given = {}
-    for number, name in enumerate(_texts(document.get("given"))):
+    for number, name in enumerate(texts_in(document.get("given"))):
         if name in files and "/" not in name:
             given[name] = files[name]
         else:
@@ -347,32 +279,33 @@ def _weights_folder() -> Path:
     return Path(str(resources.files("models"))) / "weights"
 
 
-def _tables_of(document: Mapping[str, object], key: str, problems: Problems) -> list[dict[str, Any]]:
-    value = document.get(key)
-    if value is None or value == []:
-        problems.add((), f"there is no [[{key}]], expected at least one")
-    elif not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-        problems.add((key,), f"{key} is not a list of tables, expected [[{key}]] before each")
-    return _list_of_tables(value)
+def _training(
+    table: TrainingTable, scenarios: Sequence[Scenario | None], ground: Floor | None, problems: Problems
+) -> Training:
+    """The training table, if there are scenarios to train on and others to be tested on, over a floor with labels."""
+    ids = [scenario.id for scenario in scenarios if scenario is not None]
+    hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
+    for number, name in enumerate(table.scenarios):
+        if name in hidden:
+            sentence = f'scenarios names "{name[:60]}", which is not visible, expected one whose images may be told'
+            problems.add(("training", "scenarios", number), sentence)
+        if name not in ids:
+            problems.add(
+                ("training", "scenarios", number),
+                f'scenarios names "{name[:60]}", expected the id of a scenario{did_you_mean(name, ids)}',
+            )
+    if ids and not set(ids) - set(table.scenarios):
+        problems.add(
+            ("training", "scenarios"), "scenarios names every scenario, expected one whose images are not trained on"
+        )
+    if ground is not None and not label_names(ground.name):
+        problems.add(
+            ("training",), f"the images of {ground.name} have no labels to train with, expected a floor that has"
+        )
+    return Training(table.scenarios, table.function, table.image)
 
 
-def _list_of_tables(value: object) -> list[dict[str, Any]]:
-    return [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
-
-
-def _texts(value: object) -> list[str]:
-    return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
-
-
-def _no_double(raw: Mapping[str, object], seen: dict[str, int], place: Place, kind: str, problems: Problems) -> None:
-    name = raw.get("id")
-    if not isinstance(name, str):
-        return
-    if name in seen:
-        problems.add((*place, "id"), f'id "{name[:60]}" is the id of an earlier {kind}, expected one of its own')
-    seen[name] = seen.get(name, 0) + 1
-
-
-def _slug(title: str) -> str:
-    words = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:60].strip("-")
-    return words or "criterion"
+def _runs_no_robot(document: Mapping[str, object]) -> bool:
+    """Whether the assignment has neither scenarios nor a program: only functions and texts are looked at."""
+    parts = document.get("parts")
+    return isinstance(parts, dict) and parts.get("program") == "none" and "scenario" not in document

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from sim.backgrounds import OBSTACLE_PRESETS
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
-from submissions.strict_table import StrictTable
+from submissions.strict_table import Shape, StrictTable
 from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
@@ -42,7 +43,7 @@ class HeadTable(StrictTable):
 class WorldTable(StrictTable):
     background: str = "Empty_Map"
     labels: bool = True
-    obstacles: tuple[Rectangle, ...] = ()
+    obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
     robot: str = "Default_Robot"
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
@@ -121,14 +122,14 @@ class SweepTable(StrictTable):
 class ScenarioTable(StrictTable):
     id: str = Slug
     title: str = Field(default="", max_length=200)
-    poses: tuple[tuple[float, float, float], ...] = Field(default=(), min_length=1)
+    poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
     light_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
     motor_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
     channel: ChannelTable = ChannelTable()
-    start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_jitter: Annotated[tuple[float, float, float], Shape("[mm in x, mm in y, degrees]")] = (0.0, 0.0, 0.0)
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
@@ -257,10 +258,6 @@ _TYPES: Mapping[str, str] = {
 }
 
 
-_RANGES = ("forward", "sideways", "distance", "turn", "turn_size", "seconds", "left_wheel", "right_wheel", "times",
-           "gyro", "sizes")  # fmt: skip
-
-
 def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     """One of pydantic's errors in our words, with its place in the table of that schema."""
     path = tuple(part for part in details["loc"])
@@ -271,7 +268,7 @@ def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
         return TableProblem(path, _unknown_key(schema, path))
     if kind == "missing":
         if isinstance(path[-1], int):
-            sentence = f"{_called(path[:-1])} has too few numbers{_shape(path)}"
+            sentence = f"{_called(path[:-1])} has too few numbers{_shape(schema, path)}"
             return TableProblem(path[:-1], sentence)
         return TableProblem(path[:-1], f"{name} is missing, expected {name} = ...")
     if kind in ("value_error", "assertion_error"):
@@ -293,7 +290,7 @@ def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     if kind == "too_short":
         return TableProblem(path, f"{_called(path)} has too few entries, expected at least {context['min_length']}")
     if kind == "too_long":
-        return TableProblem(path, f"{_called(path)} has too many numbers{_shape((*path, 0))}")
+        return TableProblem(path, f"{_called(path)} has too many numbers{_shape(schema, path)}")
     if kind == "string_too_long":
         return TableProblem(path, f"{_called(path)} is too long, expected at most {context['max_length']} characters")
     return TableProblem(path, f"{_called(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
@@ -307,9 +304,9 @@ def _key_in(sentence: str, table: object) -> tuple[str, ...]:
 
 def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
     for part in path[:-1]:
-        if isinstance(part, str) and part in schema.model_fields:
-            schema = _table_in(schema.model_fields[part].annotation) or schema
-    known = [field.alias or name for name, field in schema.model_fields.items()]
+        field = _fields(schema).get(str(part))
+        schema = (_table_in(field.annotation) if field else None) or schema
+    known = list(_fields(schema))
     name = str(path[-1])
     hint = did_you_mean(name, known)
     return f'"{name[:60]}" is not a key of this table, expected {listed(known)}{hint}'
@@ -330,15 +327,27 @@ def _called(path: tuple[str | int, ...]) -> str:
     return words or "this table"
 
 
-def _shape(path: tuple[str | int, ...]) -> str:
-    shapes = {"poses": "[x, y, heading]", "obstacles": "[x, y, width, height]", "zone": "[left, bottom, right, top]"}
-    shapes |= {"start_jitter": "[mm in x, mm in y, degrees]", "places": "[x, y, label]", "steps": "[accuracy, marks]"}
-    shapes |= {"rectangle": "[left, bottom, right, top]", "circle": "[x, y, radius]", "polygon": "[x, y]"}
-    shapes |= {"bar": "[x1, y1, x2, y2, radius]", "points": "[x, y]", "start_line": "[x1, y1, x2, y2]"}
-    shapes |= {"ellipse": "[x, y, horizontal radius, vertical radius]", "arc": "[from, to]"}
-    shapes |= dict.fromkeys(_RANGES, "[least, most]")
-    shape = shapes.get(next(part for part in reversed(path) if isinstance(part, str)))
-    return f", expected {shape}" if shape else ", expected another number of them"
+def _shape(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
+    """What the entries of a list of fixed length are, as the type of its key says."""
+    shape = None
+    for key in path:
+        field = _fields(schema).get(str(key))
+        if field is not None:
+            shape = next((each for each in field.metadata if isinstance(each, Shape)), None) or _shape_in(
+                field.annotation
+            )
+            schema = _table_in(field.annotation) or schema
+    return f", expected {shape.words}" if shape else ", expected another number of them"
+
+
+def _shape_in(annotation: object) -> Shape | None:
+    if isinstance(annotation, Shape):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _shape_in(part))), None)
+
+
+def _fields(schema: type[BaseModel]) -> dict[str, FieldInfo]:
+    return {field.alias or name: field for name, field in schema.model_fields.items()}
 
 
 def _short(value: object) -> str:

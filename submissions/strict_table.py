@@ -5,6 +5,8 @@ What a table means is said where it is defined.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from pydantic import BaseModel, ConfigDict
 
 
@@ -12,3 +14,10 @@ class StrictTable(BaseModel):
     """Frozen, and refused where it has a key too many or a number that is none."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Part of the type of a list of fixed length: what its entries are, in words, for who writes too few or many."""
+
+    words: str

@@ -9,10 +9,13 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
+from typing import Annotated
 
 from sim.errors import UsageError
-from submissions.criteria.classification import LabelledPlace
+from submissions.strict_table import Shape
 
+#: x, y (mm) and what is there.
+LabelledPlace = Annotated[tuple[float, float, str], Shape("[x, y, label]")]
 _MOST_PLACES = 10_000
 
 

@@ -23,7 +23,8 @@ from submissions.assignment_file import (
     read_assignment,
 )
 from submissions.assignment_parts import build_assignment
-from submissions.criteria import Classification, Finishes
+from submissions.criteria.classification import Classification
+from submissions.criteria.ending import Finishes
 from submissions.problems import Problems
 from submissions.toml_lines import find_lines, line_of
 
@@ -260,7 +261,7 @@ check = "pose"
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "timing") + "between = [3, 2]\n",
             10,
-            "this table has an empty range",
+            "between is a range with nothing in it",
         ),
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "reports") + 'expected = [["a"], ["b"]]\n',

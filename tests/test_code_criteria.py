@@ -15,8 +15,9 @@ from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import Grade
 from service.grading.grader import grade
+from service.grading.judging.code import judge_source
 from service.grading.judging.outcome import Outcome
-from service.grading.judging.source_rules import SourceAnswers, judge_source
+from service.grading.judging.source_answers import SourceAnswers
 from service.grading.static_analysis import SubmittedParts, analyse
 from service.grading.trial_runner import TrialRunner
 from service.reports.audience import student_view

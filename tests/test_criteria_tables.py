@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import pytest
 
+from service.grading.judging.judge import JUDGES
 from submissions.assignment_tables import read_table
 from submissions.criteria import SCHEMAS
 
@@ -57,3 +59,15 @@ def test_a_mistake_is_named_where_it_is(
     (problem,) = found
     assert problem.path == place
     assert sentence in problem.sentence
+
+
+@pytest.mark.parametrize("check", sorted(SCHEMAS))
+def test_a_criterion_is_judged_in_the_module_that_is_named_like_its_schemas(check: str) -> None:
+    family = SCHEMAS[check].__module__.rpartition(".")[2]
+    assert JUDGES[SCHEMAS[check]] in vars(import_module(f"service.grading.judging.{family}")).values()
+
+
+def test_too_few_numbers_are_told_as_their_own_kind_has_them() -> None:
+    keys = {"of": "lap", "measure": "best lap", "steps": [[40]]}
+    (problem,) = read_table(SCHEMAS["ranking"], {"title": "A", "marks": 1, "check": "ranking", **keys})  # type: ignore[misc]
+    assert problem.sentence == "steps[0] has too few numbers, expected [figure, share]"

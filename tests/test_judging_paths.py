@@ -12,11 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from driving import along, criterion, driven, judged, measured, passes, rest, spin, straight
-from service.grading.judging.areas import distance_to
-from service.grading.judging.circuits import rounds
-from service.grading.judging.courses import along as along_line
-from service.grading.judging.courses import covered
-from service.grading.judging.whereabouts import positions
+from service.grading.judging.geometry import along as along_line
+from service.grading.judging.geometry import covered, distance_to, positions
+from service.grading.judging.point import rounds
 from sim.backgrounds.centrelines import centrelines
 from sim.recording import Pose, Touch
 from submissions.criteria.places import Area, LineToFollow

@@ -21,7 +21,7 @@ from sim.recording import Pose
 from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
 from submissions.assignment_file import find_assignment, read_assignment
 from submissions.bundle import read_submission
-from submissions.criteria.classification import Robustness
+from submissions.criteria.robustness import Robustness
 from submissions.example_folder import examples
 from submissions.submission import Source, Submission
 from submissions.sweep import CONDITIONS, Sweep

@@ -26,6 +26,7 @@ from service.reports.readable import readable
 from service.reports.trace import trace
 from sim.backgrounds import floor
 from sim.errors import UsageError
+from sim.recorded import floor_of
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
@@ -233,4 +234,5 @@ def _show(recording: Recording) -> None:
 
 def _drawn(recording: Recording, name: str, seed: int) -> bytes:
     trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
-    return png(draw_path(trial, name, floor(recording.background, seed=recording.sheet).pixels))
+    driven_on = floor_of(recording)
+    return png(draw_path(trial, name, driven_on.pixels if driven_on else None))

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.outcome import fault_words
+from service.grading.judging.words import fault_words
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment import Assignment

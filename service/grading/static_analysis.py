@@ -1,6 +1,6 @@
 """What is found out about a submission without driving: what its text has, values of its functions, a check's answers.
 
-All of it is found inside the sandbox; what it is worth is decided in the modules of the kinds.
+All of it is found inside the sandbox; what it is worth is decided in the modules of the families.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import TrialResult
-from service.grading.judging.function_checks import calls_of
-from service.grading.judging.outcome import fault_words
-from service.grading.judging.source_rules import SPEECH, SourceAnswers
+from service.grading.judging.case import StaticAnalysis
+from service.grading.judging.code import calls_of
+from service.grading.judging.source_answers import SPEECH, SourceAnswers
+from service.grading.judging.words import fault_words
 from sim.chance import Stream
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
@@ -50,17 +51,6 @@ class SubmittedParts:
     own: Mapping[str, bytes] = field(default_factory=dict)
     cells: tuple[Cell, ...] = ()
     child_seed: int = 0  # of the chance that its functions see
-
-
-@dataclass(frozen=True, slots=True)
-class StaticAnalysis:
-    """``answers`` and ``called`` are by the id of a criterion, ``checks`` by that and the place of the trial."""
-
-    answers: Mapping[str, SourceAnswers] = field(default_factory=dict)
-    flags: Flags = field(default_factory=Flags)
-    called: Mapping[str, Called] = field(default_factory=dict)
-    checks: Mapping[tuple[str, int], Returned] = field(default_factory=dict)
-    sandbox: str = ""
 
 
 class Caller(Protocol):

@@ -9,7 +9,7 @@ from dataclasses import replace
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
-from service.grading.judging.trial_words import shown_words
+from service.grading.judging.words import shown_words
 from sim.recording import Verdict
 
 #: What a student sees before anything is published.

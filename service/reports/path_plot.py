@@ -37,8 +37,8 @@ from service.reports.plot_style import (
     whole,
     write,
 )  # fmt: skip
+from sim.recorded import robot_of
 from sim.recording import Pose, Recording
-from sim.robot import ROBOTS
 
 Pixels = NDArray[np.uint8]
 
@@ -126,7 +126,7 @@ def _points(recording: Recording) -> NDArray[np.float64]:
 
 
 def _view(recording: Recording, points: NDArray[np.float64]) -> View:
-    reach = ROBOTS.get(recording.robot, ROBOTS["Default_Robot"]).reach
+    reach = robot_of(recording).reach
     low_x, low_y = (float(value) for value in points[:, :2].min(axis=0))
     high_x, high_y = (float(value) for value in points[:, :2].max(axis=0))
     margin = max(_MARGIN, reach + 15)
@@ -221,7 +221,7 @@ def _evenly(points: NDArray[np.float64], wanted: int) -> list[int]:
 def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -> None:
     if not math.isfinite(pose.x + pose.y + pose.heading):
         return
-    robot = ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
+    robot = robot_of(recording)
     nose = robot.front
     outline = [
         (-robot.half_width, robot.back), (robot.half_width, robot.back), (robot.half_width, nose * 0.55),
@@ -271,7 +271,7 @@ def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], p
 
 
 def _draw_marks(axes: Axes, recording: Recording, per_inch: float) -> None:
-    robot = ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
+    robot = robot_of(recording)
     for touch in recording.touches[:40]:
         axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
         axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=8, color=FAULT, markeredgewidth=2, zorder=6)

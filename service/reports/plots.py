@@ -25,8 +25,7 @@ from service.reports.predictions_plot import chosen_predictions, draw_prediction
 from service.reports.readable import one_line
 from service.reports.sensor_plot import draw_sensors
 from service.reports.track_plot import draw_track, tracks, worst_track
-from sim.backgrounds import floor as floor_of
-from sim.errors import UsageError
+from sim.recorded import floor_of
 from sim.recording import Recording
 from submissions.sweep import CONDITIONS, Varied
 
@@ -109,10 +108,8 @@ def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
     """The floor as it was in the trial, with the same digits and label patches."""
     if recording.background in images:
         return images[recording.background]
-    try:
-        return floor_of(recording.background, labels=recording.label_patches, seed=recording.sheet).pixels
-    except UsageError:
-        return None
+    floor = floor_of(recording)
+    return floor.pixels if floor else None
 
 
 def _classifications(grade: Grade) -> Iterator[Plot]:

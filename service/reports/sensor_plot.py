@@ -31,6 +31,7 @@ from service.reports.plot_style import (
     set_tick_type,
     write,
 )  # fmt: skip
+from sim.recorded import seconds_at
 from sim.recording import Recording
 
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
@@ -75,7 +76,7 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
     body = sum(panel.height + _GAP for panel in panels)
     figure = new_figure(HEAD + strip_height + body + 0.36, title, _subtitle(trial))
-    end = max(recording.end_t, len(recording.ticks) / 30, 0.1)
+    end = max(recording.end_t, seconds_at(len(recording.ticks)), 0.1)
     top = float(figure.get_size_inches()[1]) - HEAD
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     if strips:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from models.intervals import wilson
 from service.grading.grade import Prediction, TrialResult
-from service.grading.judging.places import part_at
+from service.grading.judging.geometry import part_at
 from service.reports.curve_plot import Curve, draw_curve
 from service.reports.path_plot import Pixels, View, draw_floor
 from service.reports.plot_style import (

@@ -1,7 +1,13 @@
 """What can be marked without code: one schema for each kind of criterion, told apart by ``check``.
 
-Judging is the service's (``service/grading``); this only says what is asked, and refuses what cannot be
-asked.
+Judging is the service's (``service/grading/judging``, in the module named like the schema's); this only says what is
+asked, and refuses what cannot be asked. A schema is known by being defined: a class below ``Criterion`` in a module of
+this package, with its ``check``. What it needs of the rest of an assignment it says itself (``misfits``, ``completed``
+and the properties of ``Criterion``), so that whoever reads or judges assignments names no kind and no key of one.
+
+Criteria stay on the side of the edge, with the tables that an instructor writes: they are frozen pydantic models also
+after reading, unlike scenarios and limits, which become dataclasses. A schema is at once what may be written, its
+ranges, its documentation and what its judge is given; a dataclass beside each would be a second list of every key.
 
 Every criterion is judged once a trial. A trial passes or fails, and has a score between 0 and 1: the part
 of what was asked that was reached (3 of 5 lines in order, 2 of 3 messages answered), 1 exactly when it
@@ -14,137 +20,38 @@ Texts are compared without regard to spaces at the ends and to the length of run
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType
+from typing import Annotated, get_args
 
-from pydantic import Field
+from pydantic import BeforeValidator
 
-from submissions.criteria.classification import Classification, Recognition, Robustness
-from submissions.criteria.code import Functions, PythonCheck, SourceRules
-from submissions.criteria.collecting import Collects
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.drawing import Drawing
-from submissions.criteria.ending import EndPose, Finishes
-from submissions.criteria.line import Follows, Laps
-from submissions.criteria.logged import Datalog, ImageLog
-from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
-from submissions.criteria.path import Circuits, Closest, KeepsOut, Spread, StaysInside, TouchesNothing, Visits
-from submissions.criteria.reporting import Events, Reports, Sequence
-from submissions.criteria.stopping import StopOn
-from submissions.criteria.texts import Messages, Prints, Replies, Says
-from submissions.criteria.timing import Ranking, Timing
+from submissions.criteria.common import Criterion
 
-__all__ = [
-    "SCHEMAS",
-    "Circuits",
-    "Classification",
-    "Closest",
-    "Collects",
-    "Criterion",
-    "Datalog",
-    "Displacement",
-    "Drawing",
-    "Encounters",
-    "EndPose",
-    "Events",
-    "Excursions",
-    "Finishes",
-    "Follows",
-    "Functions",
-    "ImageLog",
-    "KeepsOut",
-    "Laps",
-    "Messages",
-    "Moves",
-    "Prints",
-    "PythonCheck",
-    "Ranking",
-    "Recognition",
-    "Replies",
-    "Reports",
-    "Robustness",
-    "Says",
-    "Sequence",
-    "SourceRules",
-    "Spread",
-    "StaysInside",
-    "StopOn",
-    "Timing",
-    "TouchesNothing",
-    "Visits",
-]
+__all__ = ["SCHEMAS", "AnyCriterion", "Criterion"]
 
-Criterion = Annotated[
-    Finishes
-    | Prints
-    | Says
-    | Messages
-    | Replies
-    | Classification
-    | Robustness
-    | Collects
-    | EndPose
-    | StopOn
-    | Reports
-    | Sequence
-    | Events
-    | Datalog
-    | ImageLog
-    | SourceRules
-    | Functions
-    | PythonCheck
-    | Timing
-    | Ranking
-    | Displacement
-    | Moves
-    | Excursions
-    | Encounters
-    | Drawing
-    | Visits
-    | StaysInside
-    | KeepsOut
-    | TouchesNothing
-    | Closest
-    | Circuits
-    | Follows
-    | Laps
-    | Spread,
-    Field(discriminator="check"),
-]
+
+def _schemas(of: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
+    for schema in of.__subclasses__():
+        # One without a name of its own is what several have in common.
+        yield from ((name, schema) for name in get_args(schema.model_fields["check"].annotation))
+        yield from _schemas(schema)
+
+
+for _family in iter_modules(__path__):
+    import_module(f"{__name__}.{_family.name}")
 
 #: The schema for each value of ``check``.
-SCHEMAS: dict[str, type[CriterionBase]] = {
-    "finishes": Finishes,
-    "prints": Prints,
-    "says": Says,
-    "messages": Messages,
-    "replies": Replies,
-    "classification": Classification,
-    "robustness": Robustness,
-    "collects": Collects,
-    "pose": EndPose,
-    "stop_on": StopOn,
-    "reports": Reports,
-    "sequence": Sequence,
-    "events": Events,
-    "datalog": Datalog,
-    "image_log": ImageLog,
-    "source": SourceRules,
-    "functions": Functions,
-    "python": PythonCheck,
-    "timing": Timing,
-    "ranking": Ranking,
-    "displacement": Displacement,
-    "moves": Moves,
-    "excursions": Excursions,
-    "encounters": Encounters,
-    "drawing": Drawing,
-    "visits": Visits,
-    "stays_inside": StaysInside,
-    "keeps_out": KeepsOut,
-    "touches_nothing": TouchesNothing,
-    "closest": Closest,
-    "circuits": Circuits,
-    "follows": Follows,
-    "laps": Laps,
-    "spread": Spread,
-}
+SCHEMAS: Mapping[str, type[Criterion]] = MappingProxyType(dict(sorted(_schemas())))
+
+
+def _of_its_kind(value: object) -> object:
+    if isinstance(value, dict) and value.get("check") in SCHEMAS:
+        return SCHEMAS[value["check"]].model_validate(value)
+    return value
+
+
+#: A criterion of whichever kind its ``check`` says, also where it is read back from a store.
+AnyCriterion = Annotated[Criterion, BeforeValidator(_of_its_kind)]

@@ -5,12 +5,13 @@ Only what is asked; the text is read and the functions are called by the service
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from sim.errors import UsageError
-from submissions.criteria.common import CriterionBase, Texts, one_or_many
+from submissions.criteria.common import HOLDS_ANSWERS, Criterion, Misfit, Surroundings, TextOrTexts, Texts
 from submissions.magics import Flags, parse_magic
 from submissions.strict_table import StrictTable
 
@@ -37,7 +38,7 @@ CONSTRUCTS = (
 IMPORT = "import "
 
 
-class SourceRules(CriterionBase):
+class SourceRules(Criterion):
     """What the text of the program (or of the responder) has and has not; it is read, never run.
 
     ``uses`` and ``avoids`` list constructs (``for``, ``while``, ``if``, ``break`` ...), calls (``say()``,
@@ -52,16 +53,13 @@ class SourceRules(CriterionBase):
 
     check: Literal["source"]
     part: Literal["program", "responder"] = "program"
-    uses: Texts = ()
-    avoids: Texts = ()
-    in_loop: Texts = ()
-    defines: Texts = ()
-    flags: Texts = ()
+    uses: TextOrTexts = ()
+    avoids: TextOrTexts = ()
+    in_loop: TextOrTexts = ()
+    defines: TextOrTexts = ()
+    flags: TextOrTexts = ()
 
-    @field_validator("uses", "avoids", "in_loop", "defines", "flags", mode="before")
-    @classmethod
-    def _lists(cls, value: object) -> object:
-        return one_or_many(value)
+    judges_runs: ClassVar[bool] = False
 
     @field_validator("flags")
     @classmethod
@@ -84,6 +82,9 @@ class SourceRules(CriterionBase):
         """``sklearn`` for ``import sklearn``."""
         names = (text.removeprefix(IMPORT).strip() for text in self.avoids if text.startswith(IMPORT))
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        yield from _without("part", self.part, around)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -111,7 +112,7 @@ class ExpectedCall(StrictTable):
         return self
 
 
-class Functions(CriterionBase):
+class Functions(Criterion):
     """Functions of the responder are called, without a robot, and return what they must.
 
     ``calls`` are tables ``{ arguments = [600], returns = 1227.8 }``, made one after the other in one process;
@@ -132,6 +133,11 @@ class Functions(CriterionBase):
     each: bool = False
     at_least: float = Field(default=1.0, gt=0, le=1)
 
+    judges_runs: ClassVar[bool] = False
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        yield from _without("check", "responder", around)
+
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.each and not all(isinstance(call.returns, list | tuple) and call.returns for call in self.calls):
@@ -141,7 +147,7 @@ class Functions(CriterionBase):
         return self
 
 
-class PythonCheck(CriterionBase):
+class PythonCheck(Criterion):
     """What no other criterion can ask: a Python file beside the assignment judges each trial.
 
     The file defines ``check(trial)``. ``trial`` is a dict with what was recorded: ``scenario``, ``index``,
@@ -155,9 +161,22 @@ class PythonCheck(CriterionBase):
     """
 
     check: Literal["python"]
-    file: str = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
+    file: Annotated[str, HOLDS_ANSWERS] = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
+
+    @property
+    def python_files(self) -> Texts:
+        return (self.file,)
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        if self.file not in around.files:
+            yield Misfit("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
 
 
 def flags_in(texts: Texts) -> Flags:
     """The flags that these texts are. Raises UsageError for one that does not exist."""
     return parse_magic("%%sim_magic_preloaded " + " ".join(texts))
+
+
+def _without(key: str, part: str, around: Surroundings) -> Iterator[Misfit]:
+    if part in around.without:
+        yield Misfit(key, f'{key} looks at the {part}, but parts has {part} = "none", expected one')

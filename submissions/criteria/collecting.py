@@ -9,10 +9,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from submissions.criteria.common import CriterionBase
+from submissions.criteria.common import Criterion
 
 
-class Collects(CriterionBase):
+class Collects(Criterion):
     """The pairs of images that a robot collects are good enough to train with.
 
     A pair is usable if the left image was taken over a pattern and the right one shows that pattern's label

@@ -1,18 +1,23 @@
-"""What every criterion has, and how lists of texts are read.
+"""What every criterion has, what an assignment must have around it, and the types of its lists of texts.
 
 No kind of criterion is here; each has a module of its family.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
+from sim.backgrounds import Floor
+from sim.errors import UsageError
 from submissions.strict_table import StrictTable
 
-Texts = tuple[str, ...]
+if TYPE_CHECKING:
+    from submissions.assignment import Scenario
 
 
 def one_or_many(value: object) -> object:
@@ -22,20 +27,87 @@ def one_or_many(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-def not_blank(value: Texts) -> Texts:
-    """Refuses a text that is part of every text."""
+def _not_blank(value: Texts) -> Texts:
     if not all(text.strip() for text in value):
         raise ValueError("has an empty text in it, which every text contains, expected something to look for")
     return value
 
 
-class CriterionBase(StrictTable):
-    """What every criterion has. ``scenarios`` names those it looks at; all, if empty."""
+Texts = tuple[str, ...]
+#: Marks a list that asks for nothing, and so is a mistake, where it is written with nothing in it.
+NOT_EMPTY = "not empty"
+#: Refuses a text that is part of every text.
+NotBlank = AfterValidator(_not_blank)
+SomeTexts = Annotated[Texts, NOT_EMPTY]
+TextOrTexts = Annotated[Texts, BeforeValidator(one_or_many)]
+SomeTextOrTexts = Annotated[TextOrTexts, NOT_EMPTY]
+#: Marks a key that may name a file beside the assignment which no student may read.
+HOLDS_ANSWERS = "holds answers"
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What an assignment has around a criterion, as far as it could be read."""
+
+    scenarios: Sequence[Scenario] = ()
+    ground: Floor | None = None
+    without: frozenset[str] = frozenset()  # the parts, program and responder, that nobody writes
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    aliases: Mapping[str, Texts] = field(default_factory=dict)
+    criteria: Sequence[Criterion] = ()
+
+    def looked_at_by(self, criterion: Criterion) -> Iterator[Scenario]:
+        """The scenarios of the criterion."""
+        for scenario in self.scenarios:
+            if not criterion.scenarios or scenario.id in criterion.scenarios:
+                yield scenario
+
+
+class Misfit(UsageError):
+    """What a criterion asks and the assignment does not have: the key that asks, and what is wrong with it."""
+
+    def __init__(self, key: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.key, self.sentence = key, sentence
+
+
+class Criterion(StrictTable):
+    """What every criterion has. ``scenarios`` names those it looks at; all, if empty.
+
+    A kind is a class below this one with ``check: Literal["its name"]``.
+    """
 
     id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # from the title, if not given
+    check: str  # the kind
     title: str = Field(min_length=1, max_length=200)
     marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
-    scenarios: tuple[str, ...] = ()
+    scenarios: SomeTexts = ()
     #: how the trials become marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
+
+    #: Whether it looks at runs of the robot; else at the code alone.
+    judges_runs: ClassVar[bool] = True
+
+    @property
+    def asks_responder(self) -> bool:
+        """Whether it looks at what a responder answers."""
+        return False
+
+    @property
+    def result_needed(self) -> str | None:
+        """The id of the criterion that has to be judged before it."""
+        return None
+
+    @property
+    def python_files(self) -> Texts:
+        """The files beside the assignment that are run to judge it."""
+        return ()
+
+    def completed(self, around: Surroundings) -> Self:
+        """The criterion with what the assignment says elsewhere. Raises Misfit where that cannot be read."""
+        return self
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """All that it asks and that is not there."""
+        yield from ()

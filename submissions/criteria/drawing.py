@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.places import Range, ordered
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Range
 
 
-class Drawing(CriterionBase):
+class Drawing(Criterion):
     """Figures of straight legs, drawn one after the other: ``figures`` of ``legs`` legs each, no more, no fewer.
 
     In each figure every leg has at least ``shortest`` mm, all are equal within ``equal_within`` (a share of
@@ -37,13 +37,6 @@ class Drawing(CriterionBase):
     sizes: tuple[Range, ...] = ()
     growing: bool = False
     pen: bool = True
-
-    @field_validator("sizes")
-    @classmethod
-    def _ordered(cls, value: tuple[Range, ...]) -> tuple[Range, ...]:
-        for size in value:
-            ordered(size)
-        return value
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -9,11 +9,11 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.places import Area
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Area, Zone
 
 
-class Finishes(CriterionBase):
+class Finishes(Criterion):
     """The program ends by itself, without a fault of its own, within ``seconds`` if given.
 
     A responder that raises or answers badly does not make the program fail; running out of time, CPU or
@@ -24,7 +24,7 @@ class Finishes(CriterionBase):
     seconds: float | None = Field(default=None, gt=0)
 
 
-class EndPose(CriterionBase):
+class EndPose(Criterion):
     """Where the robot is at the end: near a point, at a heading, in a zone; all that is given must hold.
 
     ``tolerance`` is in mm from (x, y), ``heading_tolerance`` in degrees, full turns ignored; ``zone`` is
@@ -38,7 +38,7 @@ class EndPose(CriterionBase):
     tolerance: float = Field(default=20.0, ge=0)
     heading: float | None = None
     heading_tolerance: float = Field(default=5.0, ge=0, le=180)
-    zone: tuple[float, float, float, float] | None = None
+    zone: Zone | None = None
     areas: tuple[Area, ...] = ()
 
     @model_validator(mode="after")
@@ -47,6 +47,4 @@ class EndPose(CriterionBase):
             raise ValueError("has one of x and y, expected both")
         if self.x is None and self.heading is None and self.zone is None and not self.areas:
             raise ValueError("asks for nothing, expected x and y, heading, zone or areas")
-        if self.zone is not None and not (self.zone[0] < self.zone[2] and self.zone[1] < self.zone[3]):
-            raise ValueError("has an empty zone, expected [left, bottom, right, top]")
         return self

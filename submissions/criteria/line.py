@@ -5,15 +5,16 @@ Only what is asked; a line is described as ``places.py`` has it.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
+from submissions.criteria.common import Criterion
 from submissions.criteria.places import LineToFollow, Part, Range
+from submissions.strict_table import Shape
 
 
-class Follows(CriterionBase):
+class Follows(Criterion):
     """The robot drives along a line, from where it first comes upon it.
 
     It is on the line while it is ``within`` mm of it; ``covers`` is the share of the line, from there to the
@@ -37,7 +38,7 @@ class Follows(CriterionBase):
         return self
 
 
-class Laps(CriterionBase):
+class Laps(Criterion):
     """Whole laps of a closed line, timed from crossing the start line to crossing it again.
 
     ``start_line`` is [x1, y1, x2, y2]. ``laps`` must be driven in the line's direction, each along at least
@@ -47,7 +48,7 @@ class Laps(CriterionBase):
 
     check: Literal["laps"]
     line: LineToFollow
-    start_line: tuple[float, float, float, float]
+    start_line: Annotated[tuple[float, float, float, float], Shape("[x1, y1, x2, y2]")]
     laps: int = Field(default=1, ge=1)
     within: float = Field(default=60.0, gt=0)
     progress: float = Field(default=0.995, gt=0, le=1)
@@ -59,6 +60,4 @@ class Laps(CriterionBase):
             raise ValueError("has a line with two ends, expected a closed one (closed = true)")
         if self.start_line[:2] == self.start_line[2:]:
             raise ValueError("has a start line without length, expected [x1, y1, x2, y2]")
-        if self.seconds is not None and self.seconds[0] > self.seconds[1]:
-            raise ValueError("has seconds with nothing in it, expected [least, most]")
         return self

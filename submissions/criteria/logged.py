@@ -10,13 +10,14 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Range
 
 #: What a series may be a log of.
 Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
 
 
-class Datalog(CriterionBase):
+class Datalog(Criterion):
     """A series of the datalog, by its name (``Light_left``), has what it should; all that is given must hold.
 
     ``at_least`` and ``at_most`` count its samples. ``plateaus`` are values that it must keep for
@@ -36,18 +37,14 @@ class Datalog(CriterionBase):
     plateaus: tuple[float, ...] = ()
     tolerance: float = Field(default=1.0, ge=0)
     plateau_samples: int = Field(default=2, ge=1)
-    between: tuple[float, float] | None = None
-    covers: tuple[float, float] | None = None
+    between: Range | None = None
+    covers: Range | None = None
     dips_below: str | None = Field(default=None, min_length=1)
     timed: bool = False
     measured: Instrument | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        for name in ("between", "covers"):
-            ends = getattr(self, name)
-            if ends is not None and ends[0] > ends[1]:
-                raise ValueError(f"has an empty range in {name}, expected [least, most]")
         if self.at_most is not None and self.at_most < self.at_least:
             raise ValueError("has an at_least above its at_most, expected at_least <= at_most")
         if any(abs(one - other) <= self.tolerance for one, other in pairwise(self.plateaus)):
@@ -55,7 +52,7 @@ class Datalog(CriterionBase):
         return self
 
 
-class ImageLog(CriterionBase):
+class ImageLog(Criterion):
     """The images that the program logs with ``image_data left``, ``right`` or ``both``.
 
     ``left`` and ``right`` are how many there must be of each sensor. ``at_start`` asks that each shows what

@@ -9,8 +9,8 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.places import Range, ordered
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Range
 from submissions.strict_table import StrictTable
 
 
@@ -29,11 +29,6 @@ class AskedMotion(StrictTable):
     turn: Range | None = None
     turn_size: Range | None = None
     seconds: Range | None = None
-
-    @field_validator("forward", "sideways", "distance", "turn", "turn_size", "seconds")
-    @classmethod
-    def _ordered(cls, value: Range | None) -> Range | None:
-        return ordered(value)
 
     @property
     def asks(self) -> bool:
@@ -55,7 +50,7 @@ class NamedMotion(AskedMotion):
         return self
 
 
-class Displacement(AskedMotion, CriterionBase):
+class Displacement(AskedMotion, Criterion):
     """What came of the whole run: where the end is, seen from the start.
 
     Beside what a move can be asked: ``left_wheel`` and ``right_wheel`` are [least, most] of the wheels'
@@ -68,11 +63,6 @@ class Displacement(AskedMotion, CriterionBase):
     right_wheel: Range | None = None
     agrees_with_wheels: float | None = Field(default=None, gt=0, le=1)
 
-    @field_validator("left_wheel", "right_wheel")
-    @classmethod
-    def _wheels_ordered(cls, value: Range | None) -> Range | None:
-        return ordered(value)
-
     @model_validator(mode="after")
     def _asks_something(self) -> Self:
         wheels = (self.left_wheel, self.right_wheel, self.agrees_with_wheels)
@@ -84,7 +74,7 @@ class Displacement(AskedMotion, CriterionBase):
         return self
 
 
-class Moves(CriterionBase):
+class Moves(Criterion):
     """The run move by move. A move ends where the robot stands still, or where driving straight and turning meet.
 
     ``moves`` lists what must be among them, in that order (``in_order = false``: in any order);
@@ -97,7 +87,7 @@ class Moves(CriterionBase):
     only: bool = False
 
 
-class Excursions(CriterionBase):
+class Excursions(Criterion):
     """Going out and coming back, along the direction in which the robot stood at the start.
 
     ``heights`` are how far it goes out each time, in proportion (``[1, 2, 1]``), within ``tolerance`` as a
@@ -119,7 +109,7 @@ class Excursions(CriterionBase):
         return value
 
 
-class Encounters(CriterionBase):
+class Encounters(Criterion):
     """What the robot does each time a light sensor sees something dark.
 
     An encounter is when the reading of ``light`` falls below ``below`` (reflected light, percent) on the floor. It is

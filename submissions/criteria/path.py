@@ -1,19 +1,19 @@
-"""Criteria about where the robot goes: through places, within areas, clear of them, round and near a point.
+"""Criteria about where the robot goes: through places, within areas, clear of them, touching nothing.
 
-Only what is asked; lines to follow and images to draw have their own modules.
+Lines to follow are ``line.py``'s, drawings ``drawing.py``'s, points to keep to or go round ``point.py``'s.
 """
 
 from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.places import Area, Part, Range, ordered
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Area, Part
 
 
-class Visits(CriterionBase):
+class Visits(Criterion):
     """The robot comes through every place, in the order of the list unless ``in_order = false``.
 
     ``at_least`` is how many of them are enough. With ``without_stopping`` it must not stand still (for more
@@ -34,7 +34,7 @@ class Visits(CriterionBase):
         return self
 
 
-class StaysInside(CriterionBase):
+class StaysInside(Criterion):
     """At all times ``of`` is in one of the areas.
 
     ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
@@ -46,7 +46,7 @@ class StaysInside(CriterionBase):
     drives: float = Field(default=0.0, ge=0)
 
 
-class KeepsOut(CriterionBase):
+class KeepsOut(Criterion):
     """At no time is ``of`` in any of the areas.
 
     ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
@@ -58,77 +58,8 @@ class KeepsOut(CriterionBase):
     drives: float = Field(default=0.0, ge=0)
 
 
-class TouchesNothing(CriterionBase):
+class TouchesNothing(Criterion):
     """The robot's body touches no wall and no obstacle; ``at_most`` touches are forgiven."""
 
     check: Literal["touches_nothing"]
     at_most: int = Field(default=0, ge=0)
-
-
-class Closest(CriterionBase):
-    """How near the path comes to the point (x, y): ``distance`` is [least, most] of the least distance, mm.
-
-    ``than_straight`` compares it with driving straight on from the start; ``first_turn`` asks for the
-    direction of the first turn of more than 2 degrees.
-    """
-
-    check: Literal["closest"]
-    x: float
-    y: float
-    distance: Range | None = None
-    than_straight: Literal["nearer", "farther"] | None = None
-    first_turn: Literal["towards", "away"] | None = None
-
-    @field_validator("distance")
-    @classmethod
-    def _ordered(cls, value: Range | None) -> Range | None:
-        return ordered(value)
-
-    @model_validator(mode="after")
-    def _asks_something(self) -> Self:
-        if self.distance is None and self.than_straight is None and self.first_turn is None:
-            raise ValueError("asks for nothing, expected one of distance, than_straight and first_turn")
-        return self
-
-
-class Circuits(CriterionBase):
-    """How often the path goes round the point (x, y): ``times`` is [least, most], parts of a round included.
-
-    ``direction`` is on the screen; ``clear_of`` is how far from the point it must always be, mm, so that spinning
-    beside it is no round. ``gyro`` is [least, most] of how much the gyro changes in each whole
-    round, degrees, without regard to the direction; ``corners`` is in how many about equal steps it does so.
-    """
-
-    check: Literal["circuits"]
-    x: float
-    y: float
-    times: Range
-    direction: Literal["either", "clockwise", "anticlockwise"] = "either"
-    of: Literal["robot", "pen"] = "robot"
-    clear_of: float = Field(default=0.0, ge=0)
-    gyro: Range | None = None
-    corners: int | None = Field(default=None, ge=1)
-
-    @field_validator("times", "gyro")
-    @classmethod
-    def _ordered(cls, value: Range | None) -> Range | None:
-        return ordered(value)
-
-    @model_validator(mode="after")
-    def _whole_round(self) -> Self:
-        if (self.gyro is not None or self.corners is not None) and self.times[0] < 1:
-            raise ValueError("looks at whole rounds with gyro or corners, expected times to begin at 1 or above")
-        return self
-
-
-class Spread(CriterionBase):
-    """An observation: how far from (x, y) the robot ended in each trial, and how much that varies.
-
-    The feedback gives least, mean and greatest distance for each level of motor noise. Without ``within``
-    nothing can be lost by it, so ``marks = 0`` fits; with it a trial passes that ends at most so many mm away.
-    """
-
-    check: Literal["spread"]
-    x: float
-    y: float
-    within: float | None = Field(default=None, gt=0)

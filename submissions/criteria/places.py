@@ -7,36 +7,45 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from sim.backgrounds.centrelines import centrelines
-from submissions.strict_table import StrictTable
+from submissions.strict_table import Shape, StrictTable
 
 #: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.
 Part = Literal["robot", "pen", "left_light", "right_light"]
 
-Point = tuple[float, float]
-#: Least and most; both belong to it.
-Range = tuple[float, float]
+Point = Annotated[tuple[float, float], Shape("[x, y]")]
 
 
-def ordered(value: Range | None) -> Range | None:
-    """Refuses a range that nothing is in."""
-    if value is not None and value[0] > value[1]:
+def _ordered(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] > value[1]:
         raise ValueError("is a range with nothing in it, expected [least, most]")
     return value
+
+
+def _with_room(zone: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    if not (zone[0] < zone[2] and zone[1] < zone[3]):
+        raise ValueError("is empty, expected [left, bottom, right, top]")
+    return zone
+
+
+#: Least and most; both belong to it, and something must.
+Range = Annotated[tuple[float, float], AfterValidator(_ordered), Shape("[least, most]")]
+#: mm; something must have room in it.
+Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), Shape("[left, bottom, right, top]")]
 
 
 class Area(StrictTable):
     """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback."""
 
     name: str = Field(default="", max_length=80)
-    rectangle: tuple[float, float, float, float] | None = None  # left, bottom, right, top
-    circle: tuple[float, float, float] | None = None  # x, y, radius
+    rectangle: Annotated[tuple[float, float, float, float], Shape("[left, bottom, right, top]")] | None = None
+    circle: Annotated[tuple[float, float, float], Shape("[x, y, radius]")] | None = None
     polygon: tuple[Point, ...] | None = None  # corners
-    bar: tuple[float, float, float, float, float] | None = None  # x and y of both ends, radius
+    bar: Annotated[tuple[float, float, float, float, float], Shape("[x1, y1, x2, y2, radius]")] | None = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -82,8 +91,10 @@ class LineToFollow(StrictTable):
 
     on: str | None = None
     points: tuple[Point, ...] | None = None
-    ellipse: tuple[float, float, float, float] | None = None
-    arc: tuple[float, float] = (0.0, 360.0)
+    ellipse: (
+        Annotated[tuple[float, float, float, float], Shape("[x, y, horizontal radius, vertical radius]")] | None
+    ) = None
+    arc: Annotated[tuple[float, float], Shape("[from, to]")] = (0.0, 360.0)
     closed: bool = False
     name: str = Field(default="the line", max_length=80)
 

@@ -5,18 +5,19 @@ Single texts and how often they come are asked in ``texts.py``.
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
-from submissions.criteria.parts import Zone, zone_with_room
+from submissions.criteria.common import Criterion, Misfit, NotBlank, Surroundings, TextOrTexts, Texts, one_or_many
+from submissions.criteria.places import Zone
 from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
 
 
-class Reports(CriterionBase):
+class Reports(Criterion):
     """Printed, said or answered figures and words are those that belong to the pose.
 
     ``expected`` has a list for each pose of the scenario, or a single one for all poses; each entry, a number
@@ -32,7 +33,7 @@ class Reports(CriterionBase):
     source: Literal["print", "speech", "either", "reply"] = "either"
     expected: Literal["label"] | tuple[tuple[float | str, ...], ...]
     tolerance: float = Field(default=0.5, ge=0)
-    among: Texts = ()
+    among: Annotated[Texts, NotBlank] = ()
     only: bool = False
 
     @field_validator("expected", mode="plain")
@@ -45,6 +46,17 @@ class Reports(CriterionBase):
             return tuple(tuple(row) for row in rows)
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
 
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        if self.expected == "label" or len(self.expected) == 1:
+            return
+        for scenario in around.looked_at_by(self):
+            if len(self.expected) != len(scenario.poses):
+                yield Misfit(
+                    "expected",
+                    f"expected has {len(self.expected)} lists for the {len(scenario.poses)} poses of scenario "
+                    f'"{scenario.id}", expected one list for each pose, or one for all',
+                )
+
     @field_serializer("expected")
     def _plain_rows(
         self, value: Literal["label"] | tuple[tuple[float | str, ...], ...]
@@ -52,13 +64,8 @@ class Reports(CriterionBase):
         # Pydantic's own takes neither the whole numbers nor the nesting.
         return value if isinstance(value, str) else [list(row) for row in value]
 
-    @field_validator("among")
-    @classmethod
-    def _words(cls, value: Texts) -> Texts:
-        return not_blank(value)
 
-
-class Sequence(CriterionBase):
+class WordSequence(Criterion):
     """Words come one after the other, however they are spread over what is said or printed.
 
     ``words`` are compared without regard to case and punctuation; one in a list of its own may be any of that
@@ -97,21 +104,11 @@ class Sequence(CriterionBase):
 class EventAt(StrictTable):
     """A text, and the zone that the sensor must be in when it comes."""
 
-    text: Texts = Field(min_length=1)  # any of these
+    text: TextOrTexts = Field(min_length=1)  # any of these
     zone: Zone
 
-    @field_validator("text", mode="before")
-    @classmethod
-    def _texts(cls, value: object) -> object:
-        return one_or_many(value)
 
-    @field_validator("zone")
-    @classmethod
-    def _room(cls, value: Zone) -> Zone:
-        return zone_with_room(value)
-
-
-class Events(CriterionBase):
+class Events(Criterion):
     """Each text is said or printed, in this order, while the sensor is where it belongs.
 
     ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``; a text is found anywhere in

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
-from submissions.criteria.parts import Zone, zone_with_room
+from submissions.criteria.common import Criterion
+from submissions.criteria.places import Range, Zone
 
 
-class StopOn(CriterionBase):
+class StopOn(Criterion):
     """The robot stops by itself with a light sensor on the right thing; all that is given must hold.
 
     ``reflected`` is [least, most] in percent, what ``reflected_light_intensity_pc`` reads; ``rgb`` is a
@@ -27,7 +27,7 @@ class StopOn(CriterionBase):
 
     check: Literal["stop_on"]
     sensor: Literal["left", "right", "either"] = "left"
-    reflected: tuple[float, float] | None = None
+    reflected: Range | None = None
     rgb: tuple[float, float, float] | None = None
     rgb_tolerance: float = Field(default=10.0, ge=0)
     zone: Zone | None = None
@@ -36,15 +36,8 @@ class StopOn(CriterionBase):
     still: float = Field(default=0.0, ge=0)
     off_floor: bool = False
 
-    @field_validator("zone")
-    @classmethod
-    def _room(cls, value: Zone | None) -> Zone | None:
-        return None if value is None else zone_with_room(value)
-
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.reflected is None and self.rgb is None and self.zone is None and self.near is None:
             raise ValueError("asks for nothing, expected reflected, rgb, zone or near")
-        if self.reflected is not None and self.reflected[0] > self.reflected[1]:
-            raise ValueError("has an empty range in reflected, expected [least, most]")
         return self

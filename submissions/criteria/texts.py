@@ -1,36 +1,26 @@
-"""Criteria about what is printed, said, sent and answered.
+"""Criteria about what is printed, said and sent.
 
-Only what is asked; judging texts is the service's.
+What the responder answers is asked in ``replies.py``.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.common import CriterionBase, Texts, not_blank, one_or_many
+from submissions.criteria.common import Criterion, NotBlank, SomeTextOrTexts, SomeTexts
 from submissions.criteria.expressions import usable
 
 
-class _TextConditions(CriterionBase):
+class TextConditions(Criterion):
     """Which texts count. A text counts if every condition that is given holds for it."""
 
-    equals: Texts = ()  # the text is one of these
-    starts_with: Texts = ()  # begins with one of these
-    contains: Texts = ()  # has all of these in it
+    equals: SomeTextOrTexts = ()  # the text is one of these
+    starts_with: Annotated[SomeTextOrTexts, NotBlank] = ()  # begins with one of these
+    contains: Annotated[SomeTextOrTexts, NotBlank] = ()  # has all of these in it
     matches: str | None = None  # a regular expression that RE2 takes, found anywhere in the text
     ignore_case: bool = False
-
-    @field_validator("equals", "starts_with", "contains", mode="before")
-    @classmethod
-    def _lists(cls, value: object) -> object:
-        return one_or_many(value)
-
-    @field_validator("starts_with", "contains")
-    @classmethod
-    def _something(cls, value: Texts) -> Texts:
-        return not_blank(value)
 
     @field_validator("matches")
     @classmethod
@@ -42,7 +32,7 @@ class _TextConditions(CriterionBase):
         return bool(self.equals or self.starts_with or self.contains or self.matches is not None)
 
 
-class _TextSequence(_TextConditions):
+class TextSequence(TextConditions):
     """How many texts must count, and in which order.
 
     Without a count at least one must; with ``in_order`` the listed texts must come in that order among
@@ -51,7 +41,7 @@ class _TextSequence(_TextConditions):
     """
 
     last: bool = False
-    in_order: Texts = ()
+    in_order: SomeTexts = ()
     only: bool = False
     compare: Literal["equals", "contains", "starts_with", "matches"] = "equals"
     at_least: int | None = Field(default=None, ge=0)
@@ -95,19 +85,19 @@ class _TextSequence(_TextConditions):
         return False
 
 
-class Prints(_TextSequence):
+class Prints(TextSequence):
     """What the program prints, one text a print call."""
 
     check: Literal["prints"]
 
 
-class Says(_TextSequence):
+class Says(TextSequence):
     """What the robot says."""
 
     check: Literal["says"]
 
 
-class Messages(_TextSequence):
+class Messages(TextSequence):
     """What the robot sends to the responder: texts like ``PY::0``; an image is the text ``IMG_DATA::...``.
 
     With ``json = true`` it is, instead, the robot's queue that is looked at: every answer that began with
@@ -121,6 +111,10 @@ class Messages(_TextSequence):
     path: str | None = Field(default=None, min_length=1)
     queue_grows: bool = False
 
+    @property
+    def asks_responder(self) -> bool:
+        return self.json_queue or self.queue_grows
+
     @model_validator(mode="after")
     def _path_needs_json(self) -> Self:
         if self.path is not None and not self.json_queue:
@@ -129,38 +123,3 @@ class Messages(_TextSequence):
 
     def _asks_more(self) -> bool:
         return self.queue_grows
-
-
-class Replies(_TextConditions):
-    """What the responder answers, arrived in time or not.
-
-    ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.
-    Otherwise every message of the robot's that reached the responder must have an answer that meets the
-    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down
-    which messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the conditions,
-    ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the whole answer.
-    """
-
-    check: Literal["replies"]
-    to: Texts = ()
-    to_starts_with: Texts = ()
-    expect: dict[str, Any] = Field(default_factory=dict)
-    at_least: int = Field(default=1, ge=0)
-    is_json: bool = False
-    path: str | None = Field(default=None, min_length=1)
-    value: Any = None
-
-    @field_validator("to", "to_starts_with", mode="before")
-    @classmethod
-    def _to_lists(cls, value: object) -> object:
-        return one_or_many(value)
-
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
-        if self.value is not None and self.path is None:
-            raise ValueError('has value without path, expected path = "message" or the like beside it')
-        if self.expect and (self.to or self.to_starts_with or self.has_conditions or self.value is not None):
-            raise ValueError("has expect beside other conditions, expected expect alone (with path and ignore_case)")
-        if self.path is None and any(not isinstance(answer, str) for answer in self.expect.values()):
-            raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
-        return self

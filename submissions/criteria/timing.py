@@ -5,15 +5,18 @@ Whether a program ends at all is asked in ``ending.py``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import CriterionBase
+from submissions.criteria.common import Criterion, Misfit, Surroundings
+from submissions.criteria.places import Range
+from submissions.strict_table import Shape
 
 
-class Timing(CriterionBase):
+class Timing(Criterion):
     """How long it took, in seconds of simulated time: from ``between[0]`` to ``between[1]``.
 
     ``of = "program"`` is from the start to the program's end, ``"moving"`` the time in which the robot moved or
@@ -22,16 +25,10 @@ class Timing(CriterionBase):
 
     check: Literal["timing"]
     of: Literal["program", "moving", "speech"] = "program"
-    between: tuple[float, float]
-
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
-        if self.between[0] > self.between[1]:
-            raise ValueError("has an empty range in between, expected [least, most]")
-        return self
+    between: Range
 
 
-class Ranking(CriterionBase):
+class Ranking(Criterion):
     """A figure that another criterion measures is worth marks by steps: the fastest lap gets all of them.
 
     ``of`` is the id of that criterion and ``measure`` the name of its figure, as reports show it. ``steps``
@@ -42,9 +39,18 @@ class Ranking(CriterionBase):
     check: Literal["ranking"]
     of: str = Field(min_length=1, max_length=80)
     measure: str = Field(min_length=1, max_length=60)
-    steps: tuple[tuple[float, float], ...] = Field(min_length=1)
+    steps: tuple[Annotated[tuple[float, float], Shape("[figure, share]")], ...] = Field(min_length=1)
     highest: bool = False
     over: Literal["share", "all", "mean", "median", "worst"] = "mean"
+
+    @property
+    def result_needed(self) -> str:
+        return self.of
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        # What is itself judged after another is judged too late to be ranked.
+        if self.of not in {each.id for each in around.criteria if each.result_needed is None}:
+            yield Misfit("of", f'of is "{self.of[:60]}", expected the id of another criterion')
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

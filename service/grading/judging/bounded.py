@@ -22,12 +22,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from service.grading.grade import CriterionResult, TrialResult
+from service.grading.judging.case import Case, StaticAnalysis
 from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
-from service.grading.static_analysis import StaticAnalysis
 from sim.errors import HostError, RobomarkError
 from sim.recording import Image
 from submissions.assignment import Assignment
-from submissions.criteria import Criterion, Ranking
+from submissions.criteria import Criterion
 
 #: Characters that programs and responders wrote in all trials; to fork a worker costs as much as judging so many.
 _LITTLE = 100_000
@@ -75,15 +75,16 @@ def judge_within(
     refuse_spoilt(trials)
     left = in_turn(assignment)
     results: dict[str, CriterionResult] = {}
+    case = Case(assignment, trials, analysis, results)
     if _written(trials) <= _LITTLE and threading.current_thread() is threading.main_thread():
         # Whatever is wrong here is found out in a process.
         with suppress(Exception, _Late), _guarded():
             while left:
-                results[left[0].id] = judge_one(left[0], assignment, trials, analysis, results)
+                results[left[0].id] = judge_one(left[0], case)
                 del left[0]
     killed_at = ""
     while left:
-        judging = _Judging(bounds, assignment, trials, analysis, results)
+        judging = _Judging(bounds, case, results)
         frames, status = _in_a_process(lambda: judging.frames(left), heartbeat)  # noqa: B023 - called at once
         for frame in frames:
             result: CriterionResult = _Unpickler(io.BytesIO(frame), trials).load()
@@ -141,10 +142,8 @@ class _Judging:
     """What the process knows, from before it was forked."""
 
     bounds: Bounds
-    assignment: Assignment
-    trials: tuple[TrialResult, ...]
-    analysis: StaticAnalysis
-    results: dict[str, CriterionResult]
+    case: Case
+    results: dict[str, CriterionResult]  # those of the case, to add to
 
     def frames(self, criteria: Sequence[Criterion]) -> Iterator[bytes]:
         """The result of each of the criteria."""
@@ -152,14 +151,14 @@ class _Judging:
         for criterion in criteria:
             _set_timers(self.bounds.cpu_seconds, self.bounds.seconds)
             result = self.results[criterion.id] = self._judged(criterion)
-            yield _pickled(result, self.trials)
+            yield _pickled(result, self.case.trials)
 
     def _judged(self, criterion: Criterion) -> CriterionResult:
-        of = self.results.get(criterion.of) if isinstance(criterion, Ranking) else None
+        of = self.results.get(criterion.result_needed or "")
         if of is not None and of.unjudged:
             return _unjudged(criterion, f"{of.id}, which it ranks, could not be judged")
         try:
-            return judge_one(criterion, self.assignment, self.trials, self.analysis, self.results)
+            return judge_one(criterion, self.case)
         except MemoryError:
             return _unjudged(criterion, f"it took more than {self.bounds.memory_bytes >> 20} MB of memory")
         except RobomarkError as error:

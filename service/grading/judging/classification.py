@@ -1,220 +1,42 @@
-"""Judging how often the images that the robot sent were named rightly: accuracy, confusion, and every image.
+"""Judging how often images are named rightly: what the accuracy is worth.
 
-It compares words only; what an image shows is found in ``truths.py``, what became of it in ``tally.py``.
+What each image was taken for is found in ``recognition.py``.
 """
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_left, bisect_right
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from statistics import fmean
+from fractions import Fraction
 
-from models.intervals import wilson
-from service.grading.grade import Accuracy, Confidence, Counts, Evidence, Prediction, TrialResult
-from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
-from service.grading.judging.labels import LabelFinder
-from service.grading.judging.outcome import quoted
-from service.grading.judging.patterns import Side, by_pattern
-from service.grading.judging.samples import Sample
-from service.grading.judging.tally import Reply, ReplyStatus, reply_to
-from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
-from sim.recording import Image, Line, Recording
-from submissions.assignment import Assignment
-from submissions.criteria.classification import Recognition
-
-#: An image taken so near to an earlier one, mm, shows the same again.
-_SAME_PLACE = 1.0
+from service.grading.grade import CriterionResult
+from service.grading.judging.case import Case, Indexed
+from service.grading.judging.judges import judges_case
+from service.grading.judging.marks import share_of_accuracy, share_of_steps
+from service.grading.judging.recognition import Classified, classify, pooled, recognised
+from service.grading.judging.sweeps import curves_of
+from submissions.criteria.classification import Classification
 
 
-@dataclass(frozen=True, slots=True)
-class Classified:
-    """What a recognition criterion found in its trials: each image or, where it says so, each pattern."""
+@judges_case(Classification)
+def judge_classification(criterion: Classification, case: Case) -> CriterionResult:
+    def judged(trials: Indexed) -> CriterionResult:
+        found = classify(criterion, case.assignment, trials)
+        share = _share(criterion, found)
+        words = _what_marks_need(criterion) if share < 1 else ""
+        return recognised(criterion, found, share, words, curves_of(found.samples, dict(trials)), dict(trials))
 
-    samples: tuple[Sample, ...]
-    accuracy: Accuracy
-    predictions: tuple[Prediction, ...]
-    evidence: tuple[Evidence, ...]
-
-
-def classify(criterion: Recognition, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]) -> Classified:
-    """Every image of ``trials`` (with their indices in the grade) that counts, pooled."""
-    shown = shown_in(criterion, trials)
-    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
-    labels = nameable(criterion, assignment, truths)
-    finder = LabelFinder(labels, criterion.aliases)
-    images: list[Sample] = []
-    samples: list[Sample] = []
-    statuses: Counter[ReplyStatus] = Counter()
-    duplicates = 0
-    for index, trial in trials:
-        recording = trial.recording
-        replies = _replies(criterion, recording)
-        statuses.update(reply.status for reply in replies)
-        duplicates += sum(reply.duplicates for reply in replies)
-        own = []
-        for number, truth in shown[index]:
-            answer, words, confidence = _answer(criterion, replies[number], finder)
-            image = recording.images[number]
-            own.append(Sample(index, image, finder.canonical(truth), answer, words, confidence))
-        images += own
-        samples += _that_count(criterion, index, trial, own, finder)
-    by_index = dict(trials)
-    of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
-    for sample in samples:
-        of_trial[sample.trial].append(sample)
-    predictions = tuple(
-        Prediction(sample.image, sample.truth, sample.answer, by_index[sample.trial].scenario, sample.trial)
-        for sample in images
-        if sample.image is not None
-    )
-    missing = sum(sample.image is None for sample in samples)
-    counts = Counts(
-        sum(statuses.values()),
-        statuses["answered"],
-        statuses["late"],
-        statuses["malformed"],
-        statuses["unanswered"],
-        duplicates,
-        len(samples) - missing,
-        missing,
-        "images" if criterion.each_pattern is None else "patterns",
-    )
-    return Classified(
-        tuple(samples),
-        _accuracy(samples, labels, counts),
-        predictions,
-        tuple(_evidence(index, own) for index, own in of_trial.items()),
-    )
+    return pooled(case.looked_at_by(criterion), judged)
 
 
-def told(sample: Sample) -> str:
-    """A sentence on one image."""
-    if sample.image is None:
-        if sample.truth == NO_IMAGE:
-            return f"Expected an image (IMG_DATA), but {sample.words}."
-        return f"Expected {quoted(sample.truth)}, but {sample.words}."
-    if sample.right:
-        return f"The image showed {quoted(sample.truth)} and was named so."
-    return f"The image showed {quoted(sample.truth)}, but {sample.words}."
+def _share(criterion: Classification, found: Classified) -> Fraction:
+    right, count = found.right, found.accuracy.n
+    if criterion.steps:
+        return share_of_steps(right, count, criterion.steps, criterion.marks)
+    return share_of_accuracy(right, count, criterion.at_least, criterion.over)
 
 
-def _that_count(
-    criterion: Recognition,
-    index: int,
-    trial: TrialResult,
-    own: list[Sample],
-    finder: LabelFinder,
-) -> Sequence[Sample]:
-    """A trial's images, or its patterns; where there are none, or too few, wrong answers in their place."""
-    if criterion.each_pattern is None:
-        counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
-    else:
-        # What a grey patch tells lies under the right sensor.
-        side: Side = "right" if criterion.truth == "grey" else "left"
-        apart = max(30.0, 2 * criterion.within)
-        counted = by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
-    if counted and len(counted) >= criterion.patterns:
-        return counted
-    if not counted and criterion.patterns <= 1:
-        truth = missing_truth(criterion, trial)
-        sent = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
-        if criterion.near_start is not None and trial.recording.images:
-            sent += f" from within {criterion.near_start:g} mm of where it started"
-        return [Sample(index, None, finder.canonical(truth), None, sent)]
-    words = f"the robot sent images of {len(counted)} patterns, and {criterion.patterns} were expected"
-    lacking = Sample(index, None, NO_IMAGE, None, words)
-    return [*counted, *[lacking] * (criterion.patterns - len(counted))]
-
-
-def _accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
-    right = sum(sample.right for sample in samples)
-    count = len(samples)
-    low, high = wilson(right, count)
-    cells = Counter((sample.truth, sample.answer) for sample in samples)
-    confusion = tuple(
-        (truth, answer, number)
-        for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
-    )
-    known = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
-    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(samples))
-
-
-def _confidence(samples: Sequence[Sample]) -> Confidence | None:
-    """How sure the answers were that were right, and those that were wrong; None if no answer said."""
-    right = [sample.confidence for sample in samples if sample.right and sample.confidence is not None]
-    wrong = [sample.confidence for sample in samples if not sample.right and sample.confidence is not None]
-    if not right and not wrong:
-        return None
-    return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
-
-
-def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
-    """The first image of the trial that was named wrongly, else its last."""
-    shown = next((sample for sample in own if not sample.right), own[-1])
-    image = shown.image
-    return Evidence(
-        trial=index,
-        passed=all(sample.right for sample in own),
-        message=told(shown),
-        t=image.t if image else None,
-        pose=image.pose if image else None,
-    )
-
-
-def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
-    """What came back to every image of the recording, whether it counts or not."""
-    if criterion.answer_from == "reply":
-        answers = Answers(recording)
-        return [reply_to(recording, answers, number) for number in range(len(recording.images))]
-    said = "said" if criterion.answer_from == "speech" else "printed"
-    replies = []
-    for image in recording.images:
-        heard = _between(recording, image, criterion.answer_from == "speech")
-        text = " | ".join(line.text for line in heard)
-        silent = Reply("unanswered", None, f"the robot {said} nothing after it")
-        replies.append(Reply("answered", text, "") if heard else silent)
-    return replies
-
-
-def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
-    """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
-    if reply.text is None:
-        return None, reply.words, None
-    if reply.status == "late" and criterion.late == "wrong":
-        return None, f"the answer came too late: {quoted(reply.text)}", None
-    text, confidence = reply.text, None
-    if criterion.answer_from == "reply":
-        value = parsed(text)
-        if criterion.confidence is not None:
-            confidence = _probability(at_path(value, criterion.confidence))
-        if criterion.answer is not None:
-            picked = at_path(value, criterion.answer)
-            text = text if picked is NOTHING else as_text(picked)
-    found = finder.labels_in(text)
-    if not found:
-        return None, f"the answer names no label: {quoted(text)}", confidence
-    if len(found) > 1:
-        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
-    return found[0], f"it was taken for {quoted(found[0])}", confidence
-
-
-def _probability(value: object) -> float | None:
-    """A number from 0 to 1, as JSON has it; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
-        return None
-    return float(value)
-
-
-def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
-    """What the robot said or printed after this image and before the next."""
-    following = bisect_right(recording.images, image.message, key=lambda other: other.message)
-    end = recording.images[following].t if following < len(recording.images) else math.inf
-    lines = recording.spoken if speech else recording.printed
-    return lines[bisect_left(lines, image.t, key=_time) : bisect_left(lines, end, key=_time)]
-
-
-def _time(line: Line) -> float:
-    return line.t
+def _what_marks_need(criterion: Classification) -> str:
+    if criterion.at_least is not None:
+        return f" All marks are given from {criterion.at_least:g} on."
+    if criterion.steps:
+        return " Marks: " + ", ".join(f"{marks:g} from {accuracy:g} on" for accuracy, marks in criterion.steps) + "."
+    return ""

@@ -12,10 +12,13 @@ from fractions import Fraction
 from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import footprint_at, part_at
+from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import decoded
-from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
-from service.grading.judging.places import footprint_at, part_at
-from sim.backgrounds import floor, label_names, names
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import quoted
+from sim.backgrounds import label_names
+from sim.recorded import floor_of, pose_after, seconds_at
 from sim.recording import Image, Recording
 from submissions.criteria.collecting import Collects
 
@@ -36,6 +39,7 @@ class Pair:
         return self.truth if self.truth is not None and self.truth == self.decoded else None
 
 
+@judges(Collects)
 def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     recording = trial.recording
     found = pairs(recording, criterion.source, trial.light_noise)
@@ -93,10 +97,10 @@ def _logged(recording: Recording) -> Iterator[Image]:
     log = recording.image_log
     for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
         if side == "left":
-            t = tick / 30
+            t = seconds_at(tick)
             pixels = _bytes(left)
             beside = _bytes(right) if other == "right" else b""
-            yield Image(t, tick, pose_at(recording, t), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))
+            yield Image(t, tick, pose_after(recording, tick), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))
 
 
 def _bytes(csv: str) -> bytes:
@@ -105,10 +109,10 @@ def _bytes(csv: str) -> bytes:
 
 def _truth(recording: Recording, image: Image) -> str | None:
     """What the floor has under the left sensor where the image was taken."""
-    if image.truth is not None or image.message >= 0 or recording.background not in names():
+    if image.truth is not None or image.message >= 0:
         return image.truth
-    ground = floor(recording.background, labels=recording.label_patches, seed=recording.sheet)
-    return ground.label_at(*part_at(recording, "left", image.pose))
+    floor = floor_of(recording)
+    return floor.label_at(*part_at(recording, "left", image.pose)) if floor else None
 
 
 def _checks(

@@ -14,9 +14,10 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import pen_down, place_at, positions, stretches, travel
+from service.grading.judging.judges import judges
 from service.grading.judging.moves import straight
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.whereabouts import pen_down, place_at, positions, stretches, travel
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 
@@ -69,6 +70,7 @@ def between(before: float, after: float) -> float:
     return (after - before + 180) % 360 - 180
 
 
+@judges(Drawing)
 def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     """Every figure in turn; the score is the share of the figures that are right."""
     recording = trial.recording

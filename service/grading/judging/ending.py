@@ -10,12 +10,15 @@ import math
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.areas import distance_to
-from service.grading.judging.outcome import Outcome, cut, failed, fault_words, passed
+from service.grading.judging.geometry import distance_to
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, cut, failed, passed
+from service.grading.judging.words import fault_words
 from sim.recording import Fault, Recording, Verdict
-from submissions.criteria import EndPose, Finishes
+from submissions.criteria.ending import EndPose, Finishes
 
 
+@judges(Finishes)
 def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = cut(recording)
@@ -45,6 +48,7 @@ def _ended(fault: Fault) -> str:
     return f"after {fault.t:.2f} s: {fault_words(fault)}"
 
 
+@judges(EndPose)
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     """Distances in mm, angles in degrees without regard to full turns; the edges of a zone belong to it."""
     end, t = trial.recording.end, trial.recording.end_t

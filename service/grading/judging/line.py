@@ -1,6 +1,6 @@
 """Judging how well a line was followed, and how fast a circuit was driven.
 
-Where the path was along the line is worked out in ``courses.py``.
+Where the path was along the line is worked out in ``geometry.py``.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.courses import Along, along, covered
+from service.grading.judging.geometry import Along, along, covered, place_at, positions
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.path import PART_NAMES
-from service.grading.judging.whereabouts import place_at, positions
+from sim.recorded import seconds_at
 from sim.recording import Floats
 from submissions.criteria.line import Follows, Laps
 
 
+@judges(Follows)
 def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
     """The part of the line that counts begins where it is first come upon; of a closed line all counts."""
     recording = trial.recording
@@ -41,7 +43,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
         Measure("share covered", share),
         Measure("farthest off", float(offsets[farthest]), "mm"),
         Measure("mean off", float(offsets.mean()), "mm"),
-        Measure("seconds to the end", (found.first + on_it - 1) / 30, "s"),
+        Measure("seconds to the end", seconds_at(found.first + on_it - 1), "s"),
         Measure("share on one side", one_side),
     )
     score = Fraction(min(share / criterion.covers, 1.0)).limit_denominator(1000)
@@ -85,6 +87,7 @@ class _Crossing:
     progress: float
 
 
+@judges(Laps)
 def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
     """A lap is from one crossing of the start line to a later one; the path between two ticks is straight."""
     recording = trial.recording
@@ -160,7 +163,7 @@ def _crossings(criterion: Laps, points: Floats, found: Along) -> list[_Crossing]
         where = place[row - 1] + share * (place[row] - place[row - 1])
         before, after = found.progress[row - 1 - found.first], found.progress[row - found.first]
         if 0 <= where <= 1 and after > before:
-            crossings.append(_Crossing((row - 1 + share) / 30, row, float(before + share * (after - before))))
+            crossings.append(_Crossing(seconds_at(row - 1 + share), row, float(before + share * (after - before))))
     return crossings
 
 

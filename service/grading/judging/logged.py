@@ -1,6 +1,6 @@
 """Judging what a program logs: series of the datalog, and images.
 
-Images are the simulator's own records; values are what the program printed, and ``measured.py`` tells which were read.
+Images and readings are the simulator's own records; values are what the program printed, which may be any number.
 """
 
 from __future__ import annotations
@@ -10,23 +10,24 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import Side, floor_share, footprint_at, light_of
+from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
-from service.grading.judging.measured import measured_only
-from service.grading.judging.outcome import Outcome, failed, passed, pose_at
-from service.grading.judging.places import floor_share
-from sim.backgrounds import floor, names
+from service.grading.judging.outcome import Outcome, failed, passed
+from sim.backgrounds import Floor
 from sim.camera import HEIGHT, WIDTH, sensor_mask
-from sim.recording import Datum, Image, Pose, Recording
-from sim.robot import ROBOTS, LightSensor, robot
-from sim.sensors import footprint
-from sim.trigonometry import sincos
-from submissions.criteria.logged import Datalog, ImageLog
+from sim.recorded import TICKS_PER_SECOND, floor_of, pose_after, pose_at, seconds_at, ticks_until
+from sim.recording import Datum, Image, Recording
+from sim.sensors import Footprint
+from submissions.criteria.logged import Datalog, ImageLog, Instrument
 
 Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
 
 
+@judges(Datalog)
 def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     name = criterion.series
@@ -59,6 +60,7 @@ def _there(count: int) -> str:
     return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
 
 
+@judges(ImageLog)
 def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     log = recording.image_log
@@ -96,7 +98,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     wrong = next((words for holds, words in checks if not holds), None)
     if wrong is None:
         return passed(f"The program logged {len(log)} images as expected.", measures=measures)
-    last = log[-1][2] / 30 if log else None
+    last = seconds_at(log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
     held = Fraction(sum(holds for holds, _ in checks), len(checks))
     return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
@@ -165,13 +167,14 @@ def _plateaus_in_order(criterion: Datalog, values: Sequence[float]) -> int:
 
 def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float) -> bool:
     """Whether a logged image is the floor's own crop at the start pose, up to the noise on the light sensors."""
-    if recording.background not in names():
-        pose = pose_at(recording, entry[2] / 30)
+    floor = floor_of(recording)
+    if floor is None:
+        pose = pose_after(recording, entry[2])
         return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y)) < 1
     side, csv, _ = entry
-    bolted = robot(recording.robot if recording.robot in ROBOTS else "Default_Robot")
-    sensor = bolted.left_light if side == "left" else bolted.right_light
-    expected = _crop(recording, sensor, recording.start)
+    which: Side = "left" if side == "left" else "right"
+    sensor = light_of(recording, which)
+    expected = _crop(floor, footprint_at(recording, which, recording.start), sensor.diameter)
     found = _pixels(csv, sensor.diameter)
     if found is None:
         return False
@@ -179,18 +182,14 @@ def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float
     return bool((np.abs(found[mask] - expected[mask]) <= noise).all())
 
 
-def _crop(recording: Recording, sensor: LightSensor, pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """RGB under the sensor, shape (diameter, diameter, 3), black off the floor."""
-    drawn = floor(recording.background, labels=recording.label_patches, seed=recording.sheet).pixels
-    sine, cosine = sincos(math.radians(pose.heading) - math.pi / 2)
-    where = footprint(sensor, pose.x, pose.y, sine, cosine)
-    side = sensor.diameter
+def _crop(floor: Floor, where: Footprint, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """RGB under a sensor of that many pixels, shape (side, side, 3), black off the floor."""
     crop = np.zeros((side, side, 3), np.int64)
     top, left = max(where.row, 0), max(where.column, 0)
     bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
     if top < bottom and left < right:
         place = (slice(top - where.row, bottom - where.row), slice(left - where.column, right - where.column))
-        crop[place] = drawn[top:bottom, left:right]
+        crop[place] = floor.pixels[top:bottom, left:right]
     return crop
 
 
@@ -208,7 +207,7 @@ def _is_uniform(csv: str) -> bool:
 def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
     """Whether there was floor under the sensor and, where the floor has label patches, one that fills its image."""
     side, csv, tick = entry
-    pose = pose_at(recording, tick / 30)
+    pose = pose_after(recording, tick)
     if floor_share(recording, "left" if side == "left" else "right", pose) < 1:
         return False
     if side == "left" or recording.background not in GREYS or not recording.label_patches:
@@ -221,5 +220,55 @@ def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
 
 
 def _where(recording: Recording, tick: int) -> str:
-    pose = pose_at(recording, tick / 30)
+    pose = pose_after(recording, tick)
     return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
+
+
+#: How old a reading may be when it is printed, seconds.
+_AGE = 0.5
+#: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
+_ROUNDED = 1.0
+#: What a reading of a sensor takes, seconds; what is printed sooner after another sample repeats it.
+_READING = 0.01
+
+
+def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: Recording) -> list[Datum]:
+    """The samples that the instrument read in the half second before they were printed, in any unit of the brick's.
+
+    Of those that were printed in less time than a reading takes only the first counts.
+
+    Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
+    of turning degrees. Nothing has been read before the first tick.
+    """
+    readings = _readings(instrument, recording)
+    if not len(readings):
+        return []
+    found: list[Datum] = []
+    for datum in samples:
+        if _was_read(datum, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
+            found.append(datum)
+    return found
+
+
+def _was_read(datum: Datum, readings: NDArray[np.float64]) -> bool:
+    last = min(max(ticks_until(datum.t), 1), len(readings))
+    first = min(max(int((datum.t - _AGE) * TICKS_PER_SECOND), 1), last)
+    return bool((np.abs(readings[first - 1 : last] - datum.value) <= _ROUNDED).any())
+
+
+def _readings(instrument: Instrument, recording: Recording) -> NDArray[np.float64]:
+    """One row a tick, one column for each unit in which it may be printed."""
+    ticks = recording.ticks
+    match instrument:
+        case "left light" | "right light":
+            rgb = ticks.left_rgb if instrument == "left light" else ticks.right_rgb
+            together = rgb.sum(axis=1)
+            return np.column_stack([rgb, rgb / 2.55, together / 3, together / 7.65])
+        case "ultrasonic":
+            return np.column_stack([ticks.ultrasonic, ticks.ultrasonic / 10, ticks.ultrasonic / 25.4])
+        case "gyro":
+            return ticks.gyro[:, None]
+        case "left wheel":
+            return np.column_stack([ticks.left_position, ticks.left_position / 360])
+        case "right wheel":
+            return np.column_stack([ticks.right_position, ticks.right_position / 360])

@@ -1,6 +1,6 @@
 """From the outcomes of the trials to marks: exact fractions until the one rounding at the end.
 
-It knows nothing of what was asked; judging is done in the modules of the kinds.
+It knows nothing of what was asked; judging is done in the modules of the families.
 """
 
 from __future__ import annotations

@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import place_at, positions, standing, stretches, times, travel
+from service.grading.judging.judges import judges
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.whereabouts import place_at, positions, robot_of, standing, stretches, times, travel
 from sim.camera import HEIGHT, WIDTH
+from sim.recorded import TICKS_PER_SECOND, robot_of
 from sim.recording import Floats, Recording
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
@@ -26,6 +28,7 @@ _NOTICEABLE = 5.0
 _REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
 
 
+@judges(Displacement)
 def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     """From the start to the end; the wheels' positions are those that the program would read at the end."""
     recording = trial.recording
@@ -65,6 +68,7 @@ def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     return passed(f"From start to end the robot {whole}.", t, end, measures)
 
 
+@judges(Moves)
 def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     """Each move that is asked for is looked for among those that were made."""
     recording = trial.recording
@@ -93,6 +97,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     return passed(f"The robot moved as asked: it {told}.", *place_at(recording, made[-1].last), measures)
 
 
+@judges(Excursions)
 def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     """Peaks of the way along the start's heading, and how near the start the robot came after each."""
     recording = trial.recording
@@ -154,6 +159,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     )
 
 
+@judges(Encounters)
 def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     """Each fall of the reading below the threshold, and what the robot did in the seconds after it."""
     recording = trial.recording
@@ -334,7 +340,7 @@ def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> 
     """Those of the falls after which all that was asked came in order, and in time."""
     ahead, turned = travel(recording)
     motion = _Motion(-np.minimum(ahead, 0), turned, standing(recording))
-    ends = np.searchsorted(times(recording), np.array(falls) / 30 + criterion.seconds, side="right") - 1
+    ends = np.searchsorted(times(recording), np.array(falls) / TICKS_PER_SECOND + criterion.seconds, side="right") - 1
     return [row for row, end in zip(falls, ends.tolist(), strict=True) if _all_came(criterion.then, motion, row, end)]
 
 

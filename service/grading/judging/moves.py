@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import Measure
-from service.grading.judging.whereabouts import place_at, relative_to, robot_of, standing, stretches, travel
+from service.grading.judging.geometry import place_at, relative_to, standing, stretches, travel
+from sim.recorded import robot_of, seconds_at
 from sim.recording import Recording
 from submissions.criteria.motion import AskedMotion
 
@@ -72,7 +73,7 @@ def move_between(recording: Recording, first: int, last: int) -> Move:
     _, before = place_at(recording, first)
     _, after = place_at(recording, last)
     ahead, left = relative_to(before, after.x, after.y)
-    return Move(first, last, ahead, left, after.heading - before.heading, (last - first) / 30.0)
+    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(last - first))
 
 
 def straight(recording: Recording) -> NDArray[np.bool_]:

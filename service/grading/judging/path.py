@@ -1,21 +1,20 @@
 """Judging where the robot went: through places, within areas, clear of them, and how near a point.
 
-Going round a point is judged in ``circuits.py``, following a line in ``line.py``.
+Going round a point is judged in ``point.py``, following a line in ``line.py``.
 """
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.areas import distance_to, to_segment
+from service.grading.judging.geometry import distance_to, place_at, positions, standing, stretches
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.whereabouts import headings, place_at, positions, standing, stretches
 from sim.recording import Floats, Recording
-from submissions.criteria.path import Closest, KeepsOut, StaysInside, TouchesNothing, Visits
+from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
 from submissions.criteria.places import Area, Part
 
 #: Standing still for more than so many ticks (half a second), or at the end, is stopping.
@@ -33,6 +32,7 @@ PART_NAMES = {
 }
 
 
+@judges(Visits)
 def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     """Each place after the one before it (or at any time); a place is visited when its edge is reached."""
     recording = trial.recording
@@ -79,6 +79,7 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
 
 
+@judges(StaysInside)
 def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     recording = trial.recording
     points = _driven(recording, criterion.of)
@@ -106,6 +107,7 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     return passed(f"{_upper(who)} stayed in {where}.", recording.end_t, recording.end, measures)
 
 
+@judges(KeepsOut)
 def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     """The measure is the least distance to any of the areas."""
     recording = trial.recording
@@ -136,6 +138,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     )
 
 
+@judges(TouchesNothing)
 def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
     recording = trial.recording
     touches = recording.touches
@@ -151,68 +154,6 @@ def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outc
         )
     return passed("The robot touched nothing." if not touches else f"The robot touched {len(touches)} times.",
                   recording.end_t, recording.end, measures)  # fmt: skip
-
-
-def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
-    """The least distance of the robot's middle to a point, and how it began to turn with regard to it."""
-    recording = trial.recording
-    points = positions(recording)
-    near = _nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
-    row, least = near if near else (0, math.nan)
-    straight = _straight_on(recording, criterion.x, criterion.y)
-    measures = (Measure("least distance", least, "mm"), Measure("straight on", straight, "mm"))
-    point = f"({criterion.x:g}, {criterion.y:g})"
-    where = place_at(recording, row)
-    if criterion.first_turn is not None:
-        turned = _first_turn(recording, criterion.x, criterion.y)
-        if turned is None or (turned[1] == "towards") != (criterion.first_turn == "towards"):
-            told = "it did not turn at all" if turned is None else f"it turned {_to(turned[1])} it"
-            wished = f"Expected the robot first to turn {_to(criterion.first_turn)}"
-            return failed(
-                f"{wished} {point}, but {told}.", *place_at(recording, turned[0] if turned else 0), measures=measures
-            )
-    if criterion.distance is not None and not criterion.distance[0] <= least <= criterion.distance[1]:
-        low, high = criterion.distance
-        return failed(
-            f"Expected the robot to come as near to {point} as {low:g} to {high:g} mm, "
-            f"but the nearest it came was {least:.0f} mm.",
-            *where,
-            measures=measures,
-        )
-    if criterion.than_straight is not None and (least < straight) != (criterion.than_straight == "nearer"):
-        wish = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
-        return failed(
-            f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), "
-            f"but the nearest it came was {least:.0f} mm.",
-            *where,
-            measures=measures,
-        )
-    return passed(f"The robot came as near to {point} as {least:.0f} mm.", *where, measures)
-
-
-def _to(direction: str) -> str:
-    return "towards" if direction == "towards" else "away from"
-
-
-def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
-    """When the robot had turned by 2 degrees, and whether that was towards the point."""
-    degrees = headings(recording)
-    rows = np.flatnonzero(np.abs(degrees - degrees[0]) > _TURN)
-    if not len(rows):
-        return None
-    row = int(rows[0])
-    start = recording.start
-    bearing = math.degrees(math.atan2(y - start.y, x - start.x))
-    left = (bearing - start.heading + 180) % 360 - 180 > 0
-    return row, "towards" if (degrees[row] > degrees[0]) == left else "away"
-
-
-def _straight_on(recording: Recording, x: float, y: float) -> float:
-    """Least distance from a point to the ray ahead of the start, mm."""
-    start = recording.start
-    along = math.radians(start.heading)
-    end = (start.x + _FAR * math.cos(along), start.y + _FAR * math.sin(along))
-    return float(to_segment(np.array([[x, y]]), (start.x, start.y), end)[0])
 
 
 def _stop_in(recording: Recording, place: Area, points: Floats) -> int | None:

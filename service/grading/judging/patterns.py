@@ -1,4 +1,4 @@
-"""Several images of one pattern, sent while the robot drives over it, made into one answer.
+"""What one image was taken for, and several images of one pattern made into one answer.
 
 Images belong together if they show the same thing at the same place under the sensor, wherever the robot stood.
 """
@@ -12,14 +12,28 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
-from service.grading.judging.outcome import listed
-from service.grading.judging.places import part_at
-from service.grading.judging.samples import Sample
-from sim.recording import Recording
+from service.grading.judging.geometry import Side, part_at
+from service.grading.judging.words import listed
+from sim.recording import Image, Recording
 
 How = Literal["first", "any", "majority"]
-Side = Literal["left", "right"]
 _Place = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One image that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
+
+    trial: int  # index into the grade's trials
+    image: Image | None
+    truth: str
+    answer: str | None
+    words: str  # what happened, for a sentence
+    confidence: float | None = None
+
+    @property
+    def right(self) -> bool:
+        return self.answer == self.truth
 
 
 def by_pattern(

@@ -1,70 +1,330 @@
-"""From what a recognition criterion found to its result: marks, curves, and the sentences that are read.
+"""Judging how the images that the robot sent were named: what became of each, which answer counts, how many are right.
 
-Finding answers and truths is ``classification.py``'s, the curves ``sweeps.py``'s.
+What an image shows is found in ``truths.py``; what it is all worth in ``classification.py`` and ``robustness.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from statistics import fmean
+from typing import Literal
 
-from service.grading.grade import AccuracyCurve, Counts, CriterionResult, Shown, TrialResult
-from service.grading.judging.classification import Classified, classify, told
-from service.grading.judging.marks import earned, share_of_accuracy, share_of_steps
-from service.grading.judging.samples import Sample
-from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, range_above, share_of_robustness
-from service.grading.judging.trial_words import early_end, place_words, shown_words
+from models.intervals import wilson
+from service.grading.grade import (
+    Accuracy,
+    AccuracyCurve,
+    Confidence,
+    Counts,
+    CriterionResult,
+    Evidence,
+    Prediction,
+    Shown,
+    TrialResult,
+)
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.case import Indexed
+from service.grading.judging.geometry import Side
+from service.grading.judging.marks import earned
+from service.grading.judging.patterns import Sample, by_pattern
+from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
+from service.grading.judging.words import LabelFinder, early_end, place_words, quoted, shown_words
+from sim.recording import Image, Line, Message, Recording, Verdict
 from submissions.assignment import Assignment
-from submissions.criteria.classification import Classification, Recognition, Robustness
-from submissions.sweep import CONDITIONS
+from submissions.criteria.recognition import Recognition
 
-_MOST_LEVELS_TOLD = 12
+ReplyStatus = Literal["answered", "late", "malformed", "unanswered"]
+_BEST_FIRST: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unanswered")
 
 
-def judge_recognition(
-    criterion: Classification | Robustness, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
-) -> CriterionResult:
-    """The result of a criterion that pools its ``trials`` (with their indices in the grade)."""
-    result = _judged(criterion, assignment, trials)
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What came back to one image. ``text`` is the answer that counts; ``words`` say why there is none."""
+
+    status: ReplyStatus
+    text: str | None
+    words: str
+    duplicates: int = 0  # answers beyond the one that counts
+
+
+def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
+    """What came back to image ``number`` of the recording.
+
+    An answer is late if it arrived after the next image was sent, or was under way when the program ended.
+    One that was lost on its way is none. Of several answers the first that arrived in time counts.
+    """
+    image = recording.images[number]
+    following = recording.images[number + 1].t if number + 1 < len(recording.images) else None
+    came = answers.all_to(image.message)
+    statuses = [(_status(message, following), message) for message in came]
+    arrived = [pair for pair in statuses if pair[0] != "unanswered"]
+    if not arrived:
+        return _silence(recording, answers, image.message, came)
+    status, message = min(arrived, key=lambda pair: _BEST_FIRST.index(pair[0]))
+    text = message.text
+    duplicates = len(arrived) - 1
+    if status == "malformed":
+        return Reply(status, None, "the answer begins with JSON:: but is not JSON", duplicates)
+    return Reply(status, text, "", duplicates)
+
+
+def _status(message: Message, following: float | None) -> ReplyStatus:
+    if message.note == "malformed":
+        return "malformed"
+    if message.delivered is None:
+        return "unanswered" if message.note == "lost" else "late"
+    return "late" if following is not None and message.delivered > following else "answered"
+
+
+def _silence(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
+    """Nothing arrived: the image or its answer was lost, the answer was no text, or there was none."""
+    if came:
+        return Reply("unanswered", None, "the answer was lost on its way")
+    sent = recording.messages[question] if question < len(recording.messages) else None
+    if sent is not None and sent.note == "lost":
+        return Reply("unanswered", None, "the image was lost on its way")
+    fault = answers.fault_after(question)
+    if fault is not None and fault.verdict is Verdict.PROTOCOL_ERROR and "the responder returned" in fault.message:
+        return Reply("malformed", None, answers.silence(question))
+    return Reply("unanswered", None, answers.silence(question))
+
+
+#: An image taken so near to an earlier one, mm, shows the same again.
+_SAME_PLACE = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Classified:
+    """What a recognition criterion found in its trials: each image or, where it says so, each pattern."""
+
+    samples: tuple[Sample, ...]
+    accuracy: Accuracy
+    predictions: tuple[Prediction, ...]
+    evidence: tuple[Evidence, ...]
+
+    @property
+    def right(self) -> int:
+        return sum(sample.right for sample in self.samples)
+
+
+def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) -> Classified:
+    """Every image of ``trials`` (with their indices in the grade) that counts, pooled."""
+    shown = shown_in(criterion, trials)
+    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
+    labels = nameable(criterion, assignment, truths)
+    finder = LabelFinder(labels, criterion.aliases)
+    images: list[Sample] = []
+    samples: list[Sample] = []
+    statuses: Counter[ReplyStatus] = Counter()
+    duplicates = 0
+    for index, trial in trials:
+        recording = trial.recording
+        replies = _replies(criterion, recording)
+        statuses.update(reply.status for reply in replies)
+        duplicates += sum(reply.duplicates for reply in replies)
+        own = []
+        for number, truth in shown[index]:
+            answer, words, confidence = _answer(criterion, replies[number], finder)
+            image = recording.images[number]
+            own.append(Sample(index, image, finder.canonical(truth), answer, words, confidence))
+        images += own
+        samples += _that_count(criterion, index, trial, own, finder)
+    by_index = dict(trials)
+    of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
+    for sample in samples:
+        of_trial[sample.trial].append(sample)
+    predictions = tuple(
+        Prediction(sample.image, sample.truth, sample.answer, by_index[sample.trial].scenario, sample.trial)
+        for sample in images
+        if sample.image is not None
+    )
+    missing = sum(sample.image is None for sample in samples)
+    counts = Counts(
+        sum(statuses.values()),
+        statuses["answered"],
+        statuses["late"],
+        statuses["malformed"],
+        statuses["unanswered"],
+        duplicates,
+        len(samples) - missing,
+        missing,
+        "images" if criterion.each_pattern is None else "patterns",
+    )
+    return Classified(
+        tuple(samples),
+        _accuracy(samples, labels, counts),
+        predictions,
+        tuple(_evidence(index, own) for index, own in of_trial.items()),
+    )
+
+
+def pooled(trials: Indexed, judged: Callable[[Indexed], CriterionResult]) -> CriterionResult:
+    """The result of all trials together; where some are hidden, with what the visible ones alone come to."""
+    result = judged(trials)
     visible = [(index, trial) for index, trial in trials if trial.visibility == "visible"]
     if len(visible) == len(trials):
         return result
     if not visible:
         return replace(result, shown=Shown(shown_words("")))
-    alone = _judged(criterion, assignment, visible)
+    alone = judged(visible)
     return replace(result, shown=Shown(shown_words(alone.message), alone.accuracy, alone.curves))
 
 
-def _judged(
-    criterion: Classification | Robustness, assignment: Assignment, trials: Sequence[tuple[int, TrialResult]]
+def recognised(
+    criterion: Recognition,
+    found: Classified,
+    share: Fraction,
+    words: str,
+    curves: tuple[AccuracyCurve, ...],
+    trials: Mapping[int, TrialResult],
 ) -> CriterionResult:
-    if isinstance(criterion, Robustness):
-        levels = levels_along(criterion.along, dict(trials))
-        trials = [(index, trial) for index, trial in trials if index in levels]
-    found = classify(criterion, assignment, trials)
-    by_index = dict(trials)
-    curves = curves_of(found.samples, by_index)
-    if isinstance(criterion, Robustness):
-        curve = curve_along(criterion.along, found.samples, by_index)
-        share = share_of_robustness(criterion, curve)
-        curves = (replace(curve, asked=criterion.level), *(other for other in curves if other.along != criterion.along))
-        words = _robustness_words(criterion, curve)
-    else:
-        share = _share(criterion, found)
-        words = _what_marks_need(criterion, found) if share < 1 else ""
+    """The result that is worth ``share`` of the marks; ``words`` say why, after the tally."""
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
         marks=earned(criterion.marks, share),
         max_marks=criterion.marks,
-        message=_tally(criterion, found) + words + _first_wrong(found.samples, by_index),
+        message=_tally(criterion, found) + words + _first_wrong(found.samples, trials),
         visibility=criterion.visibility,
         evidence=found.evidence,
         accuracy=found.accuracy,
         predictions=found.predictions,
         curves=curves,
     )
+
+
+def told(sample: Sample) -> str:
+    """A sentence on one image."""
+    if sample.image is None:
+        if sample.truth == NO_IMAGE:
+            return f"Expected an image (IMG_DATA), but {sample.words}."
+        return f"Expected {quoted(sample.truth)}, but {sample.words}."
+    if sample.right:
+        return f"The image showed {quoted(sample.truth)} and was named so."
+    return f"The image showed {quoted(sample.truth)}, but {sample.words}."
+
+
+def _that_count(
+    criterion: Recognition,
+    index: int,
+    trial: TrialResult,
+    own: list[Sample],
+    finder: LabelFinder,
+) -> Sequence[Sample]:
+    """A trial's images, or its patterns; where there are none, or too few, wrong answers in their place."""
+    if criterion.each_pattern is None:
+        counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
+    else:
+        # What a grey patch tells lies under the right sensor.
+        side: Side = "right" if criterion.truth == "grey" else "left"
+        apart = max(30.0, 2 * criterion.within)
+        counted = by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
+    if counted and len(counted) >= criterion.patterns:
+        return counted
+    if not counted and criterion.patterns <= 1:
+        truth = missing_truth(criterion, trial)
+        sent = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
+        if criterion.near_start is not None and trial.recording.images:
+            sent += f" from within {criterion.near_start:g} mm of where it started"
+        return [Sample(index, None, finder.canonical(truth), None, sent)]
+    words = f"the robot sent images of {len(counted)} patterns, and {criterion.patterns} were expected"
+    lacking = Sample(index, None, NO_IMAGE, None, words)
+    return [*counted, *[lacking] * (criterion.patterns - len(counted))]
+
+
+def _accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
+    right = sum(sample.right for sample in samples)
+    count = len(samples)
+    low, high = wilson(right, count)
+    cells = Counter((sample.truth, sample.answer) for sample in samples)
+    confusion = tuple(
+        (truth, answer, number)
+        for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
+    )
+    known = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
+    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(samples))
+
+
+def _confidence(samples: Sequence[Sample]) -> Confidence | None:
+    """How sure the answers were that were right, and those that were wrong; None if no answer said."""
+    right = [sample.confidence for sample in samples if sample.right and sample.confidence is not None]
+    wrong = [sample.confidence for sample in samples if not sample.right and sample.confidence is not None]
+    if not right and not wrong:
+        return None
+    return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
+
+
+def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
+    """The first image of the trial that was named wrongly, else its last."""
+    shown = next((sample for sample in own if not sample.right), own[-1])
+    image = shown.image
+    return Evidence(
+        trial=index,
+        passed=all(sample.right for sample in own),
+        message=told(shown),
+        t=image.t if image else None,
+        pose=image.pose if image else None,
+    )
+
+
+def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
+    """What came back to every image of the recording, whether it counts or not."""
+    if criterion.answer_from == "reply":
+        answers = Answers(recording)
+        return [reply_to(recording, answers, number) for number in range(len(recording.images))]
+    said = "said" if criterion.answer_from == "speech" else "printed"
+    replies = []
+    for image in recording.images:
+        heard = _between(recording, image, criterion.answer_from == "speech")
+        text = " | ".join(line.text for line in heard)
+        silent = Reply("unanswered", None, f"the robot {said} nothing after it")
+        replies.append(Reply("answered", text, "") if heard else silent)
+    return replies
+
+
+def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
+    """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
+    if reply.text is None:
+        return None, reply.words, None
+    if reply.status == "late" and criterion.late == "wrong":
+        return None, f"the answer came too late: {quoted(reply.text)}", None
+    text, confidence = reply.text, None
+    if criterion.answer_from == "reply":
+        value = parsed(text)
+        if criterion.confidence is not None:
+            confidence = _probability(at_path(value, criterion.confidence))
+        if criterion.answer is not None:
+            picked = at_path(value, criterion.answer)
+            text = text if picked is NOTHING else as_text(picked)
+    found = finder.labels_in(text)
+    if not found:
+        return None, f"the answer names no label: {quoted(text)}", confidence
+    if len(found) > 1:
+        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
+    return found[0], f"it was taken for {quoted(found[0])}", confidence
+
+
+def _probability(value: object) -> float | None:
+    """A number from 0 to 1, as JSON has it; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        return None
+    return float(value)
+
+
+def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
+    """What the robot said or printed after this image and before the next."""
+    following = bisect_right(recording.images, image.message, key=lambda other: other.message)
+    end = recording.images[following].t if following < len(recording.images) else math.inf
+    lines = recording.spoken if speech else recording.printed
+    return lines[bisect_left(lines, image.t, key=_time) : bisect_left(lines, end, key=_time)]
+
+
+def _time(line: Line) -> float:
+    return line.t
 
 
 def counts_words(counts: Counts) -> str:
@@ -75,22 +335,11 @@ def counts_words(counts: Counts) -> str:
     )
 
 
-def _share(criterion: Classification, found: Classified) -> Fraction:
-    right, count = _right(found), found.accuracy.n
-    if criterion.steps:
-        return share_of_steps(right, count, criterion.steps, criterion.marks)
-    return share_of_accuracy(right, count, criterion.at_least, criterion.over)
-
-
-def _right(found: Classified) -> int:
-    return sum(sample.right for sample in found.samples)
-
-
 def _tally(criterion: Recognition, found: Classified) -> str:
     accuracy = found.accuracy
     what = "images" if criterion.each_pattern is None else "patterns"
     words = (
-        f"{_right(found)} of {accuracy.n} {what} named rightly: accuracy {accuracy.value:.2f} "
+        f"{found.right} of {accuracy.n} {what} named rightly: accuracy {accuracy.value:.2f} "
         f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
     )
     counts = accuracy.counts
@@ -110,32 +359,7 @@ def _tally(criterion: Recognition, found: Classified) -> str:
     return words
 
 
-def _what_marks_need(criterion: Classification, found: Classified) -> str:
-    if criterion.at_least is not None:
-        return f" All marks are given from {criterion.at_least:g} on."
-    if criterion.steps:
-        return " Marks: " + ", ".join(f"{marks:g} from {accuracy:g} on" for accuracy, marks in criterion.steps) + "."
-    return ""
-
-
-def _robustness_words(criterion: Robustness, curve: AccuracyCurve) -> str:
-    about = CONDITIONS[criterion.along]
-    levels = curve.levels
-    if not levels:
-        return f" No trial was swept over {about.words}."
-    each = ", ".join(f"{level.value:.2f} at {level.at:g}" for level in levels[:_MOST_LEVELS_TOLD])
-    more = ", ..." if len(levels) > _MOST_LEVELS_TOLD else ""
-    words = f" By {about.words} ({about.unit}): {each}{more}."
-    if criterion.level is None:
-        return f"{words} Mean over the sweep: {float(area(levels)):.2f}."
-    held = range_above(levels, criterion.level)
-    if held is None:
-        return f"{words} It is below {criterion.level:g} at the easiest level already."
-    where = f"only at {held[0].at:g}" if held[0].at == held[1].at else f"from {held[0].at:g} to {held[1].at:g}"
-    return f"{words} It is at least {criterion.level:g} {where} {about.unit}."
-
-
-def _first_wrong(samples: Sequence[Sample], trials: dict[int, TrialResult]) -> str:
+def _first_wrong(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
     """Where the first image was named wrongly."""
     first = next((sample for sample in samples if not sample.right), None)
     if first is None:

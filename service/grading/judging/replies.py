@@ -11,12 +11,16 @@ from fractions import Fraction
 
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
-from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.texts import conditions, meets, same_text
+from service.grading.judging.words import listed, quoted
+from sim.recorded import pose_at
 from sim.recording import Message, Recording
-from submissions.criteria import Replies
+from submissions.criteria.replies import Replies
 
 
+@judges(Replies)
 def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     recording = trial.recording
     asked = [

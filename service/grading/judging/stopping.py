@@ -10,8 +10,10 @@ from fractions import Fraction
 from typing import Literal
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import floor_share, in_zone, part_at, zone_words
+from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, cut, failed, passed
-from service.grading.judging.places import floor_share, in_zone, part_at, zone_words
+from sim.recorded import seconds_at
 from sim.recording import Recording, Verdict
 from submissions.criteria.stopping import StopOn
 
@@ -20,6 +22,7 @@ Side = Literal["left", "right"]
 _MM = 0.01  # less than this in a tick is no movement
 
 
+@judges(StopOn)
 def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = cut(recording)
@@ -100,7 +103,7 @@ def _stood_still(recording: Recording) -> float:
         if math.hypot(ticks.x[i] - ticks.x[i - 1], ticks.y[i] - ticks.y[i - 1]) > _MM:
             break
         count += 1
-    return count / 30
+    return seconds_at(count)
 
 
 def _wanted(criterion: StopOn) -> str:

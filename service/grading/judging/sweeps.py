@@ -1,6 +1,6 @@
-"""Accuracy along the conditions that a scenario sweeps: the curves, and what part of the marks a curve is worth.
+"""Accuracy along the conditions that a scenario sweeps: the curves, and what their heights come to.
 
-Shares are exact fractions; rounding to marks is ``marks.py``'s.
+Exact fractions; what a curve is worth is decided in ``robustness.py``.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from itertools import pairwise
 
 from models.intervals import wilson
 from service.grading.grade import AccuracyCurve, Level, TrialResult
-from service.grading.judging.samples import Sample
-from submissions.criteria.classification import Robustness
+from service.grading.judging.patterns import Sample
 from submissions.sweep import CONDITIONS
 
 _NOISES = ("light_noise", "motor_noise")
@@ -36,17 +35,6 @@ def curve_along(condition: str, samples: Iterable[Sample], trials: Mapping[int, 
             counts[levels[sample.trial]] = right + sample.right, count + 1
     levels_of_curve = (Level(at, right, count, *wilson(right, count)) for at, (right, count) in sorted(counts.items()))
     return AccuracyCurve(condition, tuple(levels_of_curve))
-
-
-def share_of_robustness(criterion: Robustness, curve: AccuracyCurve) -> Fraction:
-    """What part of the marks the curve is worth."""
-    reached = area(curve.levels) if criterion.level is None else part_above(curve.levels, criterion.level)
-    if criterion.at_least is None:
-        return reached
-    enough = Fraction(str(criterion.at_least))
-    if reached >= enough:
-        return Fraction(1)
-    return Fraction(0) if criterion.over == "all" else reached / enough
 
 
 def area(levels: Sequence[Level]) -> Fraction:

@@ -12,10 +12,13 @@ from fractions import Fraction
 from responders.messages import JSON, PY
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
-from service.grading.judging.outcome import Outcome, failed, listed, passed, pose_at, quoted
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import listed, quoted
+from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording
-from submissions.criteria import Messages, Prints, Replies, Says
 from submissions.criteria.expressions import found_in
+from submissions.criteria.texts import Messages, Prints, Says, TextConditions, TextSequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +38,18 @@ _SAY = Deed("the robot", "say", "said")
 _SEND = Deed("the robot", "send", "sent")
 _RECEIVE = Deed("the robot", "receive", "received")
 
-Sequenced = Prints | Says | Messages
 
-
+@judges(Prints)
 def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
     return judge_sequence(criterion, trial.recording.printed, _PRINT, trial.recording)
 
 
+@judges(Says)
 def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
     return judge_sequence(criterion, trial.recording.spoken, _SAY, trial.recording)
 
 
+@judges(Messages)
 def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
     """What the robot sent, or what its queue got; with ``queue_grows`` both that and any other condition count."""
     recording = trial.recording
@@ -60,7 +64,7 @@ def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
     return Outcome(worse.passed, min(texts.score, grown.score), worse.message, worse.t, worse.pose)
 
 
-def judge_sequence(criterion: Sequenced, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
+def judge_sequence(criterion: TextSequence, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
     """Whether the right texts are among ``lines``; everything is compared with its runs of spaces as one."""
     if criterion.last:
         return _judge_last(criterion, lines, deed, recording)
@@ -70,7 +74,7 @@ def judge_sequence(criterion: Sequenced, lines: Sequence[Line], deed: Deed, reco
     return _judge_count(criterion, chosen, lines, deed, recording)
 
 
-def meets(criterion: Sequenced | Replies, text: str) -> bool:
+def meets(criterion: TextConditions, text: str) -> bool:
     """Whether a text meets every condition that is given."""
     fold = criterion.ignore_case
     plain = _plain(text, fold)
@@ -83,7 +87,7 @@ def meets(criterion: Sequenced | Replies, text: str) -> bool:
     return criterion.matches is None or found_in(text, criterion.matches, fold)
 
 
-def conditions(criterion: Sequenced | Replies) -> str:
+def conditions(criterion: TextConditions) -> str:
     """What is looked for, in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
     if criterion.equals and not (criterion.starts_with or criterion.contains or criterion.matches is not None):
         return listed(criterion.equals, "or")
@@ -103,7 +107,7 @@ def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
     return _plain(text, ignore_case) == _plain(wanted, ignore_case)
 
 
-def _judge_last(criterion: Sequenced, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
+def _judge_last(criterion: TextSequence, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
     wanted = conditions(criterion)
     if not lines:
         return failed(
@@ -121,7 +125,7 @@ def _judge_last(criterion: Sequenced, lines: Sequence[Line], deed: Deed, recordi
 
 
 def _judge_order(
-    criterion: Sequenced, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
+    criterion: TextSequence, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
 ) -> Outcome:
     wanted = criterion.in_order
     found: list[Line] = []
@@ -155,7 +159,7 @@ def _judge_order(
 
 
 def _judge_count(
-    criterion: Sequenced, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
+    criterion: TextSequence, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
 ) -> Outcome:
     least, most = _bounds(criterion)
     what = conditions(criterion) or "something"
@@ -176,7 +180,7 @@ def _judge_count(
     return failed(f"{expected}, but it {deed.past} {count} such, the last {quoted(chosen[-1].text)}.", at, pose, score)
 
 
-def _bounds(criterion: Sequenced) -> tuple[int, int | None]:
+def _bounds(criterion: TextSequence) -> tuple[int, int | None]:
     if criterion.exactly is not None:
         return criterion.exactly, criterion.exactly
     if criterion.at_least is None and criterion.at_most is None:
@@ -260,7 +264,7 @@ def _queue_grows(recording: Recording) -> Outcome:
     )
 
 
-def _compares(criterion: Sequenced, text: str, wanted: str) -> bool:
+def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:
     fold = criterion.ignore_case
     match criterion.compare:
         case "equals":

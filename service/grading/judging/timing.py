@@ -10,14 +10,18 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import CriterionResult, Evidence, Measure, TrialResult
+from service.grading.judging.case import Case
+from service.grading.judging.judges import by_trial, judges, judges_case
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import spoken_until
+from sim.recorded import seconds_at
 from sim.recording import Recording
 from submissions.criteria.timing import Ranking, Timing
 
 _STILL = 1e-6  # mm or degrees a tick
 
 
+@judges(Timing)
 def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
     recording = trial.recording
     seconds, what = _seconds(criterion, recording)
@@ -33,7 +37,13 @@ def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
     )
 
 
-def judge_ranking(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
+@judges_case(Ranking)
+def judge_ranking(criterion: Ranking, case: Case) -> CriterionResult:
+    other = case.results.get(criterion.of)
+    return by_trial(criterion, case, lambda index, _: _ranked(criterion, index, other))
+
+
+def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
     """What the figure of trial ``place`` is worth; nothing where the other criterion failed."""
     evidence = next((each for each in other.evidence if each.trial == place), None) if other else None
     measure = _measure(criterion, evidence)
@@ -86,4 +96,4 @@ def _moving(recording: Recording) -> float:
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
     changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
-    return int(np.logical_or.reduce(changes).sum()) / 30
+    return seconds_at(int(np.logical_or.reduce(changes).sum()))

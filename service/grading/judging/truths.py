@@ -9,21 +9,23 @@ import math
 from collections.abc import Mapping, Sequence
 
 from service.grading.grade import TrialResult
+from service.grading.judging.case import Indexed
+from service.grading.judging.geometry import part_at
 from service.grading.judging.label_patches import decoded
-from service.grading.judging.places import part_at
 from sim.backgrounds import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
-from submissions.criteria.classification import LabelledPlace, Recognition
+from submissions.criteria.recognition import Recognition
+from submissions.truth_file import LabelledPlace
 
 #: Stands for the truth of an image that was never sent, where the assignment does not tell it.
 NO_IMAGE = "(no image)"
 
 #: The number of an image in its recording, and what it shows.
-Shown = tuple[int, str]
+NumberedTruth = tuple[int, str]
 
 
-def shown_in(criterion: Recognition, trials: Sequence[tuple[int, TrialResult]]) -> Mapping[int, Sequence[Shown]]:
+def shown_in(criterion: Recognition, trials: Indexed) -> Mapping[int, Sequence[NumberedTruth]]:
     """For each trial (by its index in the grade) the images that count, in the order in which they were sent.
 
     Images of floor that has no name show nothing to name, and do not count.
@@ -47,7 +49,7 @@ def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[st
     return tuple(dict.fromkeys([*on_floor, *listed, *placed, *truths, *criterion.aliases]))
 
 
-def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
+def _counted(criterion: Recognition, known: Sequence[NumberedTruth]) -> Sequence[NumberedTruth]:
     match criterion.images:
         case "first":
             return known[:1]
@@ -57,9 +59,9 @@ def _counted(criterion: Recognition, known: Sequence[Shown]) -> Sequence[Shown]:
             return known
 
 
-def _known(criterion: Recognition, trial: TrialResult) -> list[Shown]:
+def _known(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
     recording = trial.recording
-    found: list[Shown] = []
+    found: list[NumberedTruth] = []
     for number, image in enumerate(recording.images):
         if criterion.near_start is not None and _look_from_start(recording, image.pose) > criterion.near_start:
             continue

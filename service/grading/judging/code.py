@@ -1,21 +1,116 @@
-"""Judging what functions return: values of called functions, and what an instructor's own check says of a trial.
+"""Judging the code that was submitted: what its text has, what its functions return, what a check in Python says.
 
-Values come from inside the sandbox and are compared here; a student's value is data and nothing more.
+Texts are read and functions called inside the sandbox; what came back is data, compared here and nothing more.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
 
 from responders.function_calls import Called, FunctionCall, Returned
-from service.grading.grade import Measure
+from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
-from service.grading.judging.outcome import Outcome, failed, fault_words, passed, quoted
+from service.grading.judging.case import Case
+from service.grading.judging.judges import by_trial, judges_case, once
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.source_answers import SPEECH, SourceAnswers
+from service.grading.judging.words import fault_words, quoted
 from sim.errors import AssignmentError
-from submissions.criteria.code import ExpectedCall, Functions, PythonCheck
+from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
+from submissions.magics import Flags
+
+#: More that is wrong would give_up the first.
+_MOST_TOLD = 4
+
+
+@judges_case(SourceRules)
+def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
+    driven = case.trials if criterion.part == "program" else ()
+    answers = case.analysis.answers.get(criterion.id)
+    return once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
+
+
+@judges_case(Functions)
+def judge_functions(criterion: Functions, case: Case) -> CriterionResult:
+    return once(criterion, _returned(criterion, case.analysis.called.get(criterion.id)))
+
+
+@judges_case(PythonCheck)
+def judge_python_check(criterion: PythonCheck, case: Case) -> CriterionResult:
+    return by_trial(criterion, case, lambda index, _: _checked(criterion, case.analysis.checks[criterion.id, index]))
+
+
+def judge_source(
+    criterion: SourceRules, answers: SourceAnswers | None, flags: Flags, trials: Sequence[TrialResult] = ()
+) -> Outcome:
+    """``trials`` are those that the program was driven in."""
+    whose = "your program" if criterion.part == "program" else "your responder"
+    if answers is None:
+        return failed(f"Expected {whose} to be submitted, but it was not.")
+    if answers.error:
+        return failed(f"Expected {whose} to be readable as Python, but: {answers.error}.")
+    wrong: list[str] = []
+    for rule, place in zip(criterion.uses, answers.uses, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to use {_words(rule)}, but it does not, or not where it is run")
+    for rule, place in zip(criterion.avoids, answers.avoids, strict=True):
+        but = f"{place} has it" if place is not None else _spoke(rule, answers, trials) or answers.unread
+        if but:
+            wrong.append(f"Expected {whose} to do without {_words(rule)}, but {but}")
+    for rule, place in zip(criterion.in_loop, answers.in_loop, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to call {rule} inside a loop, but it does not, or not where it is run")
+    for rule, place in zip(criterion.defines, answers.defines, strict=True):
+        if place is None:
+            wrong.append(f"Expected {whose} to define a function {rule}, but it does not")
+    asked = _missing_flags(criterion, flags)
+    wrong += [f"Expected the magic line of {whose} to have {told}, but it does not" for told in asked if told]
+    for_staff = _for_staff(criterion, answers)
+    if not wrong:
+        return passed(f"The text of {whose} is as expected.", for_staff=for_staff)
+    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(asked)
+    message = f"{'. '.join(wrong[:_MOST_TOLD])}."
+    return failed(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
+
+
+def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
+    """That the robot spoke although the text shows no call that does it; a rule may mean one and not the other."""
+    meant = [fnmatchcase(call, rule) for call in SPEECH]
+    shown = any(place is not None for place in answers.speech)
+    if not rule.endswith("()") or not any(meant) or shown:
+        return ""
+    spoke = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
+    return "the robot spoke when it was run" if spoke else ""
+
+
+def _for_staff(criterion: SourceRules, answers: SourceAnswers) -> str:
+    """Where to look for what is avoided, as its text does not show all that it can do."""
+    if not criterion.avoids or not answers.doubts:
+        return ""
+    return f"Can do more than its text shows: {'; '.join(answers.doubts)}."
+
+
+def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
+    """For each flag that is asked for the flag if it is missing, else nothing."""
+    if not criterion.flags:
+        return []
+    wanted = flags_in(criterion.flags)
+    values = [
+        "" if flags.values.get(short) == value else f"-{short} {value}"
+        for short, value in sorted(wanted.values.items())
+    ]
+    return values + ["" if short in flags.switches else f"-{short}" for short in sorted(wanted.switches)]
+
+
+def _words(rule: str) -> str:
+    if rule not in CONSTRUCTS:
+        return rule
+    return f"a {rule} loop" if rule in ("for", "while") else rule
+
 
 _LONGEST_MESSAGE = 500
 _MOST_MEASURES = 20
@@ -28,7 +123,7 @@ def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
     )
 
 
-def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
+def _returned(criterion: Functions, called: Called | None) -> Outcome:
     if called is None:
         return failed("Expected a responder to be submitted, but it was not.")
     if called.fault is not None:
@@ -50,7 +145,7 @@ def judge_functions(criterion: Functions, called: Called | None) -> Outcome:
     return failed(f"{first}{tally}.", score=share, measures=measures)
 
 
-def checked(criterion: PythonCheck, gave: Returned) -> Outcome:
+def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
     """The outcome that an instructor's check returned. Raises AssignmentError when it failed or returned nonsense."""
     if gave.fault is not None:
         raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")

@@ -1,0 +1,271 @@
+"""Where the robot and its parts were, when, and how that lies to areas and lines of the floor.
+
+Geometry only; what it is worth is decided in the modules of the families.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.camera import HEIGHT, WIDTH, sensor_mask
+from sim.recorded import TICKS_PER_SECOND, pose_after, pose_at, robot_of, seconds_at
+from sim.recording import Floats, Pose, Recording
+from sim.robot import LightSensor
+from sim.sensors import Footprint, footprint
+from sim.trigonometry import sincos
+from submissions.criteria.places import Area, LineToFollow, Part, Zone
+
+Side = Literal["left", "right"]
+#: A light sensor's middle, or the axle's.
+Spot = Side | Literal["middle"]
+#: Less than this between two ticks is standing still, mm and degrees.
+STILL = 0.01
+
+
+def times(recording: Recording) -> Floats:
+    """Seconds, shape (n + 1,)."""
+    return np.arange(len(recording.ticks) + 1) / TICKS_PER_SECOND
+
+
+def headings(recording: Recording) -> Floats:
+    """Degrees, unwrapped, shape (n + 1,)."""
+    return np.concatenate([[recording.start.heading], recording.ticks.heading])
+
+
+def positions(recording: Recording, part: Part = "robot") -> Floats:
+    """x and y of a part, mm, shape (n + 1, 2). Where the pen is up, its rows are NaN.
+
+    Positions that are no numbers are NaN too, so that no comparison with them holds.
+    """
+    ticks = recording.ticks
+    middle = np.column_stack(
+        [np.concatenate([[recording.start.x], ticks.x]), np.concatenate([[recording.start.y], ticks.y])]
+    )
+    if part == "robot":
+        return middle
+    if part == "pen":
+        return np.where(pen_down(recording)[:, None], middle, np.nan)
+    light = light_of(recording, "left" if part == "left_light" else "right")
+    # Local x is to the robot's right, y forward: turned by the heading less a right angle.
+    turned = np.radians(headings(recording) - 90)
+    cosine, sine = np.cos(turned), np.sin(turned)
+    return middle + np.column_stack([cosine * light.x - sine * light.y, sine * light.x + cosine * light.y])
+
+
+def pen_down(recording: Recording) -> NDArray[np.bool_]:
+    """Whether the pen drew on the way to each row, shape (n + 1,); a row before a stroke begins belongs to it."""
+    down = np.zeros(len(recording.ticks) + 1, dtype=bool)
+    ends = [tick + 1 for tick, _ in recording.pen[1:]] + [len(down)]
+    for (tick, is_down), end in zip(recording.pen, ends, strict=False):
+        down[tick:end] |= is_down
+    return down
+
+
+def place_at(recording: Recording, row: int) -> tuple[float, Pose]:
+    """Time and pose of a row."""
+    if row <= 0 or not len(recording.ticks):
+        return 0.0, recording.start
+    return seconds_at(row), pose_after(recording, row)
+
+
+def travel(recording: Recording) -> tuple[Floats, Floats]:
+    """What each tick added: mm along the heading before it (backwards less than 0), and degrees. Shapes (n,)."""
+    points, degrees = positions(recording), headings(recording)
+    along = np.radians(degrees[:-1])
+    steps = np.diff(points, axis=0)
+    return steps[:, 0] * np.cos(along) + steps[:, 1] * np.sin(along), np.diff(degrees)
+
+
+def standing(recording: Recording) -> NDArray[np.bool_]:
+    """Whether the robot stood still in each tick, shape (n,)."""
+    ahead, turned = travel(recording)
+    return (np.abs(ahead) < STILL) & (np.abs(turned) < STILL)
+
+
+def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """The runs of true entries, as (first, one past the last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def relative_to(start: Pose, x: float, y: float) -> tuple[float, float]:
+    """How far ahead, and how far to the left, a point is of a pose, mm."""
+    along = math.radians(start.heading)
+    dx, dy = x - start.x, y - start.y
+    return dx * math.cos(along) + dy * math.sin(along), -dx * math.sin(along) + dy * math.cos(along)
+
+
+def light_of(recording: Recording, side: Side) -> LightSensor:
+    """The light sensor of that side, where it is bolted on."""
+    robot = robot_of(recording)
+    return robot.left_light if side == "left" else robot.right_light
+
+
+def part_at(recording: Recording, part: Spot, pose: Pose) -> tuple[float, float]:
+    """World mm of the middle of a light sensor, or of the axle, with the robot at ``pose``."""
+    if part == "middle":
+        return pose.x, pose.y
+    sensor = light_of(recording, part)
+    turn = math.radians(pose.heading - 90)
+    sine, cosine = math.sin(turn), math.cos(turn)
+    return pose.x + cosine * sensor.x - sine * sensor.y, pose.y + sine * sensor.x + cosine * sensor.y
+
+
+def part_at_time(recording: Recording, part: Spot, t: float) -> tuple[float, float]:
+    """As ``part_at``, after the last tick until ``t`` seconds."""
+    return part_at(recording, part, pose_at(recording, t))
+
+
+def footprint_at(recording: Recording, side: Side, pose: Pose) -> Footprint:
+    """The window that a light sensor sees; it does not turn with the robot, so it alone decides what is in it."""
+    return footprint(light_of(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
+
+
+def floor_share(recording: Recording, side: Side, pose: Pose) -> float:
+    """How much of what a light sensor sees is floor, 0 to 1; beside it all is black."""
+    where, diameter = footprint_at(recording, side, pose), light_of(recording, side).diameter
+    rows, columns = where.row + np.arange(diameter), where.column + np.arange(diameter)
+    floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
+    mask = sensor_mask(diameter)
+    return float((floor & mask).sum() / mask.sum())
+
+
+def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
+    """Whether a place is in [left, bottom, right, top], or at most ``margin`` mm outside each edge."""
+    (x, y), (left, bottom, right, top) = place, zone
+    return left - margin <= x <= right + margin and bottom - margin <= y <= top + margin
+
+
+def zone_words(zone: Zone) -> str:
+    left, bottom, right, top = zone
+    return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
+
+
+def distance_to(area: Area, points: Floats) -> Floats:
+    """Signed distance of each point (n, 2) to the edge of the area, mm; a point on the edge has 0."""
+    x, y = points[:, 0], points[:, 1]
+    if area.circle is not None:
+        return np.hypot(x - area.circle[0], y - area.circle[1]) - area.circle[2]
+    if area.bar is not None:
+        x1, y1, x2, y2, radius = area.bar
+        return to_segment(points, (x1, y1), (x2, y2)) - radius
+    corners: tuple[tuple[float, float], ...] = area.polygon or ()
+    if area.rectangle is not None:
+        left, bottom, right, top = area.rectangle
+        corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+    edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+    nearest = np.min([to_segment(points, first, last) for first, last in edges], axis=0)
+    within = np.zeros(len(points), dtype=bool)
+    for (x1, y1), (x2, y2) in edges:  # a ray to the right crosses the outline an odd number of times from inside
+        crosses = (y1 > y) != (y2 > y)
+        if y1 != y2:
+            within ^= crosses & (x < x1 + (y - y1) / (y2 - y1) * (x2 - x1))
+    signed: Floats = np.where(within, -nearest, nearest)
+    return signed
+
+
+def to_segment(points: Floats, first: tuple[float, float], last: tuple[float, float]) -> Floats:
+    """Distance of each point (n, 2) to the stretch between two points, mm."""
+    start, along = np.array(first), np.array(last) - np.array(first)
+    length = float(along @ along)
+    share = np.clip((points - start) @ along / length, 0, 1) if length > 0 else np.zeros(len(points))
+    away = points - start - share[:, None] * along
+    distances: Floats = np.hypot(away[:, 0], away[:, 1])
+    return distances
+
+
+#: How far along the line, at least, the nearest point is looked for from one tick to the next, mm.
+_WINDOW = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Along:
+    """For each row from ``first`` on: ``progress`` along the line (mm, growing beyond its length where it is closed)
+    and ``offset`` from it (mm, to the left of its direction above 0)."""
+
+    first: int
+    progress: Floats
+    offset: Floats
+    length: float
+
+
+def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
+    """How the path goes along the line from where it first comes ``within`` mm of it; None if it never does.
+
+    From then on the nearest point is looked for only near the one before, so that a path that leaves the line and
+    comes upon it again elsewhere, or crosses it, has not come any farther. A corner that is cut at d mm from the line
+    on both sides makes the nearest point jump by twice that, so twice ``within`` is near enough.
+    """
+    line = _Line(course)
+    distances = line.distances(points)
+    near = np.flatnonzero(distances <= within)
+    if not len(near):
+        return None
+    first = int(near[0])
+    progress, offset = np.empty(len(points) - first), np.empty(len(points) - first)
+    at, window = line.nearest(points[first]), max(_WINDOW, 2.2 * within)
+    for row, (x, y) in enumerate(points[first:]):
+        at, offset[row] = line.step(x, y, at, window)
+        progress[row] = at
+    return Along(first, progress, offset, line.length)
+
+
+def covered(found: Along, within: float, begin: float, end: float) -> float:
+    """The share of the line from ``begin`` to ``end`` that was driven forwards, ``within`` mm of it."""
+    near = np.abs(found.offset) <= within
+    pieces = []
+    for before, after, is_near in zip(found.progress, found.progress[1:], near[:-1] & near[1:], strict=False):
+        if is_near and after > before:
+            pieces.append((max(float(before), begin), min(float(after), end)))
+    reached, total = begin, 0.0
+    for low, high in sorted(pieces):
+        total += max(high - max(low, reached), 0.0)
+        reached = max(reached, high)
+    return total / (end - begin) if end > begin else 1.0
+
+
+class _Line:
+    """The stretches of a line, repeated endlessly if it is closed."""
+
+    def __init__(self, course: LineToFollow) -> None:
+        corners = np.array(course.corners())
+        steps = np.diff(corners, axis=0)
+        lengths = np.hypot(*steps.T)
+        kept = lengths > 0
+        self._starts, self._lengths = corners[:-1][kept], lengths[kept]
+        self._directions = steps[kept] / self._lengths[:, None]
+        self._begins = np.concatenate([[0.0], np.cumsum(self._lengths)[:-1]])
+        self.length = float(self._lengths.sum())
+        self._closed = course.is_closed
+
+    def distances(self, points: Floats) -> Floats:
+        return np.array([np.min(self._from(x, y)[1]) for x, y in points])
+
+    def nearest(self, point: Floats) -> float:
+        progress, distance, _ = self._from(float(point[0]), float(point[1]))
+        return float(progress[int(np.argmin(distance))])
+
+    def step(self, x: float, y: float, at: float, window: float) -> tuple[float, float]:
+        """The nearest place within the window around ``at``, and the signed distance to it."""
+        progress, distance, side = self._from(x, y)
+        if self._closed:
+            progress = at + (progress - at + self.length / 2) % self.length - self.length / 2
+        allowed = np.abs(progress - at) <= window
+        if not allowed.any():
+            allowed = np.abs(progress - at) == np.min(np.abs(progress - at))
+        best = int(np.argmin(np.where(allowed, distance, np.inf)))
+        return float(progress[best]), float(np.copysign(distance[best], side[best]))
+
+    def _from(self, x: float, y: float) -> tuple[Floats, Floats, Floats]:
+        """For each stretch: the nearest place on it along the line, the distance to it, and the side (left above 0)."""
+        away_x, away_y = x - self._starts[:, 0], y - self._starts[:, 1]
+        forward_x, forward_y = self._directions[:, 0], self._directions[:, 1]
+        ahead = np.clip(away_x * forward_x + away_y * forward_y, 0, self._lengths)
+        side = forward_x * away_y - forward_y * away_x
+        distance = np.hypot(away_x - ahead * forward_x, away_y - ahead * forward_y)
+        return self._begins + ahead, distance, side

@@ -1,0 +1,243 @@
+"""Judging by a point of the floor: how near the path comes to it, how often it goes round, how far from it it ends.
+
+Places to come through or to keep out of are judged in ``path.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import CriterionResult, Measure, TrialResult
+from service.grading.judging.case import Case, Indexed
+from service.grading.judging.geometry import headings, place_at, positions, stretches, to_segment
+from service.grading.judging.judges import by_trial, judges, judges_case, summary
+from service.grading.judging.outcome import Outcome, failed, passed
+from sim.recording import Floats, Recording
+from submissions.criteria.point import Circuits, Closest, Spread
+
+_FAR = 10_000.0
+_TURN = 2.0
+
+
+@judges(Closest)
+def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
+    """The least distance of the robot's middle to a point, and how it began to turn with regard to it."""
+    recording = trial.recording
+    points = positions(recording)
+    near = _nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
+    row, least = near if near else (0, math.nan)
+    straight = _straight_on(recording, criterion.x, criterion.y)
+    measures = (Measure("least distance", least, "mm"), Measure("straight on", straight, "mm"))
+    point = f"({criterion.x:g}, {criterion.y:g})"
+    where = place_at(recording, row)
+    if criterion.first_turn is not None:
+        turned = _first_turn(recording, criterion.x, criterion.y)
+        if turned is None or (turned[1] == "towards") != (criterion.first_turn == "towards"):
+            told = "it did not turn at all" if turned is None else f"it turned {_to(turned[1])} it"
+            wished = f"Expected the robot first to turn {_to(criterion.first_turn)}"
+            return failed(
+                f"{wished} {point}, but {told}.", *place_at(recording, turned[0] if turned else 0), measures=measures
+            )
+    if criterion.distance is not None and not criterion.distance[0] <= least <= criterion.distance[1]:
+        low, high = criterion.distance
+        return failed(
+            f"Expected the robot to come as near to {point} as {low:g} to {high:g} mm, "
+            f"but the nearest it came was {least:.0f} mm.",
+            *where,
+            measures=measures,
+        )
+    if criterion.than_straight is not None and (least < straight) != (criterion.than_straight == "nearer"):
+        wish = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
+        return failed(
+            f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), "
+            f"but the nearest it came was {least:.0f} mm.",
+            *where,
+            measures=measures,
+        )
+    return passed(f"The robot came as near to {point} as {least:.0f} mm.", *where, measures)
+
+
+def _to(direction: str) -> str:
+    return "towards" if direction == "towards" else "away from"
+
+
+def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
+    """When the robot had turned by 2 degrees, and whether that was towards the point."""
+    degrees = headings(recording)
+    rows = np.flatnonzero(np.abs(degrees - degrees[0]) > _TURN)
+    if not len(rows):
+        return None
+    row = int(rows[0])
+    start = recording.start
+    bearing = math.degrees(math.atan2(y - start.y, x - start.x))
+    left = (bearing - start.heading + 180) % 360 - 180 > 0
+    return row, "towards" if (degrees[row] > degrees[0]) == left else "away"
+
+
+def _straight_on(recording: Recording, x: float, y: float) -> float:
+    """Least distance from a point to the ray ahead of the start, mm."""
+    start = recording.start
+    along = math.radians(start.heading)
+    end = (start.x + _FAR * math.cos(along), start.y + _FAR * math.sin(along))
+    return float(to_segment(np.array([[x, y]]), (start.x, start.y), end)[0])
+
+
+def _nearest(distances: Floats) -> tuple[int, float] | None:
+    if np.isnan(distances).all():
+        return None
+    row = int(np.nanargmin(distances))
+    return row, float(distances[row])
+
+
+#: The gyro is smoothed over so many rows (1 s) before corners are looked for.
+_SMOOTH = 31
+#: Going straight on for so many rows (0.5 s) parts two corners.
+_LASTING = 15
+#: An upper bound of so many rounds is none.
+_NO_BOUND = 100
+#: A lesser change of heading is no corner, degrees.
+_CORNER = 30.0
+
+
+@judges(Circuits)
+def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
+    recording = trial.recording
+    round_it = rounds(positions(recording, criterion.of), criterion.x, criterion.y)
+    times = float(abs(round_it[-1])) if len(round_it) else 0.0
+    measures = [Measure("times round", times)]
+    point, end = f"({criterion.x:g}, {criterion.y:g})", (recording.end_t, recording.end)
+    low, high = criterion.times
+    wanted = f"{low:g} times" if low == high else f"{low:g} to {high:g} times"
+    if high >= _NO_BOUND:
+        wanted = "at least once" if low == 1 else f"at least {low:g} times"
+    if criterion.direction != "either" and times >= 0.5:
+        went = "anticlockwise" if round_it[-1] > 0 else "clockwise"
+        if went != criterion.direction:
+            return failed(
+                f"Expected the path to go {criterion.direction} round {point}, but it went {went}.",
+                *end,
+                measures=tuple(measures),
+            )
+    if not low <= times <= high:
+        drawn = "" if len(round_it) else "; the pen was never down, which -p in the program's magic line does"
+        score = Fraction(min(times / low, 1.0) if low else 0.0).limit_denominator(1000)
+        return failed(
+            f"Expected the path to go {wanted} round {point}, but it went {times:.2f} times{drawn}.",
+            *end,
+            score=score,
+            measures=tuple(measures),
+        )
+    nearest = float(
+        np.nanmin(np.hypot(*(positions(recording, criterion.of) - (criterion.x, criterion.y)).T), initial=np.inf)
+    )
+    if nearest < criterion.clear_of:
+        return failed(
+            f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but it came as near as "
+            f"{nearest:.0f} mm.",
+            *end,
+            measures=tuple(measures),
+        )
+    for number, (first, last) in enumerate(_whole_rounds(round_it), 1):
+        turned = headings(recording)[first : last + 1]
+        change = float(abs(turned[-1] - turned[0]))
+        corners = _corners(turned)
+        measures += [Measure(f"gyro in round {number}", change, "°"), Measure(f"corners in round {number}", corners)]
+        if criterion.gyro is not None and not criterion.gyro[0] <= change <= criterion.gyro[1]:
+            return failed(
+                f"Expected the gyro to change by {criterion.gyro[0]:g}° to {criterion.gyro[1]:g}° in each round, "
+                f"but in round {number} it changed by {change:.0f}°.",
+                *place_at(recording, last),
+                measures=tuple(measures),
+            )
+        if criterion.corners is not None and corners != criterion.corners:
+            return failed(
+                f"Expected the gyro to change in {criterion.corners} steps in each round, "
+                f"but in round {number} there were {corners}.",
+                *place_at(recording, last),
+                measures=tuple(measures),
+            )
+    return passed(f"The path went {times:.2f} times round {point}.", *end, tuple(measures))
+
+
+def rounds(points: Floats, x: float, y: float) -> Floats:
+    """How often the path has gone round (x, y) at each row since its first, anticlockwise above 0.
+
+    Rows that are NaN (where the pen was up) are left out.
+    """
+    drawn = points[~np.isnan(points[:, 0])]
+    if not len(drawn):
+        return np.zeros(0)
+    angles = np.unwrap(np.arctan2(drawn[:, 1] - y, drawn[:, 0] - x))
+    return np.asarray((angles - angles[0]) / (2 * np.pi))
+
+
+def _whole_rounds(round_it: Floats) -> list[tuple[int, int]]:
+    """First and last row of each whole round."""
+    farthest = np.maximum.accumulate(np.abs(round_it))
+    ends = np.searchsorted(farthest, np.arange(1, int(farthest.max(initial=0.0)) + 1)).tolist()
+    return list(zip([0, *ends], ends, strict=False))
+
+
+def _corners(turned: Floats) -> int:
+    """In how many steps the heading changes: parts in which it turns faster than on average, 0.5 s or more apart."""
+    if len(turned) <= _SMOOTH:
+        return 0
+    smooth = np.convolve(turned, np.ones(_SMOOTH) / _SMOOTH, mode="valid")
+    rate = np.diff(smooth) * np.sign(turned[-1] - turned[0])
+    fast = rate > rate.mean()
+    for first, last in stretches(~fast):
+        if last - first < _LASTING and first > 0 and last < len(fast):
+            fast[first:last] = True
+    return sum(abs(float(smooth[last] - smooth[first])) >= _CORNER for first, last in stretches(fast))
+
+
+@judges_case(Spread)
+def judge_spread(criterion: Spread, case: Case) -> CriterionResult:
+    """An observation: where nothing was lost, all that was observed is told."""
+
+    def told(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
+        if trials and all(outcome.passed for outcome in outcomes):
+            return _spread_words(criterion, [trial for _, trial in trials])
+        return summary(trials, outcomes)
+
+    return by_trial(criterion, case, lambda _, trial: _ended(criterion, trial), told)
+
+
+def _ended(criterion: Spread, trial: TrialResult) -> Outcome:
+    """Distance of the end from the point, mm."""
+    recording = trial.recording
+    distance = _distance(criterion, trial)
+    measures = (Measure("distance from the target", distance, "mm"),)
+    told = f"ended {distance:.0f} mm from ({criterion.x:g}, {criterion.y:g})"
+    if criterion.within is not None and not distance <= criterion.within:
+        return failed(
+            f"Expected the robot to end within {criterion.within:g} mm of ({criterion.x:g}, {criterion.y:g}), "
+            f"but it ended {distance:.0f} mm from it.",
+            recording.end_t,
+            recording.end,
+            measures=measures,
+        )
+    return passed(f"The robot {told}.", recording.end_t, recording.end, measures)
+
+
+def _spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
+    """Least, mean and greatest distance for each level of motor noise."""
+    levels = sorted({trial.motor_noise for trial in trials})
+    told = []
+    for level in levels:
+        distances = [_distance(criterion, trial) for trial in trials if trial.motor_noise == level]
+        mean = sum(distances) / len(distances)
+        told.append(
+            f"with motor noise {level:g} {min(distances):.0f} to {max(distances):.0f} mm (mean {mean:.0f}, "
+            f"{len(distances)} run{'' if len(distances) == 1 else 's'})"
+        )
+    return f"The robot ended at these distances from ({criterion.x:g}, {criterion.y:g}): {'; '.join(told)}."
+
+
+def _distance(criterion: Spread, trial: TrialResult) -> float:
+    end = trial.recording.end
+    return math.hypot(end.x - criterion.x, end.y - criterion.y)

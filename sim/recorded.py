@@ -1,0 +1,48 @@
+"""What belongs to a recording without being in it: the floor and the robot that it names, and where that robot was.
+
+Whatever is drawn or judged of it is the service's.
+"""
+
+from __future__ import annotations
+
+from sim.backgrounds import Floor, floor, names
+from sim.recording import Pose, Recording
+from sim.robot import ROBOTS, Robot
+
+TICKS_PER_SECOND = 30
+
+
+def floor_of(recording: Recording) -> Floor | None:
+    """The floor that was driven on; None for an image of an instructor's own, which is not kept with the recording."""
+    if recording.background not in names():
+        return None
+    return floor(recording.background, labels=recording.label_patches, seed=recording.sheet)
+
+
+def robot_of(recording: Recording) -> Robot:
+    """The robot that was driven; the default one if its name is not known any more."""
+    return ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
+
+
+def seconds_at(tick: float) -> float:
+    """When a tick was done."""
+    return tick / TICKS_PER_SECOND
+
+
+def ticks_until(t: float) -> int:
+    """How many ticks were done at ``t`` seconds."""
+    return int(t * TICKS_PER_SECOND + 1e-6)
+
+
+def pose_after(recording: Recording, tick: int) -> Pose:
+    """Where the robot was after that many ticks; at its start before the first, at its end from the last on."""
+    ticks = recording.ticks
+    done = min(tick, len(ticks))
+    if done < 1:
+        return recording.start
+    return Pose(float(ticks.x[done - 1]), float(ticks.y[done - 1]), float(ticks.heading[done - 1]))
+
+
+def pose_at(recording: Recording, t: float) -> Pose:
+    """Where the robot was at ``t`` seconds: its pose after the last tick until then."""
+    return pose_after(recording, ticks_until(t))

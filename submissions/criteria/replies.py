@@ -1,0 +1,47 @@
+"""The criterion about what the responder answers.
+
+How often images are named rightly is asked in ``classification.py``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from submissions.criteria.common import SomeTextOrTexts
+from submissions.criteria.texts import TextConditions
+
+
+class Replies(TextConditions):
+    """What the responder answers, arrived in time or not.
+
+    ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.
+    Otherwise every message of the robot's that reached the responder must have an answer that meets the
+    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down
+    which messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the conditions,
+    ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the whole answer.
+    """
+
+    check: Literal["replies"]
+    to: SomeTextOrTexts = ()
+    to_starts_with: SomeTextOrTexts = ()
+    expect: dict[str, Any] = Field(default_factory=dict)
+    at_least: int = Field(default=1, ge=0)
+    is_json: bool = False
+    path: str | None = Field(default=None, min_length=1)
+    value: Any = None
+
+    @property
+    def asks_responder(self) -> bool:
+        return True
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.value is not None and self.path is None:
+            raise ValueError('has value without path, expected path = "message" or the like beside it')
+        if self.expect and (self.to or self.to_starts_with or self.has_conditions or self.value is not None):
+            raise ValueError("has expect beside other conditions, expected expect alone (with path and ignore_case)")
+        if self.path is None and any(not isinstance(answer, str) for answer in self.expect.values()):
+            raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
+        return self

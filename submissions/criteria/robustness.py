@@ -1,0 +1,45 @@
+"""The criterion about how long images are named rightly as conditions get harder.
+
+The conditions that can be swept are in ``sweep.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from submissions.criteria.common import Misfit, Surroundings
+from submissions.criteria.recognition import Recognition
+from submissions.sweep import Condition
+
+
+class Robustness(Recognition):
+    """How long images are named rightly as one swept condition gets harder.
+
+    ``along`` is a condition of the scenario's sweep. ``marks_from = "area"``: the marks times the mean height
+    of the curve of accuracy (the area under it, by the width of the sweep). ``"falls_below"``: the marks times
+    the part of the sweep, from its easiest level outwards, over which the accuracy is at least ``level``. With
+    ``at_least``, all marks from that area or part on, and in proportion below it.
+    """
+
+    check: Literal["robustness"]
+    along: Condition
+    marks_from: Literal["area", "falls_below"] = "area"
+    level: float | None = Field(default=None, gt=0, le=1)
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        yield from super().misfits(around)
+        if not any(scenario.varies(self.along) for scenario in around.looked_at_by(self)):
+            yield Misfit(
+                "along",
+                f'along is "{self.along}", but no scenario of the criterion is swept over it, '
+                f"expected [scenario.sweep] with {self.along} = [...]",
+            )
+
+    @model_validator(mode="after")
+    def _level_fits(self) -> Self:
+        if (self.level is not None) != (self.marks_from == "falls_below"):
+            raise ValueError('needs level with marks_from = "falls_below", and only there, expected both or neither')
+        return self

@@ -1,0 +1,113 @@
+"""From the ``[[criterion]]`` tables of an assignment file to criteria that fit the rest of it.
+
+What a criterion may hold and what it needs is its schema's; no kind of criterion is named here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from sim.errors import UsageError
+from submissions.assignment_tables import did_you_mean, listed
+from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Misfit, Surroundings
+from submissions.document import checked_table, list_of_tables, no_double, tables_of, texts_in
+from submissions.problems import Problems
+from submissions.source_text import decode_source
+from submissions.toml_lines import Path as Place
+
+_WITHOUT_ROBOT = tuple(check for check, schema in SCHEMAS.items() if not schema.judges_runs)
+
+
+def read_criteria(
+    document: Mapping[str, object], around: Surroundings, robotless: bool, problems: Problems
+) -> tuple[Criterion, ...]:
+    """The criteria that could be read; ``robotless`` is an assignment in which nothing drives."""
+    read: dict[Place, Criterion] = {}
+    seen: dict[str, int] = {}
+    scenarios = texts_in([raw.get("id") for raw in list_of_tables(document.get("scenario"))])
+    for number, raw in enumerate(tables_of(document, "criterion", problems)):
+        place: Place = ("criterion", number)
+        criterion = _criterion(raw, place, problems)
+        for index, name in enumerate(texts_in(raw.get("scenarios"))):
+            if name not in scenarios:
+                problems.add(
+                    (*place, "scenarios", index),
+                    f'scenarios names "{name[:60]}", expected the id of a scenario{did_you_mean(name, scenarios)}',
+                )
+        if criterion is None:
+            continue
+        try:
+            criterion = criterion.completed(around)
+        except Misfit as misfit:
+            problems.add((*place, misfit.key), misfit.sentence)
+        no_double({"id": criterion.id}, seen, place, "criterion", problems)
+        read[place] = criterion
+    around = replace(around, criteria=tuple(read.values()))
+    for place, criterion in read.items():
+        for found in (*_without_a_part(criterion, around, robotless), *criterion.misfits(around)):
+            problems.add((*place, found.key), found.sentence)
+    return tuple(read.values())
+
+
+def check_given(document: Mapping[str, object], problems: Problems) -> None:
+    """Names given files that hold answers: those of criteria, and what describes the assignment."""
+    answers = {"assignment.toml", "expected.toml"}
+    for raw in list_of_tables(document.get("criterion")):
+        schema = SCHEMAS.get(str(raw.get("check")))
+        answers |= {str(raw[key]) for key in _marked(schema, HOLDS_ANSWERS) if key in raw} if schema else set()
+    for number, name in enumerate(texts_in(document.get("given"))):
+        if name in answers:
+            problems.add(
+                ("given", number), f'given names "{name[:60]}", which holds answers, expected what students may read'
+            )
+
+
+def sources_of(criteria: Iterable[Criterion], files: Mapping[str, bytes], problems: Problems) -> dict[str, str]:
+    """The texts of the instructor's checks, by file name."""
+    sources = {}
+    for name in (name for criterion in criteria for name in criterion.python_files if name in files):
+        try:
+            sources[name] = decode_source(files[name], name).text
+        except UsageError as error:
+            problems.add(("criterion",), str(error).rstrip("."))
+    return sources
+
+
+def _criterion(raw: Mapping[str, Any], place: Place, problems: Problems) -> Criterion | None:
+    check = raw.get("check")
+    if not isinstance(check, str) or check not in SCHEMAS:
+        hint = did_you_mean(check, SCHEMAS) if isinstance(check, str) else ""
+        said = f'check is "{str(check)[:60]}"' if "check" in raw else "check is missing"
+        problems.add((*place, "check"), f"{said}, expected {listed(SCHEMAS)}{hint}")
+        return None
+    schema = SCHEMAS[check]
+    criterion = checked_table(schema, raw, place, problems)
+    for key in sorted(_marked(schema, NOT_EMPTY)):
+        if raw.get(key) == []:
+            problems.add((*place, key), f"{key} is an empty list and asks for nothing, expected at least one text")
+    return criterion and criterion.model_copy(update={"id": criterion.id or _slug(criterion.title)})
+
+
+def _marked(schema: type[Criterion], mark: str) -> set[str]:
+    return {name for name, key in schema.model_fields.items() if mark in key.metadata}
+
+
+def _without_a_part(criterion: Criterion, around: Surroundings, robotless: bool) -> Iterator[Misfit]:
+    """What it judges must be there: runs of a robot, and a responder that is asked."""
+    if criterion.asks_responder and "responder" in around.without:
+        yield Misfit("check", 'check needs a responder, but parts has responder = "none", expected one')
+    if robotless and criterion.judges_runs:
+        yield Misfit(
+            "check",
+            'check judges a run of the robot, but there is no scenario and parts has program = "none", '
+            f"expected {listed(_WITHOUT_ROBOT)}",
+        )
+
+
+def _slug(title: str) -> str:
+    words = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:60].strip("-")
+    return words or "criterion"
