@@ -27,7 +27,7 @@ from service.queue import self_test as known_answers
 from service.queue.broker import broker_answers, broker_client, socket_path
 from service.queue.worker import worker_lives
 from service.settings import Settings
-from service.store import self_tests, workers
+from service.store import workers
 from service.store.engine import Store, now, open_engine
 from service.store.installation import secret_of
 from service.store.metrics import collect
@@ -196,7 +196,7 @@ def _known_answer(settings: Settings) -> tuple[bool, str]:
             return True, here
         with store.reading() as session:
             lately = now(session) - timedelta(days=1)
-            shut_out = [found for found in self_tests.in_quarantine(session) if found.since > lately]
+            shut_out = [found for found in workers.in_quarantine(session) if found.since > lately]
     if not shut_out:
         return True, here
     told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)

@@ -16,7 +16,7 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, CursorResult, Select, select, update
 from sqlalchemy.orm import Session
 
-from service.store import phases, result_cache, results, workers
+from service.store import phases, plots, result_cache, results, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
@@ -93,9 +93,10 @@ def enqueue(session: Session, job: Job, at: datetime) -> str:
 
 def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
     """Give a job that waits the grade of an identical one at once. Raises HostError when it does not wait."""
-    values = result_cache.copy(session, source_id, job_id, at)
+    values = result_cache.copied(session, source_id, job_id, at)
     if not _make(session, COPY, (Job.id == job_id,), at, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
+    result_cache.copy_rows(session, source_id, job_id)
 
 
 def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
@@ -197,8 +198,8 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
         if source is None:
             return False
         at = now(session)
-        _make_held(session, HEARTBEAT, claim, at, {"heartbeat_at": at})
-        _make_held(session, FINISH, claim, at, result_cache.copy(session, source, claim.job_id, at))
+        _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
+        result_cache.copy_rows(session, source, claim.job_id)
         return True
 
 
@@ -262,8 +263,9 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
     ).all():
         if lease_until is None or heartbeat_at is None:
             continue
-        renewed = {"heartbeat_at": at, "lease_until": at + (lease_until - heartbeat_at)}
-        session.execute(update(Job).where(Job.id == job_id, Job.lease == lease).values(**renewed))
+        renewed = at + (lease_until - heartbeat_at)
+        leased = update(Job).where(Job.id == job_id, Job.lease == lease)
+        session.execute(leased.values(heartbeat_at=at, lease_until=renewed))
     waiting = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > ahead)
     for job_id, attempt, due_at in session.execute(waiting).all():
         latest = at + longest_wait(attempt) if attempt else at
@@ -272,6 +274,7 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
             session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
     notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
     session.execute(update(Job).where(*notified).values(notified_at=None))
+    plots.correct_clock(session, at, ahead)
 
 
 def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
