@@ -19,13 +19,13 @@ from benchmarks.measurement import Measurement
 from postgresql_server import PostgresqlServer
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
+from service.queue.supervisor import Supervisor
 from service.report_files import write_reports
 from service.settings import load_settings
 from service.store import batches, intake
 from service.store.engine import Store, open_store
 from service.store.metrics import quantile
 from service.store.models import Job, JobState, Lane
-from service.supervisor import Supervisor
 from submissions.assignment_file import find_assignment
 from submissions.submission import Source, Submission
 

@@ -30,7 +30,7 @@ from service.store import artifacts, batch_control, batches, results
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import GradingRequest, accept_batch, load_grading_request
-from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
+from service.store.models import CriterionResultRow, Job, JobState, Lane, PlotState, TrialRow
 from submissions.example_folder import examples
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
@@ -82,7 +82,7 @@ class Service:
                 positions = session.scalars(select(TrialRow.position).where(TrialRow.job_id == job.id)).all()
                 assert sorted(positions) == list(range(len(positions)))
                 assert positions
-                marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
+                marked = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
                 assert session.scalar(marked) == len(load_grading_request(session, job.id).assignment.criteria)
 
 

@@ -18,7 +18,7 @@ from service.store import artifacts, jobs, results
 from service.store.columns import storable
 from service.store.engine import Store
 from service.store.intake import load_grading_request
-from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, SubmissionRow
+from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import Line
 
@@ -86,7 +86,7 @@ def test_accuracy_is_data(store: Store) -> None:
     assert accuracy is not None
     _stored(store, grade)
     with store.reading() as session:
-        query = select(CriterionRow).where(CriterionRow.accuracy < 0.9, CriterionRow.accuracy_n >= 6)
+        query = select(CriterionResultRow).where(CriterionResultRow.accuracy < 0.9, CriterionResultRow.accuracy_n >= 6)
         row = session.scalars(query).one()
         assert (row.accuracy, row.accuracy_low, row.accuracy_high) == (accuracy.value, accuracy.low, accuracy.high)
         counts = {(truth, answer): count for truth, answer, count in row.confusion}

@@ -22,7 +22,7 @@ from service.store.lease_reaper import note_notices, requeue_lost, wanting_notic
 from service.store.models import (
     Batch,
     BatchState,
-    CriterionRow,
+    CriterionResultRow,
     Job,
     JobState,
     Lane,
@@ -57,7 +57,7 @@ def _finish(store: Store, claim: Claim) -> None:
 
 def _rows(store: Store) -> tuple[int, int]:
     with store.reading() as session:
-        count = [session.scalar(select(func.count()).select_from(table)) for table in (TrialRow, CriterionRow)]
+        count = [session.scalar(select(func.count()).select_from(table)) for table in (TrialRow, CriterionResultRow)]
     return count[0] or 0, count[1] or 0
 
 

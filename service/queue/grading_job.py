@@ -84,7 +84,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if jobs.finish_from_cache(store, claim):
         _log.info("job.copied")
         return
-    watch = _Heartbeat(store, settings, claim)
+    watch = _LeaseKeeper(store, settings, claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
     graded = grade(
@@ -104,7 +104,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     _log.info("job.graded", verdict=graded.verdict.value, seconds=round(watch.seconds, 3))
 
 
-class _Heartbeat:
+class _LeaseKeeper:
     """Keeps a job's lease while it is graded, and stops the grading when the lease is lost or time is up."""
 
     def __init__(self, store: Store, settings: Settings, claim: jobs.Claim) -> None:

@@ -13,7 +13,7 @@ from typing import TypeVar
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import jobs, models, result_cache
+from service.store import jobs, result_cache
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
@@ -26,6 +26,7 @@ from service.store.models import (
     JobState,
     Lane,
     Standing,
+    SubmissionRow,
 )
 from service.store.policies import Ruling, rule
 from service.store.students import Students
@@ -176,7 +177,7 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 
     Raises UsageError for an unknown job, HostError where what was kept cannot be read.
     """
-    source = select(models.SubmissionRow.source).join(Job, Job.submission_id == models.SubmissionRow.id)
+    source = select(SubmissionRow.source).join(Job, Job.submission_id == SubmissionRow.id)
     return GradingRequest(
         load_submission(session, job_id),
         load_assignment(session, job_id),
@@ -186,7 +187,7 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 
 def load_submission(session: Session, job_id: str) -> Submission:
     """What was submitted for a job; raises like ``load_grading_request``."""
-    kept = select(models.SubmissionRow.packed).join(Job, Job.submission_id == models.SubmissionRow.id)
+    kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
 
 
@@ -262,12 +263,12 @@ def _enrolled(
 def _known(session: Session, item: _Item) -> AlreadySubmitted | None:
     grading_request = item.packed.grading_request
     newest = session.scalar(
-        select(models.SubmissionRow)
+        select(SubmissionRow)
         .where(
-            models.SubmissionRow.enrolment_id == item.enrolment_id,
-            models.SubmissionRow.assignment == grading_request.assignment.id,
+            SubmissionRow.enrolment_id == item.enrolment_id,
+            SubmissionRow.assignment == grading_request.assignment.id,
         )
-        .order_by(models.SubmissionRow.attempt.desc())
+        .order_by(SubmissionRow.attempt.desc())
         .limit(1)
     )
     if newest is None or newest.sha256 != grading_request.submission.sha256:
@@ -310,15 +311,15 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     grading_request = packed.grading_request
     submission, assignment = grading_request.submission, grading_request.assignment
     version_id = keep(session, packed.frozen, at)
-    of_student = (models.SubmissionRow.enrolment_id == enrolment_id, models.SubmissionRow.assignment == assignment.id)
-    earlier = session.scalar(select(func.max(models.SubmissionRow.attempt)).where(*of_student)) or 0
+    of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
+    earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
     ruling = Ruling()
     if not terms.anew:
         ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
     job_id = new_id()
     if not ruling.over:
-        jobs.supersede(session, select(models.SubmissionRow.id).where(*of_student), job_id, at)
-    row = models.SubmissionRow(
+        jobs.supersede(session, select(SubmissionRow.id).where(*of_student), job_id, at)
+    row = SubmissionRow(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
         batch_id=terms.batch_id,

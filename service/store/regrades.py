@@ -19,7 +19,7 @@ from service.store.models import (
     UNFINISHED,
     AssignmentVersion,
     Batch,
-    CriterionRow,
+    CriterionResultRow,
     Enrolment,
     Job,
     JobState,
@@ -185,9 +185,9 @@ def _unjudged(session: Session, batch_id: str) -> set[str]:
     """The jobs for the submissions of a batch that have a criterion that could not be judged."""
     ids = select(Job.submission_id).where(Job.batch_id == batch_id)
     query = (
-        select(CriterionRow.job_id)
-        .join(Job, CriterionRow.job_id == Job.id)
-        .where(Job.submission_id.in_(ids), CriterionRow.unjudged.is_not(None))
+        select(CriterionResultRow.job_id)
+        .join(Job, CriterionResultRow.job_id == Job.id)
+        .where(Job.submission_id.in_(ids), CriterionResultRow.unjudged.is_not(None))
     )
     return set(session.scalars(query))
 
@@ -271,7 +271,7 @@ _Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
 
 
 def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
-    query = select(CriterionRow).where(CriterionRow.job_id == job_id).order_by(CriterionRow.position)
+    query = select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
     return {row.criterion: (row.title, row.marks, row.max_marks) for row in session.scalars(query)}
 
 

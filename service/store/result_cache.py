@@ -16,7 +16,7 @@ from service.store import phases
 from service.store.models import (
     Artifact,
     AssignmentVersion,
-    CriterionRow,
+    CriterionResultRow,
     Job,
     JobState,
     PlotState,
@@ -52,7 +52,7 @@ def find(session: Session, key: str) -> str | None:
     cut = exists().where(
         TrialRow.job_id == Job.id, TrialRow.verdict.in_([verdict.value for verdict in _NOT_REPEATABLE])
     )
-    unjudged = exists().where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None))
+    unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
     query = (
         select(Job.id)
         .where(
@@ -75,7 +75,7 @@ def find(session: Session, key: str) -> str | None:
 
 def copy_rows(session: Session, source_id: str, job_id: str) -> None:
     """Copy the rows of a grade to another job, which has none."""
-    for table in (TrialRow, CriterionRow, Artifact):
+    for table in (TrialRow, CriterionResultRow, Artifact):
         columns = table.__table__.columns
         kept = [column for column in columns if column.name not in ("id", "job_id")]
         rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
