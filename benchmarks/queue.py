@@ -19,13 +19,13 @@ from benchmarks.measurement import Measurement
 from postgresql_server import PostgresqlServer
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
+from service.queue.supervisor import Supervisor
 from service.report_files import write_reports
 from service.settings import load_settings
 from service.store import batches, intake
 from service.store.engine import Store, open_store
 from service.store.metrics import quantile
 from service.store.models import Job, JobState, Lane
-from service.supervisor import Supervisor
 from submissions.assignment_file import find_assignment
 from submissions.submission import Source, Submission
 
@@ -69,7 +69,9 @@ class _Bench:
         job = intake.accept(self.store, _request(student), max_attempts=3).job_id
         self.notifier.grade(Lane.INTERACTIVE)
         self.until(lambda: self._graded(job))
-        write_reports(self.store, [job], self.folder)
+        with self.store.reading() as session:
+            line = batches.job_line(session, job)
+        write_reports(self.store, [line], self.folder)
         return time.perf_counter() - begun
 
     def until(self, look: Callable[[], bool], pause: float = 0.02) -> None:
@@ -130,9 +132,9 @@ def _measure(bench: _Bench) -> list[Measurement]:
 
 
 def _plots_drawn(bench: _Bench) -> bool:
-    from service.store.lease_reaper import due_plots
+    from service.store import plots
 
-    return due_plots(bench.store) == 0
+    return plots.due(bench.store) == 0
 
 
 def _seconds(values: Sequence[float]) -> str:

@@ -1,6 +1,7 @@
-"""What could keep this machine from grading, looked at one by one. Changes nothing but making the home folder.
+"""What could keep this machine, or the whole service, from grading: one list of named checks.
 
-Each check gives one line; none of them raises.
+``robomark doctor`` prints what is found on this machine, ``/health/ready`` what is found of the service. Nothing here
+raises, and nothing is changed but that the home folder is made.
 """
 
 from __future__ import annotations
@@ -20,14 +21,11 @@ from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
-from responders.sandbox.manager import Sandboxes
-from service.grading.trial_runner import TrialRunner
 from service.home import open_home
-from service.queue import self_test as known_answers
-from service.queue.broker import broker_answers, broker_client, socket_path
+from service.queue.broker import broker_answers, broker_client, broker_version, socket_path
 from service.queue.worker import worker_lives
 from service.settings import Settings
-from service.store import self_tests, workers
+from service.store import workers
 from service.store.engine import Store, now, open_engine
 from service.store.installation import secret_of
 from service.store.metrics import collect
@@ -40,6 +38,7 @@ _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
 _APART_SECONDS = 5.0
 _LONG_SECONDS = 60.0
+_READY_SECONDS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,32 +50,41 @@ class Finding:
     sentence: str
 
 
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing to look at: on this machine, for whoever runs it, and, where grading needs it, of the whole service.
+
+    What is told of the service tells a stranger nothing: no address, no name, no text of an error.
+    """
+
+    what: str
+    here: Callable[[Settings], tuple[bool, str]]
+    of_service: Callable[[Settings, Store], tuple[bool, str]] | None = None
+
+
 def examine(settings: Settings) -> list[Finding]:
-    """Everything, in an order that a reader can follow."""
-    checks: list[tuple[str, Callable[[Settings], tuple[bool, str]]]] = [
-        ("Python", _python),
-        ("simulator", _simulator),
-        ("sandbox", _sandbox),
-        ("control groups", _control_groups),
-        ("between trials", _between_trials),
-        ("home", _home),
-        ("database", _database),
-        ("secret", _secret),
-        ("broker", _broker),
-        ("clock", _clock),
-        ("workers", _workers),
-        ("queue", _queue),
-        ("known answer", _known_answer),
-    ]
-    return [_finding(what, check, settings) for what, check in checks]
+    """Everything that can be looked at from here, in an order that a reader can follow."""
+    return [_found_here(check, settings) for check in CHECKS]
 
 
-def _finding(what: str, check: Callable[[Settings], tuple[bool, str]], settings: Settings) -> Finding:
+def examine_service(settings: Settings, store: Store) -> list[Finding]:
+    """Everything without which nothing is graded. ``settings.broker_url`` must name a broker."""
+    return [_found_of_service(check, settings, store) for check in CHECKS if check.of_service is not None]
+
+
+def _found_here(check: Check, settings: Settings) -> Finding:
     try:
-        well, sentence = check(settings)
+        return Finding(check.what, *check.here(settings))
     except (RobomarkError, SQLAlchemyError, redis.RedisError, OSError, ImportError) as error:
-        well, sentence = False, " ".join(str(error).split())
-    return Finding(what, well, sentence)
+        return Finding(check.what, False, " ".join(str(error).split()))
+
+
+def _found_of_service(check: Check, settings: Settings, store: Store) -> Finding:
+    assert check.of_service is not None
+    try:
+        return Finding(check.what, *check.of_service(settings, store))
+    except (RobomarkError, SQLAlchemyError, OSError):
+        return Finding(check.what, False, "the database does not answer")
 
 
 def _python(_settings: Settings) -> tuple[bool, str]:
@@ -94,8 +102,15 @@ def _simulator(_settings: Settings) -> tuple[bool, str]:
 
 
 def _sandbox(_settings: Settings) -> tuple[bool, str]:
+    from responders.sandbox.manager import Sandboxes
+
     with Sandboxes() as sandboxes:
         return True, f"student code runs behind: {sandboxes.check()}"
+
+
+def _sandbox_of_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
+    standing = sorted({worker.sandbox for worker in _lately(store)})
+    return bool(standing), "; ".join(standing) or "no worker says that they stand"
 
 
 def _control_groups(settings: Settings) -> tuple[bool, str]:
@@ -105,8 +120,7 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
     with _opened(settings) as store:
         if store is None:
             return True, told
-        with store.reading() as session:
-            lately = [seen.worker for seen in workers.known_workers(session) if seen.lately]
+        lately = _lately(store)
     if not lately:
         return True, told
     have = sum("control group" in worker.sandbox for worker in lately)
@@ -115,6 +129,8 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
 
 def _between_trials(_settings: Settings) -> tuple[bool, str]:
     """Without this workers here give assignments with hidden scenarios back."""
+    from responders.sandbox.manager import Sandboxes
+
     with Sandboxes() as sandboxes:
         reason = sandboxes.remembers()
     if reason is None:
@@ -143,6 +159,13 @@ def _database(settings: Settings) -> tuple[bool, str]:
     if revision != newest_revision():
         return False, f"{where} is at revision {revision}, this Robomark at {newest_revision()}: robomark db upgrade"
     return True, f"{where}, tables at revision {revision}"
+
+
+def _tables(_settings: Settings, store: Store) -> tuple[bool, str]:
+    revision = current_revision(store.engine)
+    if revision != newest_revision():
+        return False, f"its tables are at revision {revision}, this Robomark at {newest_revision()}"
+    return True, f"answers, tables at revision {revision}"
 
 
 def _secret(settings: Settings) -> tuple[bool, str]:
@@ -183,8 +206,16 @@ def _broker(settings: Settings) -> tuple[bool, str]:
     return True, f"{where} answers, version {version}"
 
 
+def _broker_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
+    version = broker_version(settings.broker_url, _READY_SECONDS)
+    return version is not None, f"answers, version {version}" if version else "does not answer"
+
+
 def _known_answer(settings: Settings) -> tuple[bool, str]:
     """Whether this machine grades the known answer rightly, and every worker did lately."""
+    from service.grading.trial_runner import TrialRunner
+    from service.queue import self_test as known_answers
+
     with TrialRunner() as runner:
         actual = known_answers.ask(runner)
     wrong = "" if actual is None else known_answers.difference(known_answers.known(), actual)
@@ -196,7 +227,7 @@ def _known_answer(settings: Settings) -> tuple[bool, str]:
             return True, here
         with store.reading() as session:
             lately = now(session) - timedelta(days=1)
-            shut_out = [found for found in self_tests.in_quarantine(session) if found.since > lately]
+            shut_out = [found for found in workers.in_quarantine(session) if found.since > lately]
     if not shut_out:
         return True, here
     told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)
@@ -220,13 +251,19 @@ def _workers(settings: Settings) -> tuple[bool, str]:
     with _opened(settings) as store:
         if store is None:
             return True, here
-        with store.reading() as session:
-            lately = [seen.worker for seen in workers.known_workers(session) if seen.lately]
+        lately = _lately(store)
     if not lately:
         return True, here
     slots = sum(worker.concurrency for worker in lately)
     hosts = len({worker.host for worker in lately})
     return True, f"{here}; heard of lately: {len(lately)} on {hosts} machines, {slots} gradings at a time"
+
+
+def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
+    lately = _lately(store)
+    if not lately:
+        return False, "none was heard of lately"
+    return True, f"{len(lately)} heard of lately, {sum(worker.concurrency for worker in lately)} gradings at a time"
 
 
 def _queue(settings: Settings) -> tuple[bool, str]:
@@ -245,6 +282,11 @@ def _queue(settings: Settings) -> tuple[bool, str]:
     return True, told
 
 
+def _lately(store: Store) -> list[workers.WorkerDescription]:
+    with store.reading() as session:
+        return [seen.worker for seen in workers.known_workers(session) if seen.lately]
+
+
 @contextmanager
 def _opened(settings: Settings) -> Iterator[Store | None]:
     """The database as it is; None where it has no tables of this release."""
@@ -253,3 +295,20 @@ def _opened(settings: Settings) -> Iterator[Store | None]:
         yield Store(engine, settings.own_secret) if current_revision(engine) == newest_revision() else None
     finally:
         engine.dispose()
+
+
+CHECKS = (
+    Check("Python", _python),
+    Check("simulator", _simulator),
+    Check("sandbox", _sandbox, _sandbox_of_workers),
+    Check("control groups", _control_groups),
+    Check("between trials", _between_trials),
+    Check("home", _home),
+    Check("database", _database, _tables),
+    Check("secret", _secret),
+    Check("broker", _broker, _broker_of_service),
+    Check("clock", _clock),
+    Check("workers", _workers, _workers_of_service),
+    Check("queue", _queue),
+    Check("known answer", _known_answer),
+)

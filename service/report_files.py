@@ -1,21 +1,22 @@
-"""Writes reports of grades that are stored, with the plots that are stored beside them.
+"""Writes reports of grades that are stored: reads what each is made of, once, and hands it to ``service.reports``.
 
-What a report says is ``service.reports``'; what is not drawn yet is drawn there.
+What a report says is decided there, and nothing there reads the database; what is not drawn yet is drawn here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.queue.plotting import PREFIX, draw
+from service.grading.grade import Grade
+from service.plotting import draw
 from service.reports.html import BatchRow, batch_index, staff_report, student_report
 from service.reports.written import file_stems, write_page
-from service.store import artifacts, batches, grades, intake, policies
+from service.store import intake, plots, policies, results
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.models import Job, JobState, PlotState, SubmissionRow
+from service.store.models import JobState, PlotState
 from sim.recording import Verdict
 
 _INDEX = "index.html"
@@ -23,25 +24,41 @@ _INDEX = "index.html"
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The report of one job."""
+    """The report of one job, and the plots in it: name -> PNG."""
 
-    job_id: str
     path: Path
+    plots: Mapping[str, bytes]
 
 
-def write_reports(store: Store, job_ids: Iterable[str], folder: Path) -> list[Written]:
+def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: str) -> Written:
+    """The page of one graded job, called by ``stem``. Raises UsageError when the folder cannot be written to."""
+    with store.reading() as session:
+        submission = intake.load_submission(session, line.id)
+        released = policies.released(session, line.id)
+        drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
+        assignment = intake.load_assignment(session, line.id) if drawn is None else None
+    if assignment is not None:
+        drawn = draw(grade, assignment)
+    found = drawn or {}
+    if line.staff_only is None:
+        page = student_report(grade, found, submission, released)
+    else:
+        page = staff_report(grade, found, submission)
+    return Written(write_page(folder, f"{stem}.html", page), found)
+
+
+def write_reports(store: Store, lines: Sequence[JobLine], folder: Path) -> list[Path]:
     """A page for each graded job, named after its student, and after its assignment where one student has several.
 
     Raises UsageError when the folder cannot be written to.
     """
-    job_ids = list(job_ids)
-    with store.reading() as session:
-        lines = [batches.job_line(session, job_id) for job_id in job_ids]
     stems = file_stems([(line.student, line.assignment) for line in lines])
-    return [
-        Written(job_id, write_page(folder, f"{stem}.html", _page(store, job_id)))
-        for job_id, stem in zip(job_ids, stems, strict=True)
-    ]
+    paths = []
+    for line, stem in zip(lines, stems, strict=True):
+        with store.reading() as session:
+            grade = results.load(session, line.id)
+        paths.append(write_report(store, line, grade, folder, stem).path)
+    return paths
 
 
 def write_batch(
@@ -51,8 +68,9 @@ def write_batch(
 
     Raises UsageError when the folder cannot be written to.
     """
-    graded = [line.id for line in lines if line.state is JobState.DONE and line.staff_only is None]
-    pages = {written.job_id: written.path.name for written in write_reports(store, graded, folder)}
+    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
+    paths = write_reports(store, graded, folder)
+    pages = {line.id: path.name for line, path in zip(graded, paths, strict=True)}
     rows = [
         BatchRow(
             line.student,
@@ -73,18 +91,3 @@ def _remark(line: JobLine) -> str:
     if line.staff_only is not None:
         return f"for staff only: {line.staff_only}"
     return "" if line.state is JobState.DONE else line.state.value
-
-
-def _page(store: Store, job_id: str) -> str:
-    with store.reading() as session:
-        grade = grades.load(session, job_id)
-        grading_request = intake.load_grading_request(session, job_id)
-        job = session.get_one(Job, job_id)
-        released = policies.released(session, job_id)
-        staff_only = session.get_one(SubmissionRow, job.submission_id).staff_only
-        kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
-    files = kept if job.plots is PlotState.DONE else draw(grade, grading_request.assignment)
-    plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
-    if staff_only is not None:
-        return staff_report(grade, plots, grading_request.submission)
-    return student_report(grade, plots, grading_request.submission, released)

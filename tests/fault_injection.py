@@ -40,7 +40,7 @@ from service.queue.worker import new_worker_name
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.intake import GradingRequest, accept_batch, load_grading_request
-from service.store.models import UNFINISHED, CriterionRow, Heartbeat, Job, JobState, Lane, TrialRow
+from service.store.models import UNFINISHED, CriterionResultRow, Heartbeat, Job, JobState, Lane, TrialRow
 from sim.errors import HostError
 
 #: Behaviours that differ; every submission is one of them, with a text of its own so that none is a copy of another.
@@ -327,7 +327,7 @@ def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]]
             trials = session.scalars(
                 select(TrialRow).where(TrialRow.job_id == job.id).order_by(TrialRow.position)
             ).all()
-            marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
+            marked = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
             doubled += (len(trials), session.scalar(marked)) != (len(quiet[variant]), criteria)
             differing += tuple(trial.sha256 for trial in trials) != quiet[variant]
         return Tally(

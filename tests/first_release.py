@@ -16,6 +16,8 @@ from service.store.migrate import configuration
 from service.store.models import Base
 
 REVISION = "0002"
+#: What columns of then are called today.
+_TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions"}
 _SQL = Path(__file__).with_name("first_release.sql")
 
 
@@ -42,7 +44,8 @@ def _copy(file: Path, engine: Engine) -> None:
                 continue
             # The columns of then, with today's types, which read what SQLite has and write what PostgreSQL wants.
             then = [column["name"] for column in inspect(source).get_columns(today.name)]
-            table = Table(today.name, MetaData(), *(Column(name, today.c[name].type) for name in then))
+            columns = [Column(name, today.c[_TODAY.get(name, name)].type) for name in then]
+            table = Table(today.name, MetaData(), *columns)
             rows = [dict(row._mapping) for row in old.execute(select(table))]
             if rows:
                 new.execute(insert(table), rows)

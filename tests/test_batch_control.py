@@ -23,7 +23,7 @@ from service.reports.written import file_stem
 from service.store import batch_control
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
-from service.store.models import CriterionRow, Job, JobState, Lane, TrialRow
+from service.store.models import CriterionResultRow, Job, JobState, Lane, TrialRow
 from submissions.example_folder import examples
 from test_batch_commands import Ended, robomark
 
@@ -182,7 +182,9 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     assert (verified.status, "is what grading it again gives" in verified.out) == (0, True)
     with open_store(settings_in(home)) as store, store.transaction() as session:
         session.execute(update(TrialRow).where(TrialRow.job_id == grade[1]).values(sha256="0" * 64))
-        session.execute(update(CriterionRow).where(CriterionRow.job_id == grade[1]).values(marks=Decimal(0)))
+        session.execute(
+            update(CriterionResultRow).where(CriterionResultRow.job_id == grade[1]).values(marks=Decimal(0))
+        )
     doubted = robomark(home, "verify", grade[1])
     assert (doubted.status, "is not what grading it again gives" in doubted.err) == (3, True)
 

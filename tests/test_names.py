@@ -261,7 +261,7 @@ def test_an_older_hash_means_only_that_it_is_graded_again(store: Store) -> None:
     taken = grading_request("ada")
     intake.accept_new(store, "b", [taken], (), max_attempts=3)
     with store.transaction() as session:
-        session.execute(update(intake.models.SubmissionRow).values(sha256="0" * 64))
+        session.execute(update(intake.SubmissionRow).values(sha256="0" * 64))
     again = intake.accept_new(store, "b", [taken], (), max_attempts=3)
     assert again.batch is not None
     assert [(job.attempt, job.staff_only) for job in again.batch.jobs] == [(2, "")]

@@ -20,6 +20,7 @@ import false_worker
 import report_builders
 import sim.robot
 from builders import grading_request, settings_in
+from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.queue import self_test as known_answers
@@ -29,7 +30,7 @@ from service.queue.notifier import Notifier
 from service.queue.self_test import Answer, Watch
 from service.queue.worker import QUARANTINED
 from service.settings import Settings
-from service.store import audit, grades, intake, jobs, self_tests
+from service.store import audit, intake, jobs, results, self_tests, workers
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
@@ -50,7 +51,7 @@ def _take(store: Store, *students: str) -> str:
 def _grade_next(store: Store, worker: str) -> str:
     claim = jobs.claim(store, worker, 60)
     assert claim is not None
-    jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
     return claim.job_id
 
 
@@ -72,7 +73,7 @@ def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, mo
         assert jobs.claim(store, "machine-1", 60) is not None
     assert watch.look() is Answer.WRONG
     with store.reading() as session:
-        (shut_out,) = self_tests.in_quarantine(session)
+        (shut_out,) = workers.in_quarantine(session)
         assert shut_out.worker == "machine-1"
         assert "trial 1 of the known answer has another hash" in shut_out.reason
         assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
@@ -86,7 +87,7 @@ def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
     with Broken() as broken:
         assert Watch(store, broken, "machine-1", 3600).look() is Answer.UNCLEAR
     with store.reading() as session:
-        assert self_tests.in_quarantine(session) == []
+        assert workers.in_quarantine(session) == []
 
 
 def test_a_process_looks_while_nobody_asks_it_to(store: Store, runner: TrialRunner) -> None:
@@ -120,7 +121,7 @@ def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_t
 
     assert jobs.claim(store, "wrong", 60) is None
     with pytest.raises(jobs.Fenced):
-        jobs.finish(store, running, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish(store, running, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
     assert (_job(store, running.job_id).state, _job(store, running.job_id).attempt) == (JobState.QUEUED, 0)
 
     suspect, again = _job(store, bad), _job(store, done.again[0])
@@ -142,7 +143,7 @@ def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) ->
         job = session.get_one(Job, claim.job_id)
         job.state, job.lease = JobState.RUNNING, claim.lease
     with pytest.raises(jobs.Fenced, match="in quarantine"):
-        jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _until(look: Callable[[], T | None], seconds: float = 120) -> T:
@@ -204,14 +205,14 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
                 query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
                 stands = session.scalars(query).one()
                 honest = grade(taken_in.submission, taken_in.assignment, secret=secret_of(store), runner=runner)
-                assert _chains(grades.load(session, stands.id)) == _chains(honest)
+                assert _chains(results.load(session, stands.id)) == _chains(honest)
                 assert (stands.id == job_id) == (job.suspect is None)
-                differs += _chains(grades.load(session, job_id)) != _chains(honest)
+                differs += _chains(results.load(session, job_id)) != _chains(honest)
             assert differs, "the switch changed no grade"
         assert "worker.quarantined" in (tmp_path / "false_worker.log").read_text()
 
 
-def _chains(graded: grades.Grade) -> list[str]:
+def _chains(graded: Grade) -> list[str]:
     return [trial.recording.sha256 for trial in graded.trials]
 
 

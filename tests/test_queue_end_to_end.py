@@ -26,11 +26,11 @@ from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import artifacts, batches, grades, jobs
+from service.store import artifacts, batch_control, batches, results
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import GradingRequest, accept_batch, load_grading_request
-from service.store.models import CriterionRow, Job, JobState, Lane, PlotState, TrialRow
+from service.store.models import CriterionResultRow, Job, JobState, Lane, PlotState, TrialRow
 from submissions.example_folder import examples
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
@@ -82,7 +82,7 @@ class Service:
                 positions = session.scalars(select(TrialRow.position).where(TrialRow.job_id == job.id)).all()
                 assert sorted(positions) == list(range(len(positions)))
                 assert positions
-                marked = select(func.count()).select_from(CriterionRow).where(CriterionRow.job_id == job.id)
+                marked = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
                 assert session.scalar(marked) == len(load_grading_request(session, job.id).assignment.criteria)
 
 
@@ -128,7 +128,7 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
         for job in graded:
             taken_in = load_grading_request(session, job.id)
             direct = grade(taken_in.submission, taken_in.assignment, secret=secret_of(service.store), runner=runner)
-            assert comparable(grades.load(session, job.id)) == comparable(direct)
+            assert comparable(results.load(session, job.id)) == comparable(direct)
             assert (job.marks, job.verdict) == (direct.marks, direct.verdict.value)
             plots = artifacts.get(session, job.id, prefix="plot-")
             assert plots
@@ -229,7 +229,7 @@ def _has_student(pool_child: int) -> bool:
 def test_a_cancelled_job_stops(service: Service) -> None:
     batch = service.submit(_spinning(1))
     job = service.until_running(batch)
-    assert jobs.cancel(service.store, [job.id]) == 1
+    assert batch_control.cancel(service.store, batch).running == 1
     after = service.submit([grading_request("after")])
     service.wait(after)
     assert [found.state for found in service.jobs(batch)] == [JobState.CANCELLED]

@@ -13,7 +13,7 @@ from builders import comparable, echo, grading_request
 from responders.sandbox.meter import JobLimits, Spent
 from service.commands.batch_tables import remarks
 from service.grading.grade import Cost, Grade
-from service.store import artifacts, batches, grades, jobs, metrics, self_tests
+from service.store import artifacts, batches, jobs, metrics, plots, results, self_tests
 from service.store.engine import Store
 from service.store.installation import secret_of
 from service.store.intake import Accepted, GradingRequest, accept, accept_batch
@@ -35,7 +35,7 @@ def _grade_next(store: Store, grade: Grade = GRADE, worker: str = "worker") -> s
     claim = jobs.claim(store, worker, 60)
     assert claim is not None
     own = replace(grade, secret_sha256=secret_of(store).sha256)
-    jobs.finish(store, claim, grades.prepare(own), datetime.now(UTC))
+    jobs.finish(store, claim, results.prepare(own), datetime.now(UTC))
     return claim.job_id
 
 
@@ -48,14 +48,14 @@ def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Sto
     cost = Cost(JobLimits(), Spent(4000, 3.25, 0.5))
     _accept(store, "ada")
     first = _grade_next(store, replace(GRADE, cost=cost))
-    jobs.finish_plots(store, first, [artifacts.File("plot-a.png", "image/png", b"image")])
+    plots.finish(store, first, {"a": b"image"})
     second = _accept(store, "bob")
     assert second.copied_from == first
     job = _job(store, second.job_id)
     assert (job.state, job.copied_from, job.plots, job.attempt) == (JobState.DONE, first, PlotState.DONE, 0)
     assert jobs.claim(store, "worker", 60) is None
     with store.reading() as session:
-        original, copy = grades.load(session, first), grades.load(session, second.job_id)
+        original, copy = results.load(session, first), results.load(session, second.job_id)
         assert comparable(replace(copy, student=original.student)) == comparable(original)
         assert copy.cost == original.cost == cost
         assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"image"
@@ -93,7 +93,7 @@ def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None
     _accept(store, "ada")
     first = _grade_next(store, replace(GRADE, criteria=criteria))
     with store.reading() as session:
-        assert grades.load(session, first).criteria[0].unjudged == criteria[0].unjudged
+        assert results.load(session, first).criteria[0].unjudged == criteria[0].unjudged
         line = batches.job_line(session, first)
         assert metrics.collect(session).unjudged == 1
     assert "1 criteria not judged" in remarks(line)

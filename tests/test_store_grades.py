@@ -14,11 +14,11 @@ import report_builders
 from builders import accept_one, comparable
 from responders.sandbox.meter import JobLimits, Spent
 from service.grading.grade import Cost, Grade
-from service.store import artifacts, grades, jobs
+from service.store import artifacts, jobs, results
 from service.store.columns import storable
 from service.store.engine import Store
 from service.store.intake import load_grading_request
-from service.store.models import Artifact, AssignmentVersion, CriterionRow, Job, SubmissionRow
+from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import Line
 
@@ -28,7 +28,7 @@ def _stored(store: Store, grade: Grade) -> str:
     accepted = accept_one(store, grade.student)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+    jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
     with store.transaction() as session:
         version = {"assignment": grade.assignment, "title": grade.assignment_title, "version": grade.assignment_version}
         session.execute(update(AssignmentVersion).values(**version))
@@ -50,7 +50,7 @@ def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -
     grade = make()
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = grades.load(session, job_id)
+        back = results.load(session, job_id)
     assert comparable(back) == comparable(grade)
     assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
 
@@ -60,7 +60,7 @@ def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> N
     grade = replace(report_builders.shape_grade(), cost=cost)
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = grades.load(session, job_id)
+        back = results.load(session, job_id)
     assert back.cost == cost
     other = replace(grade, cost=Cost(cost.limits, Spent(1 << 18, 3.5, 0.0)))
     assert other == grade
@@ -75,7 +75,7 @@ def test_hostile_texts_go_in_and_the_recordings_keep_them(store: Store) -> None:
     grade = replace(grade, trials=(replace(first, recording=poisoned), *grade.trials[1:]), criteria=criteria)
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = grades.load(session, job_id)
+        back = results.load(session, job_id)
     assert comparable(back)[1] == comparable(grade)[1]
     assert [result.message for result in back.criteria] == [storable(result.message) for result in grade.criteria]
 
@@ -86,7 +86,7 @@ def test_accuracy_is_data(store: Store) -> None:
     assert accuracy is not None
     _stored(store, grade)
     with store.reading() as session:
-        query = select(CriterionRow).where(CriterionRow.accuracy < 0.9, CriterionRow.accuracy_n >= 6)
+        query = select(CriterionResultRow).where(CriterionResultRow.accuracy < 0.9, CriterionResultRow.accuracy_n >= 6)
         row = session.scalars(query).one()
         assert (row.accuracy, row.accuracy_low, row.accuracy_high) == (accuracy.value, accuracy.low, accuracy.high)
         counts = {(truth, answer): count for truth, answer, count in row.confusion}
@@ -100,7 +100,7 @@ def test_marks_keep_their_places(store: Store) -> None:
     third = replace(grade.criteria[0], marks=Decimal("0.10"), max_marks=Decimal("3.30"))
     job_id = _stored(store, replace(grade, criteria=(third,)))
     with store.reading() as session:
-        back = grades.load(session, job_id).criteria[0]
+        back = results.load(session, job_id).criteria[0]
     assert (str(back.marks), str(back.max_marks)) == ("0.10", "3.30")
 
 
@@ -110,7 +110,7 @@ def test_a_flood_of_images_is_cut_and_the_marks_stay(store: Store, monkeypatch: 
     grade = report_builders.shape_grade()
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = grades.load(session, job_id)
+        back = results.load(session, job_id)
     assert back.marks == grade.marks
     assert back.accuracy == grade.accuracy
     assert all("too large" in trial.recording.notes[-1] for trial in back.trials)
@@ -129,7 +129,7 @@ def test_what_a_worker_needs_is_all_in_the_database(store: Store) -> None:
 def test_a_job_without_a_grade_says_so(store: Store) -> None:
     accepted = accept_one(store)
     with store.reading() as session, pytest.raises(UsageError, match="has no grade"):
-        grades.load(session, accepted.job_id)
+        results.load(session, accepted.job_id)
 
 
 def test_a_file_of_the_same_name_is_replaced(store: Store) -> None:
@@ -147,7 +147,7 @@ def test_a_damaged_file_is_noticed(store: Store) -> None:
     with store.transaction() as session:
         session.execute(update(Artifact).values(sha256="0" * 64))
     with store.reading() as session, pytest.raises(HostError, match="damaged"):
-        grades.load(session, job_id)
+        results.load(session, job_id)
 
 
 def test_a_file_over_the_cap_is_refused(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from sqlalchemy import func, select, update
 import report_builders
 from builders import accept_one, grading_request, settings_in
 from service.settings import Settings
-from service.store import batches, grades, jobs
+from service.store import batch_control, batches, jobs, plots, results
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.jobs import Claim, Fenced, Retry
@@ -22,7 +22,7 @@ from service.store.lease_reaper import note_notices, requeue_lost, wanting_notic
 from service.store.models import (
     Batch,
     BatchState,
-    CriterionRow,
+    CriterionResultRow,
     Job,
     JobState,
     Lane,
@@ -52,12 +52,12 @@ def _claim(store: Store, worker: str = "worker") -> Claim:
 
 
 def _finish(store: Store, claim: Claim) -> None:
-    jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _rows(store: Store) -> tuple[int, int]:
     with store.reading() as session:
-        count = [session.scalar(select(func.count()).select_from(table)) for table in (TrialRow, CriterionRow)]
+        count = [session.scalar(select(func.count()).select_from(table)) for table in (TrialRow, CriterionResultRow)]
     return count[0] or 0, count[1] or 0
 
 
@@ -97,7 +97,7 @@ def test_a_stale_worker_can_change_nothing(store: Store) -> None:
     ):
         with pytest.raises(Fenced):
             change()
-    jobs.release(store, stale)
+    assert jobs.release_worker(store, "stale") == 0
     assert _rows(store) == (0, 0)
     assert (_job(store, job_id).state, _job(store, job_id).worker) == (JobState.RUNNING, "fresh")
     _finish(store, fresh)
@@ -168,7 +168,8 @@ def test_lost_workers_cost_attempts_and_end_with_a_reason(store: Store) -> None:
 
 def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
     job_id = accept_one(store, max_attempts=1).job_id
-    jobs.release(store, _claim(store))
+    _claim(store, "first")
+    assert jobs.release_worker(store, "first") == 1
     assert (_job(store, job_id).state, _job(store, job_id).attempt) == (JobState.QUEUED, 0)
     claim = _claim(store, "ended")
     assert jobs.release_worker(store, "another") == 0
@@ -180,13 +181,13 @@ def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
 
 
 def test_a_cancelled_job_stops_its_worker(store: Store) -> None:
-    running, queued = accept_one(store, "ada").job_id, accept_one(store, "bob").job_id
+    batch = _batch(store, "batch", 2)
     claim = _claim(store)
-    assert jobs.cancel(store, [running, queued]) == 2
+    assert batch_control.cancel(store, batch) == batch_control.Controlled(True, 1, 1)
     with pytest.raises(Fenced, match="cancelled"):
         jobs.heartbeat(store, claim, 60, 0.5)
     assert jobs.claim(store, "worker", 60) is None
-    assert jobs.cancel(store, [running, queued]) == 0
+    assert not batch_control.cancel(store, batch).changed
 
 
 def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store: Store) -> None:
@@ -277,13 +278,13 @@ def test_notices_are_wanting_until_they_are_noted(store: Store) -> None:
 
 def test_plots_are_tried_a_few_times(store: Store) -> None:
     job_id = accept_one(store).job_id
-    assert jobs.claim_plots(store, 60) is None
+    assert plots.claim(store, 60) is None
     _finish(store, _claim(store))
-    for _ in range(jobs.PLOT_ATTEMPTS):
-        assert jobs.claim_plots(store, 60) == job_id
-        assert jobs.claim_plots(store, 60) is None
+    for _ in range(plots.ATTEMPTS):
+        assert plots.claim(store, 60) == job_id
+        assert plots.claim(store, 60) is None
         _change(store, job_id, plots_due_at=datetime.now(UTC))
-    assert jobs.claim_plots(store, 60) is None
+    assert plots.claim(store, 60) is None
     assert _job(store, job_id).plots is PlotState.FAILED
 
 

@@ -15,10 +15,10 @@ import report_builders
 from builders import accept_one
 from first_release import lay_first_release
 from service.settings import Settings
-from service.store import artifacts, batches, grades, intake, jobs
+from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration, current_revision, newest_revision
-from service.store.models import Artifact, Base, Batch, CriterionRow, Job, JobState, Standing, TrialRow
+from service.store.models import Artifact, Base, Batch, CriterionResultRow, Job, JobState, Standing, TrialRow
 from sim.errors import HostError
 
 
@@ -61,11 +61,13 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
         with store.reading() as session:
             states = dict(session.execute(select(Job.state, func.count()).group_by(Job.state)).all())
             assert states == {JobState.DONE: 2, JobState.DEAD: 1, JobState.CANCELLED: 1, JobState.QUEUED: 1}
-            counts = [session.scalar(select(func.count()).select_from(t)) for t in (TrialRow, CriterionRow, Artifact)]
+            counts = [
+                session.scalar(select(func.count()).select_from(t)) for t in (TrialRow, CriterionResultRow, Artifact)
+            ]
             assert counts == [2, 10, 3]
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
             ada, bob = sorted(batches.job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
-            graded = grades.load(session, ada.id)
+            graded = results.load(session, ada.id)
             assert (graded.student, graded.marks, ada.standing) == ("ada", Decimal("1.00"), Standing.STANDS)
             assert len(graded.trials[0].recording.ticks) > 10
             assert graded.cost is None
@@ -77,7 +79,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
         # What waited is graded by the new release, and what comes in is numbered on.
         waiting = jobs.claim(store, "worker", 60)
         assert waiting is not None
-        jobs.finish(store, waiting, grades.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish(store, waiting, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
         assert accept_one(store, "ada").attempt == 3
 
 

@@ -10,7 +10,7 @@ from sqlalchemy import select
 
 import report_builders
 from builders import grading_request
-from service.store import batches, grades, jobs, policies, regrades
+from service.store import batches, jobs, policies, regrades, results
 from service.store.engine import Store, now
 from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
 from service.store.models import Job, JobState, Lane, SubmissionRow
@@ -49,7 +49,7 @@ def _grade_all(store: Store, verdict: Verdict | None = None) -> None:
         (trial, *rest) = GRADE.trials
         grade = replace(GRADE, trials=(replace(trial, recording=replace(trial.recording, verdict=verdict)), *rest))
     while (claim := jobs.claim(store, "worker", 60)) is not None:
-        jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
 
 
 def test_without_a_policy_everything_counts(store: Store) -> None:
@@ -94,7 +94,7 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
         (line,) = batches.job_lines(session, batch)
         assert (line.marks, line.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
         assert session.get_one(Job, first.job_id).state is JobState.DONE
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(0, 0, 0, 0, 1)
+    assert regrades.publish(store, batch, actor="staff") == regrades.Published(0, 0, 0, 0, 1, 0)
 
 
 @pytest.mark.parametrize(

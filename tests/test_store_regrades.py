@@ -14,7 +14,7 @@ import report_builders
 from builders import echo, grading_request
 from service.commands.batch_tables import unjudged_words
 from service.grading.grade import Grade
-from service.store import audit, batch_control, batches, grades, jobs, regrades
+from service.store import audit, batch_control, batches, jobs, regrades, results
 from service.store.engine import Store
 from service.store.intake import accept_batch, accept_new
 from service.store.models import Batch, Job, JobState, Standing
@@ -40,7 +40,7 @@ def _batch(store: Store, *students: str) -> str:
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
     while (claim := jobs.claim(store, "worker", 60)) is not None:
-        jobs.finish(store, claim, grades.prepare(grade), datetime.now(UTC))
+        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
 
 
 def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = False) -> str:
@@ -78,7 +78,7 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
             old, new = session.get_one(Job, job_id), session.get_one(Job, after[student])
             assert (old.standing, old.marks, old.published_by) == (Standing.KEPT, GRADE.marks, "staff")
             assert (new.standing, new.batch_id, new.published_at is not None) == (Standing.STANDS, again, True)
-            assert grades.load(session, job_id).marks == GRADE.marks
+            assert results.load(session, job_id).marks == GRADE.marks
         actions = [entry.action for entry in audit.entries(session, "batch", batch)]
     assert actions == ["publish", "regrade", "publish"]
     assert regrades.publish(store, batch, actor="staff").published == 0
@@ -105,7 +105,7 @@ def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
     for claimed in (_unjudged(GRADE), GRADE):
         claim = jobs.claim(store, "worker", 60)
         assert claim is not None
-        jobs.finish(store, claim, grades.prepare(claimed), datetime.now(UTC))
+        jobs.finish(store, claim, results.prepare(claimed), datetime.now(UTC))
     with store.reading() as session:
         lines = batches.job_lines(session, batch)
     (left,) = [line for line in lines if line.unjudged]
@@ -206,7 +206,7 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
     jobs.give_up(store, claim, "no program")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, grades.prepare(GRADE), datetime.now(UTC))
+    jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
     other = replace(echo(), id="other")
     with pytest.raises(UsageError, match="has no submission for other, only for echo-responder"):
         regrades.regrade(store, batch, other, max_attempts=3, actor="staff")

@@ -12,7 +12,7 @@ from builders import accept_one
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import grades, jobs, metrics, phases, workers
+from service.store import jobs, metrics, phases, plots, results, workers
 from service.store.engine import Store
 from service.store.jobs import Retry
 from service.store.lease_reaper import requeue_lost, wanting_notices
@@ -80,8 +80,8 @@ def test_the_times_of_a_grade_are_kept_and_told(store: Store) -> None:
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     trials_at, graded_at = claim.at + timedelta(seconds=2), claim.at + timedelta(seconds=3)
-    jobs.finish(store, claim, grades.prepare(report_builders.faulty_grade()), graded_at, trials_at)
-    jobs.finish_plots(store, job_id, [])
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), graded_at, trials_at)
+    plots.finish(store, job_id, {})
     job = _job(store, job_id)
     assert (job.state, set(job.phases)) == (JobState.DONE, set(phases.NAMES))
     told = phases.durations(job.phases)

@@ -26,7 +26,7 @@ from service.reports.json_output import json_document
 from service.reports.junit import junit_text
 from service.reports.written import file_stems
 from service.settings import load_settings
-from service.store import batches, grades, regrades
+from service.store import batches, regrades, results
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.models import JobState
@@ -120,7 +120,7 @@ def _write(path: Path, text: str) -> None:
 def _grades(store: Store, lines: Iterable[JobLine]) -> Iterator[tuple[JobLine, Grade]]:
     for line in lines:
         with store.reading() as session:
-            yield line, grades.load(session, line.id)
+            yield line, results.load(session, line.id)
 
 
 def _json(found: Sequence[Grade]) -> str:

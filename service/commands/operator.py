@@ -19,12 +19,12 @@ from service.commands.grade import warn_of_no_sandbox
 from service.doctor import examine
 from service.home import for_the_user
 from service.queue.broker import EmbeddedBroker
-from service.queue.plotting import PREFIX
 from service.queue.worker import run_worker
-from service.report_files import write_reports
+from service.report_files import write_report
 from service.reports.text import plain_text
+from service.reports.written import file_stem
 from service.settings import Settings, load_settings
-from service.store import artifacts, batches, grades
+from service.store import batches, results
 from service.store.batches import JobLine
 from service.store.engine import open_engine, open_store
 from service.store.migrate import current_revision, newest_revision
@@ -81,19 +81,18 @@ def show(
             if line.state is not JobState.DONE:
                 sys.stdout.write(_not_graded(line))
                 return
-            graded = grades.load(session, line.id)
-            plots = artifacts.get(session, line.id, prefix=PREFIX)
+            graded = results.load(session, line.id)
         sys.stdout.write(plain_text(graded))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         print("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if report is None:
             return
-        for written in write_reports(store, [line.id], report):
-            print(f"report: {written.path}")
-        for plot in plots.values():
-            path = report / f"{line.id}-{plot.name}"
+        written = write_report(store, line, graded, report, file_stem(line.student))
+        print(f"report: {written.path}")
+        for name, data in written.plots.items():
+            path = report / f"{line.id}-plot-{name}.png"
             with for_the_user():
-                path.write_bytes(plot.data)
+                path.write_bytes(data)
             print(f"plot: {path}")
 
 

@@ -17,9 +17,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
 from service.queue.logs import configure_logging
+from service.queue.supervisor import Supervisor, alone_in
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
-from service.supervisor import Supervisor, alone_in
 from service.web.listening import address, listen
 from sim.errors import HostError, RobomarkError
 

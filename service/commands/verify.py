@@ -12,7 +12,7 @@ from rich.text import Text
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
 from service.settings import load_settings
-from service.store import batches, grades, intake
+from service.store import batches, intake, results
 from service.store.engine import open_store
 from service.store.installation import secret_of
 from service.store.models import Job
@@ -33,7 +33,7 @@ def verify(
         own = secret_of(store)
         with store.reading() as session:
             job = session.get_one(Job, batches.find_job(session, grade))
-            stored = grades.load(session, job.id)
+            stored = results.load(session, job.id)
             grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
     again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret)

@@ -16,9 +16,9 @@ from sqlalchemy.exc import DBAPIError
 
 from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
-from service.queue.plotting import draw
+from service.plotting import draw
 from service.settings import Settings
-from service.store import grades, intake, jobs
+from service.store import intake, jobs, plots, results
 from service.store.engine import Store
 from service.store.installation import secret_of
 from sim.errors import Cancelled, HostError, UsageError
@@ -69,14 +69,14 @@ def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: st
 
 def plot_next(store: Store, settings: Settings) -> str | None:
     """Draw and keep the plots of the job that has waited longest. Returns its id; None when none is due."""
-    job_id = jobs.claim_plots(store, settings.job_seconds)
+    job_id = plots.claim(store, settings.job_seconds)
     if job_id is None:
         return None
     with store.reading() as session:
-        graded = grades.load(session, job_id)
-        grading_request = intake.load_grading_request(session, job_id)
-    files = draw(graded, grading_request.assignment)
-    _persistent(lambda: jobs.finish_plots(store, job_id, files), settings.lease_seconds)
+        graded = results.load(session, job_id)
+        assignment = intake.load_assignment(session, job_id)
+    drawn = draw(graded, assignment)
+    _persistent(lambda: plots.finish(store, job_id, drawn), settings.lease_seconds)
     return job_id
 
 
@@ -84,7 +84,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if jobs.finish_from_cache(store, claim):
         _log.info("job.copied")
         return
-    watch = _Heartbeat(store, settings, claim)
+    watch = _LeaseKeeper(store, settings, claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
     graded = grade(
@@ -98,13 +98,13 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if broken is not None:
         faults = broken.recording.faults
         raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
-    prepared = grades.prepare(graded)
+    prepared = results.prepare(graded)
     # The work is done: a database that is away for a moment must not lose it.
     _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, watch.trials_at), settings.lease_seconds)
     _log.info("job.graded", verdict=graded.verdict.value, seconds=round(watch.seconds, 3))
 
 
-class _Heartbeat:
+class _LeaseKeeper:
     """Keeps a job's lease while it is graded, and stops the grading when the lease is lost or time is up."""
 
     def __init__(self, store: Store, settings: Settings, claim: jobs.Claim) -> None:

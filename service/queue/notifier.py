@@ -16,9 +16,10 @@ from redis.exceptions import RedisError
 
 from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES
 from service.settings import Settings
+from service.store import plots
 from service.store.engine import Store
 from service.store.jobs import Retry
-from service.store.lease_reaper import due_plots, forget_notices, note_notices, requeue_lost, wanting_notices
+from service.store.lease_reaper import forget_notices, note_notices, requeue_lost, wanting_notices
 from service.store.models import Lane
 
 _log = structlog.get_logger(__name__)
@@ -56,7 +57,7 @@ class Notifier:
         requeue_lost(self.store, Retry(self.settings.backoff_seconds))
         for lane, wanting in wanting_notices(self.store, self.settings.notify_seconds).items():
             self.grade(lane, min(wanting.stale, self._lacking(lane.value, wanting.due)))
-        waiting = due_plots(self.store)
+        waiting = plots.due(self.store)
         if waiting:
             self.plot(self._lacking(PLOTS, waiting))
 

@@ -26,7 +26,7 @@ from service.queue.processes import run_file
 from service.queue.tasks import WORKER_VARIABLE
 from service.queue.worker_steps import add_steps
 from service.settings import Settings, load_settings
-from service.store import jobs, self_tests, workers
+from service.store import jobs, workers
 from service.store.engine import Store, open_store
 from service.store.workers import WorkerDescription
 from service.version import GRADER_VERSION
@@ -98,7 +98,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
 
 def _in_quarantine(store: Store, name: str) -> bool:
     with store.reading() as session:
-        return self_tests.is_in_quarantine(session, name)
+        return workers.is_in_quarantine(session, name)
 
 
 @contextmanager

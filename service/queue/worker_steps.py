@@ -21,7 +21,7 @@ from redis.exceptions import ConnectionError as BrokerGone
 
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import self_tests, workers
+from service.store import workers
 from service.store.engine import Store
 from service.store.workers import WorkerDescription
 
@@ -80,7 +80,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
         notifier.catch_up()
         beat.waiting = notifier.waiting()
         with store.reading() as session:
-            return not self_tests.is_in_quarantine(session, worker.name)
+            return not workers.is_in_quarantine(session, worker.name)
 
     class LeaseReaper(_Reaping):
         what, every_seconds = staticmethod(catch_up), period

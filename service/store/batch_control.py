@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, exists, func, or_, select, update
+from sqlalchemy import exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit
+from service.store import audit, jobs
 from service.store.engine import Store, now
-from service.store.models import UNFINISHED, Batch, BatchState, Job, JobState, SubmissionRow
+from service.store.models import Batch, BatchState, Job, JobState, SubmissionRow
 from sim.errors import UsageError
 
 #: Who it is said to be where nobody was named.
@@ -56,12 +56,7 @@ def cancel(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
         waiting, running = _unfinished(session, batch_id)
         if waiting + running == 0:
             return Controlled(False, 0, 0)
-        ended = {"state": JobState.CANCELLED, "lease": None, "lease_until": None, "finished_at": now(session)}
-        _change_jobs(
-            session,
-            (Job.batch_id == batch_id, Job.state.in_(UNFINISHED)),
-            ended | {"error": "the batch was cancelled"},
-        )
+        jobs.cancel(session, batch_id, "the batch was cancelled", now(session))
         session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
         audit.note(session, actor, "cancel", "batch", batch_id, not_begun=waiting, stopped=running)
         return Controlled(True, waiting, running)
@@ -79,7 +74,6 @@ def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retrie
         else:
             _refuse_cancelled(_state(session, batch_id), batch_id)
             of_batch = Job.batch_id == batch_id
-        dead = (of_batch, Job.state == JobState.DEAD)
         newer = aliased(SubmissionRow)
         outdated = exists().where(
             newer.enrolment_id == SubmissionRow.enrolment_id,
@@ -88,15 +82,11 @@ def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retrie
             newer.staff_only.is_(None),
         )
         of_newest = select(SubmissionRow.id).where(~outdated)
-        before = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
-        at = now(session)
-        values = {"state": JobState.QUEUED, "attempt": 0, "progress": 0.0, "error": None}
-        values |= {"due_at": at, "notified_at": None, "finished_at": None}
-        _change_jobs(session, (*dead, Job.submission_id.in_(of_newest)), values)
-        left = session.scalar(select(func.count()).select_from(Job).where(*dead)) or 0
-        if before > left:
-            audit.note(session, actor, "retry", "batch", batch_id or "all", queued=before - left)
-        return Retried(before - left, left)
+        queued = jobs.retry(session, (of_batch, Job.submission_id.in_(of_newest)), now(session))
+        left = session.scalar(select(func.count()).select_from(Job).where(of_batch, Job.state == JobState.DEAD)) or 0
+        if queued:
+            audit.note(session, actor, "retry", "batch", batch_id or "all", queued=queued)
+        return Retried(queued, left)
 
 
 def _set(store: Store, batch_id: str, state: BatchState, action: str, actor: str) -> Controlled:
@@ -105,7 +95,8 @@ def _set(store: Store, batch_id: str, state: BatchState, action: str, actor: str
         _refuse_cancelled(before, batch_id)
         session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
         # So that what goes on is notified for at once.
-        _change_jobs(session, (Job.batch_id == batch_id, Job.state == JobState.QUEUED), {"notified_at": None})
+        waiting = update(Job).where(Job.batch_id == batch_id, Job.state == JobState.QUEUED)
+        session.execute(waiting.values(notified_at=None), execution_options={"synchronize_session": False})
         if before is not state:
             audit.note(session, actor, action, "batch", batch_id)
         return Controlled(before is not state, *_unfinished(session, batch_id))
@@ -128,7 +119,3 @@ def _unfinished(session: Session, batch_id: str) -> tuple[int, int]:
     counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
     states = dict(session.execute(counted).all())
     return states.get(JobState.QUEUED, 0), states.get(JobState.RUNNING, 0)
-
-
-def _change_jobs(session: Session, which: tuple[ColumnElement[bool], ...], values: dict[str, object]) -> None:
-    session.execute(update(Job).where(*which).values(**values), execution_options={"synchronize_session": False})

@@ -9,18 +9,18 @@ from decimal import Decimal
 from sqlalchemy import ColumnElement, Row, Select, func, select
 from sqlalchemy.orm import Session
 
-from service.store import models
 from service.store.models import (
     UNFINISHED,
     AssignmentVersion,
     Batch,
     BatchState,
-    CriterionRow,
+    CriterionResultRow,
     Enrolment,
     Job,
     JobState,
     PlotState,
     Standing,
+    SubmissionRow,
     TrialRow,
 )
 from sim.errors import UsageError
@@ -120,7 +120,7 @@ def job_lines(session: Session, batch_id: str) -> list[JobLine]:
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
         which = (Job.batch_id == batch_id, Job.suspect.is_(None))
     else:
-        ids = select(models.SubmissionRow.id).where(models.SubmissionRow.batch_id == batch_id)
+        ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
         which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
     query = _job_lines().where(*which).order_by(Enrolment.student, Job.id)
     return [_line(row) for row in session.execute(query)]
@@ -161,30 +161,32 @@ def _job_lines() -> Select[
     Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
 ]:
     accuracy = (
-        select(CriterionRow.accuracy)
-        .where(CriterionRow.job_id == Job.id, CriterionRow.accuracy.is_not(None))
-        .order_by(CriterionRow.position)
+        select(CriterionResultRow.accuracy)
+        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None))
+        .order_by(CriterionResultRow.position)
         .limit(1)
         .scalar_subquery()
     )
     unjudged = (
-        select(func.count()).where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None)).scalar_subquery()
+        select(func.count())
+        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
+        .scalar_subquery()
     )
     surprises = select(func.count()).where(TrialRow.job_id == Job.id, TrialRow.surprise.is_not(None)).scalar_subquery()
     return (
         select(
             Job,
             Enrolment.student,
-            models.SubmissionRow.source,
+            SubmissionRow.source,
             AssignmentVersion,
-            models.SubmissionRow.attempt,
+            SubmissionRow.attempt,
             accuracy,
-            models.SubmissionRow.staff_only,
-            models.SubmissionRow.days_late,
+            SubmissionRow.staff_only,
+            SubmissionRow.days_late,
             unjudged,
             surprises,
         )
-        .join(models.SubmissionRow, Job.submission_id == models.SubmissionRow.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
     )

@@ -5,14 +5,15 @@ Publishes nothing: the row is the job, and the queue's notice comes after the co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import TypeVar
 
-from sqlalchemy import Select, func, or_, select, update
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import models, result_cache
+from service.store import jobs, result_cache
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
@@ -25,6 +26,7 @@ from service.store.models import (
     JobState,
     Lane,
     Standing,
+    SubmissionRow,
 )
 from service.store.policies import Ruling, rule
 from service.store.students import Students
@@ -36,6 +38,7 @@ from submissions.bundle import pack_submission, unpack_submission
 from submissions.submission import Submission
 
 DEFAULT_COURSE = "default"
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,20 +177,33 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 
     Raises UsageError for an unknown job, HostError where what was kept cannot be read.
     """
-    query = (
-        select(models.SubmissionRow.packed, models.SubmissionRow.source, AssignmentVersion.content)
-        .join(Job, Job.submission_id == models.SubmissionRow.id)
-        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .where(Job.id == job_id)
+    source = select(SubmissionRow.source).join(Job, Job.submission_id == SubmissionRow.id)
+    return GradingRequest(
+        load_submission(session, job_id),
+        load_assignment(session, job_id),
+        session.scalars(source.where(Job.id == job_id)).one(),
     )
-    found = session.execute(query).one_or_none()
-    if found is None:
+
+
+def load_submission(session: Session, job_id: str) -> Submission:
+    """What was submitted for a job; raises like ``load_grading_request``."""
+    kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
+    return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
+
+
+def load_assignment(session: Session, job_id: str) -> Assignment:
+    """What a job is marked against; raises like ``load_grading_request``."""
+    kept = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
+    return _read_back(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
+
+
+def _read_back(read: Callable[[bytes], Read], kept: bytes | None, what: str, job_id: str) -> Read:
+    if kept is None:
         raise UsageError(f"there is no job {job_id}")
-    packed, source, content = found
     try:
-        return GradingRequest(unpack_submission(packed), assignment_from_bytes(content), source)
+        return read(kept)
     except (UsageError, ValueError, TypeError, KeyError) as error:
-        raise HostError(f"The submission of {job_id} cannot be read back: {error}") from error
+        raise HostError(f"The {what} of {job_id} cannot be read back: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,12 +263,12 @@ def _enrolled(
 def _known(session: Session, item: _Item) -> AlreadySubmitted | None:
     grading_request = item.packed.grading_request
     newest = session.scalar(
-        select(models.SubmissionRow)
+        select(SubmissionRow)
         .where(
-            models.SubmissionRow.enrolment_id == item.enrolment_id,
-            models.SubmissionRow.assignment == grading_request.assignment.id,
+            SubmissionRow.enrolment_id == item.enrolment_id,
+            SubmissionRow.assignment == grading_request.assignment.id,
         )
-        .order_by(models.SubmissionRow.attempt.desc())
+        .order_by(SubmissionRow.attempt.desc())
         .limit(1)
     )
     if newest is None or newest.sha256 != grading_request.submission.sha256:
@@ -295,15 +311,15 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     grading_request = packed.grading_request
     submission, assignment = grading_request.submission, grading_request.assignment
     version_id = keep(session, packed.frozen, at)
-    of_student = (models.SubmissionRow.enrolment_id == enrolment_id, models.SubmissionRow.assignment == assignment.id)
-    earlier = session.scalar(select(func.max(models.SubmissionRow.attempt)).where(*of_student)) or 0
+    of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
+    earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
     ruling = Ruling()
     if not terms.anew:
         ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
     job_id = new_id()
     if not ruling.over:
-        _supersede(session, select(models.SubmissionRow.id).where(*of_student), job_id, at)
-    row = models.SubmissionRow(
+        jobs.supersede(session, select(SubmissionRow.id).where(*of_student), job_id, at)
+    row = SubmissionRow(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
         batch_id=terms.batch_id,
@@ -328,27 +344,17 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         # Nobody waits for what only staff will see.
         lane=Lane.BATCH if ruling.over else terms.lane,
         max_attempts=terms.max_attempts,
-        due_at=at,
-        queued_at=at,
         forced=terms.anew,
     )
-    session.add(job)
-    session.flush()
+    jobs.enqueue(session, job, at)
     source = (
         None
         if terms.anew
         else result_cache.find(session, result_cache.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
     )
     if source is not None:
-        session.execute(update(Job).where(Job.id == job_id).values(**result_cache.copy(session, source, job_id, at)))
+        jobs.copy(session, job_id, source, at)
     return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
-
-
-def _supersede(session: Session, submissions: Select[int], job_id: str, at: datetime) -> None:
-    """Cancel what waits of these submissions; but a regrade of what was graded once goes on."""
-    waiting = (Job.state == JobState.QUEUED, Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
-    superseded = {"state": JobState.CANCELLED, "error": f"superseded by {job_id}", "finished_at": at}
-    session.execute(update(Job).where(*waiting).values(**superseded))
 
 
 def course_of(session: Session, name: str, at: datetime) -> int:

@@ -1,32 +1,59 @@
-"""What may happen to a job: claimed, kept alive, finished, failed, given back, cancelled.
+"""The states of a job, and every transition between them: nothing else writes a job's state, lease or due moment.
 
 A worker holds a job by its lease's token, and every change it makes is refused once the token is no longer the job's.
-Which job is due first stands in ``scheduling.py``; finding lost ones in ``lease_reaper.py``.
+Which job is due first stands in ``scheduling.py``; finding lost ones in ``lease_reaper.py``; plots in ``plots.py``.
 """
 
 from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, cast
 
-from sqlalchemy import CursorResult, Update, select, update
+from sqlalchemy import ColumnElement, CursorResult, Select, select, update
 from sqlalchemy.orm import Session
 
-from service.store import artifacts, grades, phases, result_cache, self_tests
+from service.store import phases, plots, result_cache, results, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
-from service.store.models import UNFINISHED, Job, JobState, PlotState
+from service.store.models import Job, JobState, PlotState
 from service.store.scheduling import next_job
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
 
-PLOT_ATTEMPTS = 3
 _LONGEST_BACKOFF = timedelta(hours=1)
+#: Clocks are corrected all the time by less than this.
+_TOLERANCE = timedelta(seconds=2)
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """What may happen to a job: from which states, to which, and by whom. From none: there was no job."""
+
+    name: str
+    before: tuple[JobState, ...]
+    after: JobState
+    by: str
+
+
+ENQUEUE = Transition("enqueue", (), JobState.QUEUED, "intake, a regrade, a quarantine")
+COPY = Transition("copy", (JobState.QUEUED,), JobState.DONE, "intake")
+SUPERSEDE = Transition("supersede", (JobState.QUEUED,), JobState.CANCELLED, "intake")
+CLAIM = Transition("claim", (JobState.QUEUED,), JobState.RUNNING, "a worker")
+HEARTBEAT = Transition("heartbeat", (JobState.RUNNING,), JobState.RUNNING, "the worker that holds it")
+FINISH = Transition("finish", (JobState.RUNNING,), JobState.DONE, "the worker that holds it")
+TRY_AGAIN = Transition("try again", (JobState.RUNNING,), JobState.QUEUED, "the worker that holds it, the lease reaper")
+GIVE_UP = Transition("give up", (JobState.RUNNING,), JobState.DEAD, "the worker that holds it, the lease reaper")
+GIVE_BACK = Transition("give back", (JobState.RUNNING,), JobState.QUEUED, "a worker's end, a quarantine")
+CANCEL = Transition("cancel", (JobState.QUEUED, JobState.RUNNING), JobState.CANCELLED, "staff")
+RETRY = Transition("retry", (JobState.DEAD,), JobState.QUEUED, "staff")
+TRANSITIONS = (
+    ENQUEUE, COPY, SUPERSEDE, CLAIM, HEARTBEAT, FINISH, TRY_AGAIN, GIVE_UP, GIVE_BACK, CANCEL, RETRY,
+)  # fmt: skip
 
 
 class Fenced(Cancelled):
@@ -40,6 +67,7 @@ class Claim:
     job_id: str
     lease: str
     attempt: int  # 1 is the first
+    max_attempts: int
     at: datetime  # the database's clock when it was claimed
 
 
@@ -54,32 +82,49 @@ class Retry:
         return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _LONGEST_BACKOFF)
 
 
+def enqueue(session: Session, job: Job, at: datetime) -> str:
+    """Let a new job wait from now on. Returns its id."""
+    job.state = ENQUEUE.after
+    job.queued_at = job.due_at = at
+    session.add(job)
+    session.flush()
+    return job.id
+
+
+def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
+    """Give a job that waits the grade of an identical one at once. Raises HostError when it does not wait."""
+    values = result_cache.copied(session, source_id, job_id, at)
+    if not _make(session, COPY, (Job.id == job_id,), at, values):
+        raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
+    result_cache.copy_rows(session, source_id, job_id)
+
+
+def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
+    """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
+    which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
+    _make(session, SUPERSEDE, which, at, {"error": f"superseded by {by}"})
+
+
 def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Take the job whose turn it is; None when none is due."""
     with store.transaction() as session:
         at = now(session)
-        job_id = None if self_tests.is_in_quarantine(session, worker) else next_job(session, at, worker)
+        job_id = None if workers.is_in_quarantine(session, worker) else next_job(session, at, worker)
         if job_id is None:
             return None
-        begun = session.scalars(select(Job.attempt).where(Job.id == job_id)).one()
-        claimed = Claim(job_id, secrets.token_hex(16), begun + 1, at)
-        taken = _change(
-            session,
-            update(Job)
-            .where(Job.id == job_id, Job.state == JobState.QUEUED)
-            .values(
-                state=JobState.RUNNING,
-                attempt=Job.attempt + 1,
-                lease=claimed.lease,
-                lease_until=at + timedelta(seconds=lease_seconds),
-                heartbeat_at=at,
-                started_at=at,
-                worker=worker,
-                process=os.getpid(),
-                progress=0.0,
-            ),
-        )
-        return claimed if taken else None
+        begun, most = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
+        claimed = Claim(job_id, secrets.token_hex(16), begun + 1, most, at)
+        values = {
+            "attempt": Job.attempt + 1,
+            "lease": claimed.lease,
+            "lease_until": at + timedelta(seconds=lease_seconds),
+            "heartbeat_at": at,
+            "started_at": at,
+            "worker": worker,
+            "process": os.getpid(),
+            "progress": 0.0,
+        }
+        return claimed if _make(session, CLAIM, (Job.id == job_id,), at, values) else None
 
 
 def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
@@ -91,13 +136,13 @@ def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float)
             "heartbeat_at": at,
             "progress": min(1.0, max(0.0, progress)),
         }
-        _guarded(session, claim, values)
+        _make_held(session, HEARTBEAT, claim, at, values)
 
 
 def finish(
     store: Store,
     claim: Claim,
-    prepared: grades.Prepared,
+    prepared: results.Prepared,
     graded_at: datetime,
     trials_at: datetime | None = None,
 ) -> None:
@@ -119,13 +164,7 @@ def finish(
         }
         values = {
             "phases": phases.written(moments),
-            "state": JobState.DONE,
-            "lease": None,
-            "lease_until": None,
-            "progress": 1.0,
-            "error": None,
             "graded_at": graded_at,
-            "finished_at": at,
             "verdict": grade.verdict.value,
             "marks": grade.marks,
             "max_marks": grade.max_marks,
@@ -140,8 +179,8 @@ def finish(
             "plots_due_at": at,
         }
         _refuse_quarantined(session, claim)
-        _guarded(session, claim, values)
-        grades.insert(session, claim.job_id, prepared, at)
+        _make_held(session, FINISH, claim, at, values)
+        results.insert(session, claim.job_id, prepared, at)
 
 
 def finish_from_cache(store: Store, claim: Claim) -> bool:
@@ -159,8 +198,8 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
         if source is None:
             return False
         at = now(session)
-        _guarded(session, claim, {"heartbeat_at": at})
-        _guarded(session, claim, result_cache.copy(session, source, claim.job_id, at))
+        _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
+        result_cache.copy_rows(session, source, claim.job_id)
         return True
 
 
@@ -170,106 +209,113 @@ def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
     Raises Fenced when the job is no longer this worker's.
     """
     with store.transaction() as session:
-        at = now(session)
-        job = session.scalars(select(Job).where(Job.id == claim.job_id)).one()
-        values = after_fault(job.attempt, job.max_attempts, reason, retry, at)
-        _guarded(session, claim, values)
-        return cast(JobState, values["state"])
+        return fault(session, claim, reason, retry, now(session))
+
+
+def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetime) -> JobState:
+    """The same in a transaction that is open, for a worker that cannot say so itself any more."""
+    if claim.attempt >= claim.max_attempts:
+        times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
+        _make_held(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
+        return GIVE_UP.after
+    _make_held(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
+    return TRY_AGAIN.after
 
 
 def give_up(store: Store, claim: Claim, reason: str) -> None:
     """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
     with store.transaction() as session:
-        _guarded(session, claim, _ended(JobState.DEAD, now(session)) | {"error": reason})
-
-
-def release(store: Store, claim: Claim) -> None:
-    """Give the job back as if it had not been begun. Does nothing when it is no longer this worker's."""
-    with store.transaction() as session:
-        _change(session, update(Job).where(*_held(claim)).values(**_given_back(now(session))))
+        _make_held(session, GIVE_UP, claim, now(session), {"error": reason})
 
 
 def release_worker(store: Store, worker: str) -> int:
     """Give back all that a worker held, one that is known to have ended. Returns how many jobs that were."""
     with store.transaction() as session:
-        held = (Job.state == JobState.RUNNING, Job.worker == worker)
-        return _change(session, update(Job).where(*held).values(**_given_back(now(session))))
+        return give_back(session, worker, now(session))
 
 
-def cancel(store: Store, job_ids: Sequence[str]) -> int:
-    """Stop jobs that have not ended; a worker that runs one is told at its next heartbeat. Returns how many."""
-    with store.transaction() as session:
-        ended = _ended(JobState.CANCELLED, now(session))
-        open_jobs = (Job.id.in_(job_ids), Job.state.in_(UNFINISHED))
-        return _change(session, update(Job).where(*open_jobs).values(**ended))
+def give_back(session: Session, worker: str, at: datetime) -> int:
+    """Let all that a worker holds wait as if it had not been begun. Returns how many jobs that were."""
+    return _make(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
 
 
-def claim_plots(store: Store, lease_seconds: float) -> str | None:
-    """The job whose plots are drawn next, by age; None when none is due.
+def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
+    """End the jobs of a batch that have not ended; a worker that runs one is told at its next heartbeat."""
+    return _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
 
-    Drawing twice does no harm, so the claim is only put off, not fenced. After three times it is given up.
+
+def retry(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
+    """Let those of these jobs that are dead wait again, with all their attempts. Returns how many."""
+    return _make(session, RETRY, which, at, {"attempt": 0, "error": None})
+
+
+def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
+    """Bring moments that lie too far ahead of ``at`` back to where they would be; doing it twice changes nothing.
+
+    Nothing but a clock that was set back can have written them; one that was set forward needs no correction, as
+    leases then run out early and the workers are fenced. ``longest_wait`` is how long a job waits after an attempt that
+    failed. A lease keeps its length, a job that never failed is due now, and one that did waits once more.
     """
-    with store.transaction() as session:
-        at = now(session)
-        due = (Job.plots == PlotState.DUE, Job.plots_due_at <= at)
-        given_up = update(Job).where(*due, Job.plots_attempt >= PLOT_ATTEMPTS).values(plots=PlotState.FAILED)
-        session.execute(given_up)
-        query = select(Job.id).where(*due).order_by(Job.finished_at, Job.id).limit(1)
-        job_id = session.scalar(query.with_for_update(skip_locked=True))
-        if job_id is not None:
-            until = at + timedelta(seconds=lease_seconds)
-            values = {"plots_due_at": until, "plots_attempt": Job.plots_attempt + 1}
-            session.execute(update(Job).where(Job.id == job_id).values(**values))
-        return job_id
+    ahead = at + _TOLERANCE
+    held = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
+    for job_id, lease, lease_until, heartbeat_at in session.execute(
+        held.where(Job.state == JobState.RUNNING, Job.heartbeat_at > ahead)
+    ).all():
+        if lease_until is None or heartbeat_at is None:
+            continue
+        renewed = at + (lease_until - heartbeat_at)
+        leased = update(Job).where(Job.id == job_id, Job.lease == lease)
+        session.execute(leased.values(heartbeat_at=at, lease_until=renewed))
+    waiting = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > ahead)
+    for job_id, attempt, due_at in session.execute(waiting).all():
+        latest = at + longest_wait(attempt) if attempt else at
+        if due_at > latest + _TOLERANCE:
+            held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
+            session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
+    notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
+    session.execute(update(Job).where(*notified).values(notified_at=None))
+    plots.correct_clock(session, at, ahead)
 
 
-def finish_plots(store: Store, job_id: str, files: list[artifacts.File]) -> None:
-    """Keep the plots of a job."""
-    with store.transaction() as session:
-        at = now(session)
-        artifacts.put(session, job_id, files, at)
-        before = session.scalars(select(Job.phases).where(Job.id == job_id)).one()
-        reached = {**before, **phases.written({phases.PLOTTED: at})}
-        done = {"plots": PlotState.DONE, "plots_due_at": None, "plotted_at": at, "phases": reached}
-        session.execute(update(Job).where(Job.id == job_id).values(**done))
+def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
+    """What every transition into a state writes beside it."""
+    match state:
+        case JobState.QUEUED:
+            waiting = {"progress": 0.0, "due_at": at, "notified_at": None, "finished_at": None}
+            return {"lease": None, "lease_until": None} | waiting
+        case JobState.RUNNING:
+            return {}
+        case JobState.DONE:
+            return {"lease": None, "lease_until": None, "finished_at": at, "progress": 1.0, "error": None}
+        case JobState.DEAD | JobState.CANCELLED:
+            return {"lease": None, "lease_until": None, "finished_at": at}
 
 
-def after_fault(attempt: int, max_attempts: int, reason: str, retry: Retry, at: datetime) -> dict[str, Any]:
-    """The columns of a job after a fault of ours in attempt number ``attempt``."""
-    if attempt >= max_attempts:
-        times = "once" if attempt == 1 else f"{attempt} times"
-        return _ended(JobState.DEAD, at) | {"error": f"Tried {times}, the last time: {reason}"}
-    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "notified_at": None}
-    return waiting | {"progress": 0.0, "error": reason, "due_at": at + retry.wait(attempt)}
+def _make(
+    session: Session,
+    transition: Transition,
+    which: tuple[ColumnElement[bool], ...],
+    at: datetime,
+    values: dict[str, Any],
+) -> int:
+    """Make the transition for those of these jobs that are where it begins; the others stay. Returns how many."""
+    columns = {"state": transition.after} | _arriving(transition.after, at) | values
+    statement = update(Job).where(*which, Job.state.in_(transition.before)).values(**columns)
+    options = {"synchronize_session": False}
+    return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
 
 
-def _ended(state: JobState, at: datetime) -> dict[str, Any]:
-    return {"state": state, "lease": None, "lease_until": None, "finished_at": at}
-
-
-def _given_back(at: datetime) -> dict[str, Any]:
-    waiting = {"state": JobState.QUEUED, "lease": None, "lease_until": None, "notified_at": None}
-    return waiting | {"progress": 0.0, "due_at": at, "attempt": Job.attempt - 1}
-
-
-def _held(claim: Claim) -> tuple[Any, ...]:
-    return Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING
-
-
-def _refuse_quarantined(session: Session, claim: Claim) -> None:
-    worker = session.scalar(select(Job.worker).where(*_held(claim)))
-    if worker is not None and self_tests.is_in_quarantine(session, worker, lock=True):
-        raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")
-
-
-def _guarded(session: Session, claim: Claim, values: dict[str, Any]) -> None:
-    if not _change(session, update(Job).where(*_held(claim)).values(**values)):
+def _make_held(session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]) -> None:
+    """Make the transition for a job that is held. Raises Fenced when it is held no more."""
+    if not _make(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
         state = session.scalar(select(Job.state).where(Job.id == claim.job_id))
         if state is None:
             raise HostError(f"The job {claim.job_id} is gone from the database")
         raise Fenced(f"The job {claim.job_id} is no longer this worker's: it is {state.value}")
 
 
-def _change(session: Session, statement: Update) -> int:
-    options = {"synchronize_session": False}
-    return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
+def _refuse_quarantined(session: Session, claim: Claim) -> None:
+    held = (Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING)
+    worker = session.scalar(select(Job.worker).where(*held))
+    if worker is not None and workers.is_in_quarantine(session, worker, lock=True):
+        raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")

@@ -12,10 +12,10 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store.clock import correct
+from service.store import jobs
 from service.store.engine import Store, now
-from service.store.jobs import Retry, after_fault
-from service.store.models import Job, JobState, Lane, PlotState
+from service.store.jobs import Claim, Retry
+from service.store.models import Job, JobState, Lane
 from service.store.scheduling import claimable
 
 #: Databases bound how many values one statement may carry.
@@ -34,15 +34,13 @@ def requeue_lost(store: Store, retry: Retry) -> int:
     """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
     with store.transaction() as session:
         at = now(session)
-        correct(session, at, retry.wait)
+        jobs.correct_clock(session, at, retry.wait)
         lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
         query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
         rows = session.execute(query.with_for_update(skip_locked=True)).all()
         for job_id, lease, attempt, max_attempts, worker in rows:
             reason = f"the worker {worker} fell silent while it graded; its log may tell why"
-            values = after_fault(attempt, max_attempts, reason, retry, at)
-            held = (Job.id == job_id, Job.lease == lease)
-            session.execute(update(Job).where(*held).values(**values))
+            jobs.fault(session, Claim(job_id, lease or "", attempt, max_attempts, at), reason, retry, at)
         return len(rows)
 
 
@@ -76,13 +74,6 @@ def forget_notices(store: Store, ids: Sequence[str]) -> None:
     """These were not notified after all."""
     with store.transaction() as session:
         _set_notified(session, ids, None)
-
-
-def due_plots(store: Store) -> int:
-    """How many jobs wait for their plots."""
-    with store.reading() as session:
-        due = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
-        return session.scalar(select(func.count()).select_from(Job).where(*due)) or 0
 
 
 def _set_notified(session: Session, ids: Sequence[str], at: datetime | None) -> None:

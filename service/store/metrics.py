@@ -18,7 +18,7 @@ from service.store.models import (
     UNFINISHED,
     Batch,
     BatchState,
-    CriterionRow,
+    CriterionResultRow,
     Job,
     JobState,
     Lane,
@@ -66,7 +66,7 @@ def collect(session: Session) -> ServiceMetrics:
     plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
     paused = select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED)
     quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
-    unjudged = select(func.count()).select_from(CriterionRow).where(CriterionRow.unjudged.is_not(None))
+    unjudged = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.unjudged.is_not(None))
     surprises = select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None))
     seen = workers.known_workers(session)
     return ServiceMetrics(

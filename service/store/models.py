@@ -1,6 +1,8 @@
 """The tables: who, what was submitted, the jobs, and what came of them.
 
-Only shapes and constraints; what is done with them stands in the modules beside this one.
+Only shapes and constraints; what is done with them stands in the modules beside this one. A class is called as its
+table is, and ``...Row`` only where what it keeps has a class of that name itself (``Submission``, ``Trial``,
+``CriterionResult``).
 """
 
 from __future__ import annotations
@@ -280,7 +282,7 @@ class TrialRow(Base):
     surprise: Mapped[str | None]  # what our own code stumbled over, if it did
 
 
-class CriterionRow(Base):
+class CriterionResultRow(Base):
     """One marked line. Accuracy is data of its own, so that a course can be asked about it."""
 
     __tablename__ = "criterion_result"

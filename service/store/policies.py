@@ -12,9 +12,8 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import models
 from service.store.engine import now
-from service.store.models import Enrolment, Extension, Job, JobState, Policy
+from service.store.models import Enrolment, Extension, Job, JobState, Policy, SubmissionRow
 from sim.recording import Verdict
 
 _ALWAYS = frozenset({"visible"})
@@ -94,7 +93,7 @@ def released(session: Session, job_id: str) -> frozenset[str]:
     seen = set(_ALWAYS)
     if job.published_at is not None:
         seen |= {"after_published", "after_due_date"}
-    assignment = session.get_one(models.SubmissionRow, job.submission_id).assignment
+    assignment = session.get_one(SubmissionRow, job.submission_id).assignment
     closed_at = _closed_for_all(session, job.enrolment_id, assignment)
     if closed_at is not None and now(session) > closed_at:
         seen.add("after_due_date")
@@ -160,7 +159,7 @@ def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> dat
 
 def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:
     """When the different submissions came that count as attempts: begun, and not ended by a fault of ours."""
-    submission = models.SubmissionRow
+    submission = SubmissionRow
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
     query = (
         select(func.coalesce(submission.submitted_at, submission.created_at), submission.sha256)

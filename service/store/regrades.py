@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
-from datetime import datetime
 from decimal import Decimal
 
 from sqlalchemy import select
@@ -15,11 +14,12 @@ from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
 from service.store.engine import Store, now
+from service.store.jobs import enqueue
 from service.store.models import (
     UNFINISHED,
     AssignmentVersion,
     Batch,
-    CriterionRow,
+    CriterionResultRow,
     Enrolment,
     Job,
     JobState,
@@ -113,7 +113,8 @@ def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_a
         )
         session.add(batch)
         session.flush()
-        session.add_all(_proposal(job, version_id, batch.id, max_attempts, at) for job in wanted)
+        for job in wanted:
+            enqueue(session, _proposal(job, version_id, batch.id, max_attempts), at)
         audit.note(session, actor, "regrade", "batch", batch_id, as_batch=batch.id, grades=len(wanted))
         return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
 
@@ -184,9 +185,9 @@ def _unjudged(session: Session, batch_id: str) -> set[str]:
     """The jobs for the submissions of a batch that have a criterion that could not be judged."""
     ids = select(Job.submission_id).where(Job.batch_id == batch_id)
     query = (
-        select(CriterionRow.job_id)
-        .join(Job, CriterionRow.job_id == Job.id)
-        .where(Job.submission_id.in_(ids), CriterionRow.unjudged.is_not(None))
+        select(CriterionResultRow.job_id)
+        .join(Job, CriterionResultRow.job_id == Job.id)
+        .where(Job.submission_id.in_(ids), CriterionResultRow.unjudged.is_not(None))
     )
     return set(session.scalars(query))
 
@@ -210,7 +211,7 @@ def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfi
     return f"batch {batch_id} has nothing to grade again{waits}"
 
 
-def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int, at: datetime) -> Job:
+def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int) -> Job:
     return Job(
         submission_id=job.submission_id,
         assignment_version_id=version_id or job.assignment_version_id,
@@ -218,8 +219,6 @@ def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int
         batch_id=batch_id,
         lane=Lane.BATCH,
         max_attempts=max_attempts,
-        due_at=at,
-        queued_at=at,
         forced=True,
         regrade_of=job.id,
         standing=Standing.PROPOSED,
@@ -272,7 +271,7 @@ _Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
 
 
 def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
-    query = select(CriterionRow).where(CriterionRow.job_id == job_id).order_by(CriterionRow.position)
+    query = select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
     return {row.criterion: (row.title, row.marks, row.max_marks) for row in session.scalars(query)}
 
 

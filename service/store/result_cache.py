@@ -16,8 +16,7 @@ from service.store import phases
 from service.store.models import (
     Artifact,
     AssignmentVersion,
-    Base,
-    CriterionRow,
+    CriterionResultRow,
     Job,
     JobState,
     PlotState,
@@ -53,7 +52,7 @@ def find(session: Session, key: str) -> str | None:
     cut = exists().where(
         TrialRow.job_id == Job.id, TrialRow.verdict.in_([verdict.value for verdict in _NOT_REPEATABLE])
     )
-    unjudged = exists().where(CriterionRow.job_id == Job.id, CriterionRow.unjudged.is_not(None))
+    unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
     query = (
         select(Job.id)
         .where(
@@ -74,10 +73,17 @@ def find(session: Session, key: str) -> str | None:
     return session.scalar(query)
 
 
-def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
-    """Copy the rows of a grade to another job, which has none; the columns that the job itself then has."""
-    for table in (TrialRow, CriterionRow, Artifact):
-        _copy_rows(session, table, source_id, job_id)
+def copy_rows(session: Session, source_id: str, job_id: str) -> None:
+    """Copy the rows of a grade to another job, which has none."""
+    for table in (TrialRow, CriterionResultRow, Artifact):
+        columns = table.__table__.columns
+        kept = [column for column in columns if column.name not in ("id", "job_id")]
+        rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
+        session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))
+
+
+def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
+    """What another job itself has of a grade that is copied to it."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
     of_grade = ("verdict", "marks", "max_marks", "sandbox", "grader_version", "cost")
@@ -85,14 +91,8 @@ def copy(session: Session, source_id: str, job_id: str, at: datetime) -> dict[st
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
         "notes": _notes(session, source, job_id),
-        "state": JobState.DONE,
         "copied_from": source_id,
-        "lease": None,
-        "lease_until": None,
-        "progress": 1.0,
-        "error": None,
         "graded_at": at,
-        "finished_at": at,
         "phases": phases.written({phases.QUEUED: queued_at, phases.COMMITTED: at}),
         "plots": PlotState.DONE if drawn else PlotState.DUE,
         "plots_due_at": None if drawn else at,
@@ -107,10 +107,3 @@ def _notes(session: Session, source: Job, job_id: str) -> list[str]:
         unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)
     )
     return [*own, *(note for note in source.notes if note not in theirs)]
-
-
-def _copy_rows(session: Session, table: type[Base], source_id: str, job_id: str) -> None:
-    columns = table.__table__.columns
-    kept = [column for column in columns if column.name not in ("id", "job_id")]
-    rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
-    session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))

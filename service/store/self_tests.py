@@ -1,4 +1,4 @@
-"""Which workers can be trusted: when each process last graded the known answer rightly, and who is in quarantine.
+"""What a known answer says of a worker: when each process last graded it rightly, and what follows when one did not.
 
 A worker that got it wrong claims nothing any more, and what it graded since its last right answer is run again by
 others. Grading the known answer is ``service.queue.self_test``'s.
@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import audit
+from service.store import audit, jobs
 from service.store.engine import Store, now
 from service.store.models import Batch, BatchState, Job, JobState, Lane, SelfTest, Standing, Worker
 from service.version import GRADER_VERSION, grader_sha256
@@ -28,13 +28,6 @@ class Quarantined:
     taken_back: int
     suspect: tuple[str, ...]
     again: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class InQuarantine:
-    worker: str
-    since: datetime
-    reason: str
 
 
 def answered_rightly(store: Store, worker: str, process: int) -> None:
@@ -65,7 +58,7 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
         row.reason = reason
         # A finish waits for this row, or was committed before it was locked and is seen below.
         session.flush()
-        taken_back = _take_back(session, worker, at)
+        taken_back = jobs.give_back(session, worker, at)
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
         suspects = _suspects(session, worker)
         again = tuple(_run_again(session, job, sentence, at) for job in suspects if job.standing is not Standing.KEPT)
@@ -75,22 +68,6 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
         ids = tuple(job.id for job in suspects)
         audit.note(session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again))
         return Quarantined(taken_back, ids, again)
-
-
-def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:
-    """Whether the worker may neither claim nor finish; with ``lock`` that stays so to the transaction's end."""
-    query = select(Worker.quarantined_at).where(Worker.name == worker)
-    return session.scalar(query.with_for_update(read=True) if lock else query) is not None
-
-
-def in_quarantine(session: Session) -> list[InQuarantine]:
-    """All workers in quarantine, the latest first."""
-    query = select(Worker).where(Worker.quarantined_at.is_not(None)).order_by(Worker.quarantined_at.desc())
-    return [
-        InQuarantine(row.name, row.quarantined_at, row.reason or "")
-        for row in session.scalars(query)
-        if row.quarantined_at is not None
-    ]
 
 
 def _worker(session: Session, name: str, at: datetime) -> Worker:
@@ -113,16 +90,6 @@ def _forget_old(session: Session, at: datetime) -> None:
         delete(Worker).where(Worker.name.in_(old)),
     ):
         session.execute(statement, execution_options={"synchronize_session": False})
-
-
-def _take_back(session: Session, worker: str, at: datetime) -> int:
-    held = select(Job).where(Job.state == JobState.RUNNING, Job.worker == worker).with_for_update()
-    jobs = session.scalars(held).all()
-    for job in jobs:
-        job.state, job.lease, job.lease_until, job.notified_at = JobState.QUEUED, None, None, None
-        job.progress, job.due_at, job.attempt = 0.0, at, job.attempt - 1
-    session.flush()
-    return len(jobs)
 
 
 def _suspects(session: Session, worker: str) -> Sequence[Job]:
@@ -150,11 +117,7 @@ def _run_again(session: Session, job: Job, sentence: str, at: datetime) -> str:
         batch_id=None if cancelled else job.batch_id,
         lane=Lane(job.lane),
         max_attempts=job.max_attempts,
-        due_at=at,
-        queued_at=at,
         regrade_of=job.id,
         standing=job.standing,
     )
-    session.add(again)
-    session.flush()
-    return again.id
+    return jobs.enqueue(session, again, at)

@@ -1,6 +1,6 @@
-"""Which workers live: each writes down every few seconds that it does, and takes its row away at its end.
+"""Which workers live and which are in quarantine: each writes down every few seconds that it lives, until its end.
 
-Says nothing of what they hold; that is in the jobs.
+Says nothing of what they hold; that is in the jobs. What puts one into quarantine is in ``self_tests.py``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now
-from service.store.models import Heartbeat
+from service.store.models import Heartbeat, Worker
 
 #: A worker that wrote within this time is taken to live.
 LATELY = timedelta(seconds=30)
@@ -38,6 +38,15 @@ class Seen:
     started_at: datetime
     seen_at: datetime
     lately: bool
+
+
+@dataclass(frozen=True, slots=True)
+class InQuarantine:
+    """A worker that got a known answer wrong, and how."""
+
+    worker: str
+    since: datetime
+    reason: str
 
 
 def beat(store: Store, worker: WorkerDescription) -> None:
@@ -78,3 +87,19 @@ def known_workers(session: Session) -> list[Seen]:
 def another_lives(worker: str, at: datetime) -> ColumnElement[bool]:
     """Whether a worker other than this one was heard of lately, as a condition."""
     return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - LATELY).exists()
+
+
+def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:
+    """Whether the worker may neither claim nor finish; with ``lock`` that stays so to the transaction's end."""
+    query = select(Worker.quarantined_at).where(Worker.name == worker)
+    return session.scalar(query.with_for_update(read=True) if lock else query) is not None
+
+
+def in_quarantine(session: Session) -> list[InQuarantine]:
+    """All workers in quarantine, the latest first."""
+    query = select(Worker).where(Worker.quarantined_at.is_not(None)).order_by(Worker.quarantined_at.desc())
+    return [
+        InQuarantine(row.name, row.quarantined_at, row.reason or "")
+        for row in session.scalars(query)
+        if row.quarantined_at is not None
+    ]

@@ -10,9 +10,9 @@ from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.doctor import examine_service
 from service.settings import Settings
 from service.store.engine import Store
-from service.web.health import readiness
 from service.web.metrics import metrics_text
 
 
@@ -29,8 +29,10 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     @app.get("/health/ready")
     def ready() -> JSONResponse:
         """Whether submissions would be graded now: 200, or 503 with what is not well."""
-        found = readiness(settings, store)
-        return JSONResponse(found.plain(), status_code=200 if found.ready else 503)
+        findings = examine_service(settings, store)
+        is_ready = all(finding.well for finding in findings)
+        checks = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
+        return JSONResponse({"ready": is_ready, "checks": checks}, status_code=200 if is_ready else 503)
 
     @app.get("/metrics")
     def metrics() -> Response:

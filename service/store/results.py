@@ -28,7 +28,7 @@ from service.grading.grade import (
 )
 from service.store import artifacts, recordings
 from service.store.codec import decode, encode
-from service.store.models import AssignmentVersion, CriterionRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
 from submissions.seeds import PUBLIC
@@ -66,7 +66,7 @@ def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> N
     """Write the rows of a grade; those of an earlier grading of the same job go."""
     grade = prepared.grade
     session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))
-    session.execute(delete(CriterionRow).where(CriterionRow.job_id == job_id))
+    session.execute(delete(CriterionResultRow).where(CriterionResultRow.job_id == job_id))
     session.add_all(_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
     session.add_all(
         _criterion_row(job_id, position, result, prepared.predictions[position])
@@ -89,7 +89,9 @@ def load(session: Session, job_id: str) -> Grade:
         raise UsageError(f"{job_id} has no grade")
     job, sha256, student, version = found
     trials = _trials(session, job_id)
-    rows = session.scalars(select(CriterionRow).where(CriterionRow.job_id == job_id).order_by(CriterionRow.position))
+    rows = session.scalars(
+        select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
+    )
     return Grade(
         assignment=version.assignment,
         assignment_title=version.title,
@@ -131,9 +133,9 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
 
 def _criterion_row(
     job_id: str, position: int, result: CriterionResult, predictions: list[dict[str, Any]]
-) -> CriterionRow:
+) -> CriterionResultRow:
     accuracy = result.accuracy
-    return CriterionRow(
+    return CriterionResultRow(
         job_id=job_id,
         position=position,
         criterion=result.id,
@@ -194,7 +196,7 @@ def _recording(files: dict[str, artifacts.File], job_id: str, position: int) -> 
     return recordings.from_bytes(files[name].data)
 
 
-def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionResult:
+def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> CriterionResult:
     return CriterionResult(
         id=row.criterion,
         title=row.title,
@@ -212,7 +214,7 @@ def _criterion(row: CriterionRow, trials: tuple[TrialResult, ...]) -> CriterionR
     )
 
 
-def _accuracy(row: CriterionRow) -> Accuracy | None:
+def _accuracy(row: CriterionResultRow) -> Accuracy | None:
     if row.accuracy is None or row.accuracy_low is None or row.accuracy_high is None or row.accuracy_n is None:
         return None
     return Accuracy(

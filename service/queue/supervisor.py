@@ -1,6 +1,6 @@
 """All of a service on one machine: broker, workers and web server, each started again when it ends.
 
-Runs no loop of its own and prints nothing; ``up_command.py`` does.
+Runs no loop of its own and prints nothing; ``commands/up.py`` does.
 """
 
 from __future__ import annotations

@@ -1,0 +1,70 @@
+"""The plots of stored grades: whose are drawn next, and what was drawn. They come after the marks and change none.
+
+Draws nothing; that is ``service.plotting``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+
+from sqlalchemy import func, or_, select, update
+from sqlalchemy.orm import Session
+
+from service.store import artifacts, phases
+from service.store.engine import Store, now
+from service.store.models import Job, PlotState
+
+ATTEMPTS = 3
+_PREFIX, _SUFFIX = "plot-", ".png"
+
+
+def claim(store: Store, lease_seconds: float) -> str | None:
+    """The job whose plots are drawn next, by age; None when none is due.
+
+    Drawing twice does no harm, so the claim is only put off, not fenced. After three times it is given up.
+    """
+    with store.transaction() as session:
+        at = now(session)
+        due = (Job.plots == PlotState.DUE, Job.plots_due_at <= at)
+        given_up = update(Job).where(*due, Job.plots_attempt >= ATTEMPTS).values(plots=PlotState.FAILED)
+        session.execute(given_up)
+        query = select(Job.id).where(*due).order_by(Job.finished_at, Job.id).limit(1)
+        job_id = session.scalar(query.with_for_update(skip_locked=True))
+        if job_id is not None:
+            until = at + timedelta(seconds=lease_seconds)
+            put_off = update(Job).where(Job.id == job_id)
+            session.execute(put_off.values(plots_due_at=until, plots_attempt=Job.plots_attempt + 1))
+        return job_id
+
+
+def finish(store: Store, job_id: str, drawn: Mapping[str, bytes]) -> None:
+    """Keep the plots of a job: name -> PNG."""
+    files = [artifacts.File(f"{_PREFIX}{name}{_SUFFIX}", "image/png", data) for name, data in drawn.items()]
+    with store.transaction() as session:
+        at = now(session)
+        artifacts.put(session, job_id, files, at)
+        before = session.scalars(select(Job.phases).where(Job.id == job_id)).one()
+        reached = {**before, **phases.written({phases.PLOTTED: at})}
+        done = update(Job).where(Job.id == job_id)
+        session.execute(done.values(plots=PlotState.DONE, plots_due_at=None, plotted_at=at, phases=reached))
+
+
+def load(session: Session, job_id: str) -> dict[str, bytes]:
+    """The plots that were kept of a job: name -> PNG."""
+    kept = artifacts.get(session, job_id, prefix=_PREFIX)
+    return {name.removeprefix(_PREFIX).removesuffix(_SUFFIX): file.data for name, file in kept.items()}
+
+
+def due(store: Store) -> int:
+    """How many jobs wait for their plots."""
+    with store.reading() as session:
+        waiting = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
+        return session.scalar(select(func.count()).select_from(Job).where(*waiting)) or 0
+
+
+def correct_clock(session: Session, at: datetime, ahead: datetime) -> None:
+    """Plots that wait for a moment after ``ahead`` are due ``at``, where a wrong clock wrote it."""
+    waiting = (Job.plots == PlotState.DUE, Job.plots_due_at > ahead)
+    written_later = or_(Job.finished_at > ahead, Job.started_at > ahead)
+    session.execute(update(Job).where(*waiting, written_later).values(plots_due_at=at))

@@ -1,0 +1,203 @@
+"""The states of a job: every transition tried from every state, and nothing but ``jobs.py`` writes them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+import report_builders
+import service
+from builders import grading_request
+from service.store import batch_control, jobs, results
+from service.store.engine import Store, now
+from service.store.intake import accept_batch
+from service.store.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
+from service.store.models import Job, JobState, SubmissionRow
+from sim.errors import HostError
+
+WORKER = "worker"
+RETRY = Retry(0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A job in some state, and the claim of the worker that holds it, or of one that does not."""
+
+    job_id: str
+    batch_id: str
+    source_id: str  # a grade to copy
+    claim: Claim
+
+
+def _accept(store: Store, student: str) -> tuple[str, str]:
+    batch = accept_batch(store, student, [grading_request(student)], [], max_attempts=2)
+    return batch.jobs[0].job_id, batch.id
+
+
+def _claimed(store: Store) -> Claim:
+    claim = jobs.claim(store, WORKER, 60)
+    assert claim is not None
+    return claim
+
+
+def _finish(store: Store, claim: Claim) -> None:
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+
+
+def _fail(store: Store, claim: Claim, *, enough: bool) -> None:
+    tried = Claim(claim.job_id, claim.lease, 2 if enough else 1, 2, claim.at)
+    jobs.fail(store, tried, "it broke", RETRY)
+
+
+def _in_session(change: Callable[..., object]) -> Callable[[Store, Subject], object]:
+    def run(store: Store, subject: Subject) -> object:
+        with store.transaction() as session:
+            return change(session, subject, now(session))
+
+    return run
+
+
+def _submissions(subject: Subject) -> object:
+    return select(SubmissionRow.id).where(SubmissionRow.batch_id == subject.batch_id)
+
+
+#: One thing to do for each transition, as those do it who may.
+MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
+    jobs.COPY: _in_session(lambda session, subject, at: jobs.copy(session, subject.job_id, subject.source_id, at)),
+    jobs.SUPERSEDE: _in_session(
+        lambda session, subject, at: jobs.supersede(session, _submissions(subject), "another", at)
+    ),
+    jobs.CLAIM: lambda store, subject: jobs.claim(store, WORKER, 60),
+    jobs.HEARTBEAT: lambda store, subject: jobs.heartbeat(store, subject.claim, 60, 0.5),
+    jobs.FINISH: lambda store, subject: _finish(store, subject.claim),
+    jobs.TRY_AGAIN: lambda store, subject: _fail(store, subject.claim, enough=False),
+    jobs.GIVE_UP: lambda store, subject: _fail(store, subject.claim, enough=True),
+    jobs.GIVE_BACK: lambda store, subject: jobs.release_worker(store, WORKER),
+    jobs.CANCEL: _in_session(lambda session, subject, at: jobs.cancel(session, subject.batch_id, "enough", at)),
+    jobs.RETRY: _in_session(lambda session, subject, at: jobs.retry(session, (Job.id == subject.job_id,), at)),
+}
+
+
+def _subject(store: Store, state: JobState, student: str, source_id: str) -> Subject:
+    """A job of this state, brought there by the transitions themselves."""
+    job_id, batch_id = _accept(store, student)
+    nobodys = Claim(job_id, "0" * 32, 1, 2, datetime.now(UTC))
+    if state is JobState.QUEUED:
+        return Subject(job_id, batch_id, source_id, nobodys)
+    claim = _claimed(store)
+    assert claim.job_id == job_id
+    if state is JobState.DONE:
+        _finish(store, claim)
+    elif state is JobState.DEAD:
+        jobs.give_up(store, claim, "no program")
+    elif state is JobState.CANCELLED:
+        batch_control.cancel(store, batch_id)
+    return Subject(job_id, batch_id, source_id, claim)
+
+
+def _job(store: Store, job_id: str) -> Job:
+    with store.reading() as session:
+        return session.get_one(Job, job_id)
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_a_transition_is_made_where_it_begins_and_nowhere_else(store: Store, state: JobState) -> None:
+    assert set(MOVES) == set(TRANSITIONS) - {jobs.ENQUEUE}
+    source_id, _ = _accept(store, "source")
+    _finish(store, _claimed(store))
+    for number, (transition, move) in enumerate(MOVES.items()):
+        subject = _subject(store, state, f"student-{number}", source_id)
+        assert _job(store, subject.job_id).state is state
+        with suppress(Fenced, HostError):
+            move(store, subject)
+        job = _job(store, subject.job_id)
+        assert job.state is (transition.after if state in transition.before else state), transition.name
+        assert (job.lease is not None) == (job.state is JobState.RUNNING), transition.name
+        assert (job.finished_at is None) == (job.state in (JobState.QUEUED, JobState.RUNNING)), transition.name
+        # So that the next one claimed is the next one's.
+        batch_control.cancel(store, subject.batch_id)
+
+
+def test_every_state_can_be_reached_and_left_or_is_an_end() -> None:
+    assert {transition.after for transition in TRANSITIONS} == set(JobState)
+    left = {state for transition in TRANSITIONS for state in transition.before}
+    assert set(JobState) - left == {JobState.DONE, JobState.CANCELLED}
+
+
+def test_the_drawing_names_every_transition() -> None:
+    drawn = Path(service.__file__ or "").parents[1].joinpath("docs", "how-it-works.md").read_text(encoding="utf-8")
+    section = drawn.split("## A job", 1)[1].split("\n## ", 1)[0]
+    rows = {tuple(cell.strip(" `") for cell in line.split("|")[1:-1]) for line in section.splitlines() if "|" in line}
+    for transition in TRANSITIONS:
+        before = ", ".join(state.value for state in transition.before)
+        assert (transition.name, before, transition.after.value, transition.by) in rows
+
+
+#: What belongs to a job's state.
+OWN = {"state", "lease", "lease_until", "due_at"}
+
+
+def _job_writes(tree: ast.AST) -> Iterator[int]:
+    """The lines that write what belongs to a job's state, or could: values that cannot be read here count."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            for target in [each for outer in targets for each in ast.walk(outer)]:
+                if (
+                    isinstance(target, ast.Attribute)
+                    and isinstance(target.ctx, ast.Store)
+                    and target.attr in OWN
+                    and not (isinstance(target.value, ast.Name) and target.value.id in ("self", "row"))
+                ):
+                    yield node.lineno
+        elif isinstance(node, ast.Dict):
+            written = {key.value for key in node.keys if isinstance(key, ast.Constant)}
+            if written & (OWN - {"state"}):
+                yield node.lineno
+        elif isinstance(node, ast.Call) and _writes_a_job(node):
+            yield node.lineno
+
+
+def _writes_a_job(call: ast.Call) -> bool:
+    """Whether a job is made, or anything but a batch updated, with what belongs to a job's state."""
+    if not any(keyword.arg is None or keyword.arg in OWN for keyword in call.keywords):
+        return False
+    if isinstance(call.func, ast.Name):
+        return call.func.id == "Job"
+    if not isinstance(call.func, ast.Attribute) or call.func.attr != "values":
+        return False
+    return not ast.unparse(call.func.value).startswith(("update(Batch)", "insert("))
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "job.state = JobState.DONE",
+        "job.state, job.lease = JobState.QUEUED, None",
+        "job = Job(id=job_id, state=JobState.DONE)",
+        "session.execute(update(Job).where(Job.id == job_id).values(state=JobState.DONE))",
+        "session.execute(update(Job).values(**values))",
+        "waiting = update(Job)\nsession.execute(waiting.values(due_at=at))",
+        "columns = {'lease': None}",
+    ],
+)
+def test_a_write_of_a_state_would_be_found(written: str) -> None:
+    assert list(_job_writes(ast.parse(written)))
+
+
+def test_nothing_else_writes_the_state_of_a_job() -> None:
+    folder = Path(service.__file__ or "").parent
+    found = {
+        f"{path.relative_to(folder)}:{line}"
+        for path in sorted(folder.rglob("*.py"))
+        if path.relative_to(folder).as_posix() != "store/jobs.py" and "versions" not in path.parts
+        for line in _job_writes(ast.parse(path.read_text(encoding="utf-8")))
+    }
+    assert found == set()
