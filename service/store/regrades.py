@@ -134,8 +134,8 @@ def changes(session: Session, batch_id: str) -> list[Change]:
 def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
     """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
 
-    One that is suspect, of a submission over a limit, or with a criterion that could not be judged is not published, the
-    last unless ``anyway``. Raises UsageError for an unknown batch.
+    One that is suspect, of a submission over a limit, or with a criterion that could not be judged is not published,
+    the last unless ``anyway``. Raises UsageError for an unknown batch.
     """
     with store.transaction() as session:
         at = now(session)

@@ -8,12 +8,10 @@ from __future__ import annotations
 import itertools
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sim.backgrounds.drawing import BLACK, BLUE, HEIGHT, RED, WHITE, WIDTH, Box, Colour, grey
-from sim.backgrounds.tracks import Point, SmoothCanvas
 from sim.chance import Stream
+from sim.floors.canvas import BLACK, BLUE, HEIGHT, RED, WHITE, WIDTH, Box, Colour, Pixels, Point, SmoothCanvas, grey
+from sim.floors.registry import printed
+from sim.recording import Pose
 
 #: The bars of Into Orbit that a robot must not cross: both ends and the radius with the white border.
 ORBIT_BARS: tuple[tuple[Point, Point, float], ...] = (
@@ -44,7 +42,8 @@ _WRO_BLACK: Colour = (35, 31, 32)
 _WRO_BLUE: Colour = (0, 105, 180)
 
 
-def fll_2018_into_orbit() -> NDArray[np.uint8]:
+@printed("FLL_2018_Into_Orbit", Pose(150, 150, 90), menu=17)
+def fll_2018_into_orbit() -> Pixels:
     """Space with a satellite to go round to, a moon base, an asteroid, and bordered black bars in the way."""
     canvas = SmoothCanvas((18, 24, 58))
     _stars(canvas)
@@ -94,7 +93,8 @@ def _satellite(canvas: SmoothCanvas) -> None:
     canvas.rectangle((x - 18, y - 26, x + 18, y + 26), (214, 180, 90))
 
 
-def fll_2019_city_shaper() -> NDArray[np.uint8]:
+@printed("FLL_2019_City_Shaper", Pose(500, 150, 90), menu=16)
+def fll_2019_city_shaper() -> Pixels:
     """A city plan: launch area, streets with bordered black lines, building circles and a bridge; all free drawing."""
     canvas = SmoothCanvas((226, 222, 208))
     for left, top, right, bottom in (
@@ -126,7 +126,8 @@ def fll_2019_city_shaper() -> NDArray[np.uint8]:
     return canvas.pixels()
 
 
-def wro_2018_regular_junior() -> NDArray[np.uint8]:
+@printed("WRO_2018_Regular_Junior", Pose(1181, 150, 90), menu=15)
+def wro_2018_regular_junior() -> Pixels:
     """A blue base, three coloured targets of three cells, and black lines from the base to each."""
     canvas = SmoothCanvas()
     width = 20
@@ -148,7 +149,8 @@ def wro_2018_regular_junior() -> NDArray[np.uint8]:
     return canvas.pixels()
 
 
-def wro_2019_regular_junior() -> NDArray[np.uint8]:
+@printed("WRO_2019_Regular_Junior", Pose(2215, 150, 90), menu=14)
+def wro_2019_regular_junior() -> Pixels:
     """A start area at the lower right, black lines, and rows of coloured cells; all free drawing."""
     canvas = SmoothCanvas()
     width = 20

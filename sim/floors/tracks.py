@@ -1,6 +1,6 @@
 """The floors with tracks to follow: test lines, lines with obstacles, junctions and the Thruxton circuit.
 
-Smooth-edged images, in image coordinates (y down); where the obstacles stand is in ``floors.py``.
+Smooth-edged images, in image coordinates (y down); the lines in world coordinates are ``centrelines.py``'s.
 """
 
 from __future__ import annotations
@@ -11,17 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 
-import numpy as np
-from numpy.typing import NDArray
-from PIL import Image, ImageDraw
-
-from sim.backgrounds.drawing import BLACK, HEIGHT, RED, WHITE, WIDTH, Box, Canvas, Colour, grey
-
-#: Images are drawn so many times larger and then averaged.
-SCALE = 4
-
-Point = tuple[float, float]
-
+from sim.floors.canvas import BLACK, RED, WHITE, Pixels, Point, SmoothCanvas, grey
+from sim.floors.registry import Obstacle, printed
+from sim.recording import Pose
 
 @dataclass(frozen=True, slots=True)
 class TrackLine:
@@ -39,58 +31,8 @@ def lines_of(file_name: str) -> tuple[TrackLine, ...]:
     )
 
 
-class SmoothCanvas:
-    """An image that is drawn ``SCALE`` times as large and averaged, so that slanting edges are smooth.
-
-    Coordinates are those of the finished image, in which pixel 0 reaches from 0 to 1.
-    """
-
-    def __init__(self, background: Colour = WHITE) -> None:
-        self._image = Image.new("RGB", (WIDTH * SCALE, HEIGHT * SCALE), background)
-        self._canvas: Canvas = ImageDraw.Draw(self._image)
-
-    def line(self, points: Sequence[Point], width: float, colour: Colour = BLACK) -> None:
-        scaled = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
-        self._canvas.line(scaled, colour, width=round(width * SCALE), joint="curve")
-
-    def capsule(self, start: Point, end: Point, radius: float, colour: Colour) -> None:
-        """Everything within ``radius`` of the stretch from ``start`` to ``end``."""
-        self.line((start, end), 2 * radius, colour)
-        for x, y in (start, end):
-            self.disc((x, y), radius, colour)
-
-    def disc(self, centre: Point, radius: float, colour: Colour) -> None:
-        x, y = centre
-        self.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
-
-    def ring(self, centre: Point, radius: float, width: float, colour: Colour) -> None:
-        """A circle line whose middle is ``radius`` from ``centre``."""
-        x, y = centre
-        outer = radius + width / 2
-        box = self._inside((x - outer, y - outer, x + outer, y + outer))
-        self._canvas.ellipse(box, outline=colour, width=round(width * SCALE))
-
-    def ellipse(self, box: Box, colour: Colour) -> None:
-        self._canvas.ellipse(self._inside(box), colour)
-
-    def rectangle(self, box: Box, colour: Colour) -> None:
-        self._canvas.rectangle(self._inside(box), colour)
-
-    def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
-        self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
-
-    def pixels(self) -> NDArray[np.uint8]:
-        """What was drawn, shape (1143, 2362, 3)."""
-        return np.asarray(self._image.reduce(SCALE))
-
-    @staticmethod
-    def _inside(box: Box) -> Box:
-        """Pillow draws both edges of a box, so the far ones move in by one of the small pixels."""
-        left, top, right, bottom = box
-        return (left * SCALE, top * SCALE, right * SCALE - 1, bottom * SCALE - 1)
-
-
-def line_following_test() -> NDArray[np.uint8]:
+@printed("Line_Following_Test", Pose(141, 125, 90), menu=18)
+def line_following_test() -> Pixels:
     """Eleven black lines of all kinds."""
     canvas = SmoothCanvas()
     for line in lines_of("line_following_test.json"):
@@ -98,7 +40,14 @@ def line_following_test() -> NDArray[np.uint8]:
     return canvas.pixels()
 
 
-def obstacles_test() -> NDArray[np.uint8]:
+#: What stands on Obstacles_Test from the start.
+_TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
+    (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
+)
+
+
+@printed("Obstacles_Test", Pose(121, 125, 90), menu=25, obstacles=_TEST_OBSTACLES)
+def obstacles_test() -> Pixels:
     """Six lines that lead to obstacles, and a broad black band."""
     canvas = SmoothCanvas()
     lines = lines_of("obstacles_test.json")
@@ -109,7 +58,8 @@ def obstacles_test() -> NDArray[np.uint8]:
     return canvas.pixels()
 
 
-def junction_handling_test() -> NDArray[np.uint8]:
+@printed("Junction_Handling_Test", Pose(698, 130, 90), menu=19)
+def junction_handling_test() -> Pixels:
     """A street grid with a roundabout; a green marker in the right or left corner of a crossing says where to turn.
 
     Drawn anew with the original's measures: lines 20 wide, markers 25.
@@ -136,7 +86,8 @@ def junction_handling_test() -> NDArray[np.uint8]:
     return canvas.pixels()
 
 
-def thruxton_circuit() -> NDArray[np.uint8]:
+@printed("Thruxton_Circuit", Pose(457, 242, 120), menu=22)
+def thruxton_circuit() -> Pixels:
     """The closed loop, the grey start bar across it, and flags and chequers beside the bar."""
     canvas = SmoothCanvas()
     (track,) = lines_of("thruxton_circuit.json")

@@ -5,11 +5,9 @@ Only the image; unlike the original's it has no see-through parts, so no earlier
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sim.backgrounds.drawing import BLACK, BLUE, GREEN, RED, WHITE, YELLOW, Colour, grey
-from sim.backgrounds.tracks import SmoothCanvas
+from sim.floors.canvas import BLACK, BLUE, GREEN, RED, WHITE, YELLOW, Colour, Pixels, SmoothCanvas, grey
+from sim.floors.registry import printed
+from sim.recording import Pose
 
 CARD_WIDTH, CARD_HEIGHT = 2215, 1073
 
@@ -18,7 +16,8 @@ _MAGENTA: Colour = (255, 0, 255)
 _CENTRE = (CARD_WIDTH / 2, CARD_HEIGHT / 2)
 
 
-def testcard() -> NDArray[np.uint8]:
+@printed("Testcard", Pose(400, 800, 90), menu=12)
+def testcard() -> Pixels:
     """White grid on grey, and in it colour bars, a grey staircase, fine stripes and a circle."""
     canvas = SmoothCanvas()
     canvas.rectangle((0, 0, CARD_WIDTH, CARD_HEIGHT), grey(128))

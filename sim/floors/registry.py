@@ -26,16 +26,6 @@ from sim.recording import Pose
 Obstacle = tuple[float, float, float, float]
 _Pixels = Callable[[], NDArray[np.uint8]]
 
-#: The six shapes of Simple_Shapes, in the order of the codes 0 to 5 that the course gives them.
-SHAPES = (
-    "square",
-    "right facing triangle",
-    "left facing triangle",
-    "downwards facing triangle",
-    "upwards facing triangle",
-    "diamond",
-)
-
 #: What the flag ``-o`` offers: x, y, width, height of each obstacle, mm, lower left corner first.
 OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
     {
@@ -142,11 +132,6 @@ def _digit_labels(shown: tuple[int, ...]) -> tuple[FloorLabel, ...]:
         for digit, (row, column) in zip(shown, places, strict=True)
     )
 
-
-#: What stands on Obstacles_Test from the start.
-_TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
-    (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
-)
 
 _PLANS: Mapping[str, _Plan | _SheetPlan | _ShapesPlan] = MappingProxyType(
     {

@@ -10,8 +10,8 @@ import itertools
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from sim.backgrounds.drawing import HEIGHT
-from sim.backgrounds.tracks import Point, TrackLine, lines_of
+from sim.floors.canvas import HEIGHT, Point
+from sim.floors.tracks import TrackLine, lines_of
 
 #: The lines of Line_Following_Test in the order of the data file. The name is the x where the line starts, with
 #: ``high`` for the ones that start half-way up; the broken line, in three parts, is not among them.
