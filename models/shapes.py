@@ -13,8 +13,8 @@ from models.images import LabelledPose, Photographer, Shift
 from models.networks import Plan
 from models.preprocessing import features
 from models.tasks import Examples, Task, Test
-from sim.backgrounds import SHAPES
 from sim.chance import Stream
+from sim.floors import SHAPES
 from sim.recording import Pose
 
 _SEED = 20201107

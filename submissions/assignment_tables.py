@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import ErrorDetails
 
-from sim.backgrounds import OBSTACLE_PRESETS
+from sim.floors import OBSTACLE_PRESETS
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.strict_table import StrictTable

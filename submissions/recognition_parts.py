@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from sim.backgrounds import Floor, label_names
 from sim.errors import UsageError
+from sim.floors import Floor, label_names
 from submissions.assignment import Scenario, Training
 from submissions.assignment_tables import TrainingTable, did_you_mean
 from submissions.criteria.classification import Recognition, Robustness

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
 from service.settings import Settings
-from sim.backgrounds import OBSTACLE_PRESETS
+from sim.floors import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
 from submissions.assignment_file import find_assignment
 from submissions.assignment_tables import (

@@ -17,7 +17,7 @@ from service.grading.judging.circuits import rounds
 from service.grading.judging.courses import along as along_line
 from service.grading.judging.courses import covered
 from service.grading.judging.whereabouts import positions
-from sim.backgrounds.centrelines import centrelines
+from sim.floors.centrelines import centrelines
 from sim.recording import Pose, Touch
 from submissions.criteria.places import Area, LineToFollow
 

@@ -18,9 +18,9 @@ from models.images import LabelledPose, Photographer, Shift
 from models.networks import read
 from models.preprocessing import features
 from models.training import TRAINABLE, train
-from sim.backgrounds import floor
-from sim.backgrounds.digits import _digit_images
 from sim.errors import UsageError
+from sim.floors import floor
+from sim.floors.digits import _digit_images
 from sim.recording import Pose
 
 DIGITS = [pytest.param(name, marks=pytest.mark.long) for name in ("digits", "digits-28")]

@@ -21,7 +21,7 @@ from service.grading.judging.per_class import class_scores
 from service.grading.judging.truths import NO_IMAGE
 from service.reports.audience import student_view
 from service.reports.recognition_table import recognition_tables
-from sim.backgrounds import SHAPES
+from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment

@@ -18,7 +18,7 @@ from service.reports.html import student_report
 from service.reports.misread_plot import draw_misread, misread
 from service.reports.plots import draw_all, plots_of
 from service.reports.track_plot import along_the_way, draw_track, taken, tracks, worst_track
-from sim.backgrounds import floor
+from sim.floors import floor
 from sim.recording import Image, Pose
 
 

@@ -12,7 +12,7 @@ from service.reports.floor_plot import draw_floor
 from service.reports.html import PrintedFloor, gallery
 from service.reports.plot_style import png
 from service.reports.written import prepare_folder, write_page
-from sim.backgrounds import floor, label_names, names
+from sim.floors import floor, label_names, names
 
 
 def floors(

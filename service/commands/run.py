@@ -24,8 +24,8 @@ from service.reports.path_plot import draw_path
 from service.reports.plot_style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
-from sim.backgrounds import floor
 from sim.errors import UsageError
+from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise

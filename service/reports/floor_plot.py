@@ -1,6 +1,6 @@
 """Draws a floor by itself: the image with a scale in mm, where the robot starts, obstacles and what has a label.
 
-The floors' images are ``sim/backgrounds``'; a robot's path over one is drawn in ``path_plot.py``.
+The floors' images are ``sim/floors``'; a robot's path over one is drawn in ``path_plot.py``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from service.reports.plot_style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
-from sim.backgrounds import Floor
+from sim.floors import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.56, 0.12, 0.42  # inches

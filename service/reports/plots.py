@@ -25,8 +25,8 @@ from service.reports.predictions_plot import chosen_predictions, draw_prediction
 from service.reports.readable import one_line
 from service.reports.sensor_plot import draw_sensors
 from service.reports.track_plot import draw_track, tracks, worst_track
-from sim.backgrounds import floor as floor_of
 from sim.errors import UsageError
+from sim.floors import floor as floor_of
 from sim.recording import Recording
 from submissions.sweep import CONDITIONS, Varied
 

@@ -42,7 +42,7 @@ _DIGITS = tuple(map(str, range(10)))
 
 @drawn_anew("MNIST_Digits", Pose(400, 50, 90), menu=23, label_names=_DIGITS)
 def white_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
-    """Black handwriting on white paper."""
+    """Handwriting pasted on white paper."""
     return _sheet(seed, 255, label_patches=label_patches)
 
 

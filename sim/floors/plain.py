@@ -1,4 +1,4 @@
-"""The plain floors: bands, gradients, loops and simple outlines, at fixed image coordinates (rectangles with both edges).
+"""The plain floors: bands, gradients, loops and simple outlines, in image coordinates (rectangles with both edges).
 
 Not the shapes, tracks, digit sheets, test card and competition mats, which have modules of their own.
 """
@@ -12,9 +12,26 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.floors.canvas import BLACK, BLUE, GREEN, HEIGHT, RED, WHITE, WIDTH, YELLOW, Box, Canvas, Colour, Painter, Pixels, grey, paint
+from sim.floors.canvas import (
+    BLACK,
+    BLUE,
+    GREEN,
+    HEIGHT,
+    RED,
+    WHITE,
+    WIDTH,
+    YELLOW,
+    Box,
+    Canvas,
+    Colour,
+    Painter,
+    Pixels,
+    grey,
+    paint,
+)
 from sim.floors.registry import printed
 from sim.recording import Pose
+
 
 def painted(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Callable[[Painter], Painter]:
     """Registers the floor that a painter leaves on ``paper``."""

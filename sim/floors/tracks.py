@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 
 from sim.floors.canvas import BLACK, RED, WHITE, Pixels, Point, SmoothCanvas, grey
 from sim.floors.registry import Obstacle, printed
 from sim.recording import Pose
+
 
 @dataclass(frozen=True, slots=True)
 class TrackLine:

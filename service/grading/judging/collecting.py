@@ -15,7 +15,7 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at, quoted
 from service.grading.judging.places import footprint_at, part_at
-from sim.backgrounds import floor, label_names, names
+from sim.floors import floor, label_names, names
 from sim.recording import Image, Recording
 from submissions.criteria.collecting import Collects
 

@@ -16,8 +16,8 @@ from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.measured import measured_only
 from service.grading.judging.outcome import Outcome, failed, passed, pose_at
 from service.grading.judging.places import floor_share
-from sim.backgrounds import floor, names
 from sim.camera import HEIGHT, WIDTH, sensor_mask
+from sim.floors import floor, names
 from sim.recording import Datum, Image, Pose, Recording
 from sim.robot import ROBOTS, LightSensor, robot
 from sim.sensors import footprint

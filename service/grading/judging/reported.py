@@ -12,7 +12,7 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.outcome import Outcome, failed, listed, passed, quoted
 from service.grading.judging.places import part_at
 from service.grading.judging.words import Token, find_words, tokens_of, words_of
-from sim.backgrounds import floor, names
+from sim.floors import floor, names
 from sim.recording import Recording
 from submissions.criteria.reporting import Reports
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from service.grading.grade import TrialResult
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.places import part_at
-from sim.backgrounds import label_names
+from sim.floors import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.classification import LabelledPlace, Recognition
