@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 from typer.testing import CliRunner
 
-from models import card, shapes
+from models import card
 from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
+from models.families import shapes
 from models.images import Photographer, Shift
 from service.commands.models import models_app
 from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves

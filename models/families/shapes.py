@@ -10,9 +10,8 @@ import itertools
 import numpy as np
 
 from models.images import LabelledPose, Photographer, Shift
-from models.networks import Plan
 from models.preprocessing import features
-from models.tasks import Examples, Task, Test
+from models.tasks import Examples, Plan, Task, Test, register
 from sim.chance import Stream
 from sim.floors import SHAPES
 from sim.recording import Pose
@@ -49,15 +48,17 @@ def _test() -> Test:
     return Test(places(), noises, places(), (0, 32), 20, words)
 
 
-TASK = Task(
-    name="shapes",
-    file="mlp_shapes_14x14.joblib",
-    words="Names the shape under the robot's left light sensor.",
-    classes=SHAPES,
-    side=14,
-    plan=Plan(hidden=40, stages=((1e-3, 60), (2e-4, 20)), decay=1e-3, seed=_SEED),
-    examples=_examples,
-    training_words=f"Simple_Shapes as the simulated left sensor sees it: every whole mm up to {max(_OFFSETS)} off each "
-    "way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128",
-    test=_test,
+TASK = register(
+    Task(
+        name="shapes",
+        file="mlp_shapes_14x14.joblib",
+        words="Names the shape under the robot's left light sensor.",
+        classes=SHAPES,
+        side=14,
+        plan=Plan(hidden=40, stages=((1e-3, 60), (2e-4, 20)), decay=1e-3, seed=_SEED),
+        examples=_examples,
+        training_words=f"Simple_Shapes as the simulated left sensor sees it: every whole mm up to {max(_OFFSETS)} off "
+        "each way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128",
+        test=_test,
+    )
 )
