@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.queue.plotting import PREFIX, draw
-from service.reports.html import BatchRow, batch_index, staff_report, student_report
+from service.reports.html import BatchRow, batch_index, report
+from service.reports.view import staff_view, student_view
 from service.reports.written import file_stems, write_page
 from service.store import artifacts, batches, grades, intake, policies
 from service.store.batches import JobLine
@@ -85,6 +86,5 @@ def _page(store: Store, job_id: str) -> str:
         kept = list(artifacts.get(session, job_id, prefix=PREFIX).values())
     files = kept if job.plots is PlotState.DONE else draw(grade, grading_request.assignment)
     plots = {file.name.removeprefix(PREFIX).removesuffix(".png"): file.data for file in files}
-    if staff_only is not None:
-        return staff_report(grade, plots, grading_request.submission)
-    return student_report(grade, plots, grading_request.submission, released)
+    view = student_view(grade, released) if staff_only is None else staff_view(grade)
+    return report(view, plots, grading_request.submission)

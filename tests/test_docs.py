@@ -16,6 +16,7 @@ import pytest
 from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
+from service.reports.formats import FORMATS
 from service.settings import Settings
 from sim.floors import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
@@ -103,6 +104,11 @@ def test_every_robot_and_set_of_obstacles_is_named_for_instructors() -> None:
     text = (ROOT / "docs" / "instructors.md").read_text()
     assert [name for name in OBSTACLE_PRESETS if f"`{name}`" not in text] == []
     assert [name for name in ROBOTS if name.removesuffix("_Wide_Eyes") not in text] == []
+
+
+def test_every_output_format_is_named_for_instructors() -> None:
+    told = (ROOT / "docs" / "instructors.md").read_text()
+    assert [name for name in FORMATS if f"`{name}`" not in told] == []
 
 
 def test_every_kind_of_criterion_is_listed_for_instructors() -> None:

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from responders.sandbox import control_group
-from service.commands.batch_tables import remarks
+from service.commands.batch.tables import remarks
 from service.commands.grade import warn_of_no_sandbox
 from service.doctor import examine
 from service.home import for_the_user
@@ -22,7 +22,8 @@ from service.queue.broker import EmbeddedBroker
 from service.queue.plotting import PREFIX
 from service.queue.worker import run_worker
 from service.report_files import write_reports
-from service.reports.text import plain_text
+from service.reports.formats.text import plain_text
+from service.reports.view import staff_view
 from service.settings import Settings, load_settings
 from service.store import artifacts, batches, grades
 from service.store.batches import JobLine
@@ -83,7 +84,7 @@ def show(
                 return
             graded = grades.load(session, line.id)
             plots = artifacts.get(session, line.id, prefix=PREFIX)
-        sys.stdout.write(plain_text(graded))
+        sys.stdout.write(plain_text(staff_view(graded)))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         print("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if report is None:

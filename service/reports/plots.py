@@ -14,7 +14,6 @@ from typing import Literal
 from matplotlib.figure import Figure
 
 from service.grading.grade import AccuracyCurve, CriterionResult, Grade
-from service.reports.audience import BEFORE_PUBLICATION, scenarios, student_view, worst_trial
 from service.reports.confusion_plot import draw_confusion
 from service.reports.conversation_plot import draw_conversation
 from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves
@@ -25,6 +24,7 @@ from service.reports.predictions_plot import chosen_predictions, draw_prediction
 from service.reports.readable import one_line
 from service.reports.sensor_plot import draw_sensors
 from service.reports.track_plot import draw_track, tracks, worst_track
+from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.errors import UsageError
 from sim.floors import floor as floor_of
 from sim.recording import Recording
@@ -62,10 +62,10 @@ def draw_all(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[st
     y = 1143 mm; a floor that is in neither is drawn white.
     """
     drawn: dict[str, bytes] = {}
-    for view in (grade, student_view(grade)):
-        for plot in plots_of(view):
+    for view in (staff_view(grade), student_view(grade)):
+        for plot in plots_of(view.grade):
             if plot.name not in drawn:
-                drawn[plot.name] = png(_draw(view, plot, images))
+                drawn[plot.name] = png(_draw(view.grade, plot, images))
     return drawn
 
 
@@ -117,7 +117,7 @@ def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
 
 def _classifications(grade: Grade) -> Iterator[Plot]:
     for index, result in enumerate(grade.criteria):
-        suffix = _suffix(_hidden_classification(grade, result))
+        suffix = _suffix(tells_of_hidden(grade, result))
         accuracy = result.accuracy
         if accuracy is not None and accuracy.confusion:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
@@ -186,7 +186,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         index = worst_trial(grade, scenario)
         trial = grade.trials[index]
         recording = trial.recording
-        name = f"{_slug(scenario)}-{trial.index + 1}{_suffix(trial.visibility not in BEFORE_PUBLICATION)}"
+        name = f"{_slug(scenario)}-{trial.index + 1}{_suffix(is_for_staff(trial.visibility))}"
         title = _title(grade, scenario)
         start, end = recording.start, recording.end
         yield Plot(
@@ -217,7 +217,7 @@ def _conversations(grade: Grade) -> Iterator[Plot]:
         messages = trial.recording.messages
         sent = sum(message.sender == "robot" for message in messages)
         lost = sum(message.delivered is None for message in messages)
-        suffix = _suffix(trial.visibility not in BEFORE_PUBLICATION)
+        suffix = _suffix(is_for_staff(trial.visibility))
         yield Plot(
             f"conversation-{_slug(trial.scenario)}-{trial.index + 1}{suffix}", "conversation", index, trial.scenario,
             f"{_title(grade, trial.scenario)}: conversation",
@@ -225,14 +225,6 @@ def _conversations(grade: Grade) -> Iterator[Plot]:
             f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
             f"{lost} never arrived.",
         )  # fmt: skip
-
-
-def _hidden_classification(grade: Grade, result: CriterionResult) -> bool:
-    return result.visibility not in BEFORE_PUBLICATION or any(
-        grade.trials[prediction.trial].visibility not in BEFORE_PUBLICATION
-        for prediction in result.predictions
-        if 0 <= prediction.trial < len(grade.trials)
-    )
 
 
 def _title(grade: Grade, what: str) -> str:

@@ -10,14 +10,17 @@ import io
 from collections.abc import Iterable, Sequence
 
 from service.grading.grade import Grade
-from service.reports.audience import student_view
+from service.reports.formats.registry import table
 from service.reports.readable import number, one_line
+from service.reports.view import GradebookView, View, gradebook_view, staff_view
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
-def marks_csv(grades: Sequence[Grade]) -> str:
+@table("csv", ".csv", staff_view)
+def marks_csv(views: Sequence[View]) -> str:
     """One row a grade: student, assignment, marks, verdict, accuracy, hashes, a column a criterion, words for staff."""
+    grades = [view.grade for view in views]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = ["student", "assignment", "marks", "max_marks", "verdict"]
     header += ["accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version"]
@@ -25,15 +28,16 @@ def marks_csv(grades: Sequence[Grade]) -> str:
     return _table([header, *(_row(grade, criteria) for grade in grades)])
 
 
-def moodle_csv(grades: Sequence[Grade]) -> str:
+@table("moodle", ".csv", gradebook_view)
+def moodle_csv(views: Sequence[GradebookView]) -> str:
     """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
     rows = [["ID number", "Grade", "Feedback comments"]]
-    for grade in grades:
+    for view in views:
         feedback = "; ".join(
             f"{result.title}: {number(result.marks)} of {number(result.max_marks)}. {result.message}"
-            for result in student_view(grade).criteria
+            for result in view.shown.criteria
         )
-        rows.append([grade.student, number(grade.marks), one_line(feedback, 2000)])
+        rows.append([view.entry.student, number(view.entry.marks), one_line(feedback, 2000)])
     return _table(rows)
 
 

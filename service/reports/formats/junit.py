@@ -8,14 +8,18 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from service.grading.grade import CriterionResult, Grade
+from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
+from service.reports.view import View, staff_view
 from sim.recording import Verdict
 
 _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
 
 
-def junit_text(grade: Grade) -> str:
-    """``grade`` as a ``testsuites`` document with one suite; times are simulated seconds."""
+@document("junit", ".xml", staff_view)
+def junit_text(view: View) -> str:
+    """The grade as a ``testsuites`` document with one suite; times are simulated seconds."""
+    grade = view.grade
     unmarked = grade.verdict in _NOT_MARKED
     missed = sum(result.marks < result.max_marks for result in grade.criteria)
     root = ElementTree.Element("testsuites")

@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from service.commands.batch_control import BatchId, cancel, pause, resume, retry
-from service.commands.batch_export import export
-from service.commands.batch_regrade import publish, regrade
-from service.commands.batch_tables import changes_table, history_table, marks_table, summary, unjudged_words
-from service.commands.batch_waiting import marks_awaited
+from service.commands.batch.awaited import marks_awaited
+from service.commands.batch.control import BatchId, cancel, pause, resume, retry
+from service.commands.batch.export import export
+from service.commands.batch.regrade import publish, regrade
+from service.commands.batch.tables import changes_table, history_table, marks_table, summary, unjudged_words
 from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging

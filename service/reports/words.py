@@ -1,4 +1,4 @@
-"""Each verdict in a student's words: what happened, whose fault it was, what to try next.
+"""What is said of a grade in sentences: each verdict in a student's words, its accuracy, what its trials cost.
 
 It knows no marks and no particular trial; the faults of a recording say where and when.
 """
@@ -14,6 +14,7 @@ from service.grading.grade import Grade
 from sim.recording import Verdict
 
 Tone = Literal["good", "notice", "bad"]
+_MEGABYTE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,3 +137,31 @@ _NO_ROBOT = VerdictWords(
 def grade_words(grade: Grade) -> VerdictWords:
     """The words for a grade's verdict, or that there was nothing to run."""
     return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+
+
+def accuracy_words(grade: Grade) -> str:
+    """One sentence with value, interval and n; empty without a classification."""
+    accuracy = grade.accuracy
+    if accuracy is None:
+        return ""
+    return (
+        f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
+        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
+    )
+
+
+def cost_words(grade: Grade) -> str:
+    """One sentence with what all trials cost together, or may cost where that is not told; empty if nobody knows."""
+    if grade.cost is None:
+        return ""
+    limits, spent = grade.cost.limits, grade.cost.spent
+    if spent is None:
+        return (
+            f"All trials together may use {limits.cpu_seconds:g} s of CPU, {limits.sleep_seconds:g} s of sleep and "
+            f"{limits.kept_bytes >> 20} MB of output."
+        )
+    return (
+        f"Used {round(spent.cpu_seconds, 1):g} of {limits.cpu_seconds:g} s of CPU, "
+        f"{round(spent.sleep_seconds, 1):g} of {limits.sleep_seconds:g} s of sleep, "
+        f"{round(spent.kept_bytes / _MEGABYTE, 1):g} of {limits.kept_bytes >> 20} MB of output."
+    )

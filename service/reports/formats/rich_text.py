@@ -13,15 +13,18 @@ from rich.text import Text
 
 from service.grading.grade import Grade
 from service.reports.faults import FaultGroup, fault_groups
+from service.reports.formats.registry import on_terminal
 from service.reports.readable import number, one_line, readable
-from service.reports.text import accuracy_words, cost_words
-from service.reports.verdict_words import grade_words
+from service.reports.view import View, staff_view
+from service.reports.words import accuracy_words, cost_words, grade_words
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 
 
-def rich_report(grade: Grade) -> RenderableType:
-    """``grade`` as one renderable; print it with ``rich.console.Console().print``."""
+@on_terminal("text", staff_view)
+def rich_report(view: View) -> RenderableType:
+    """The grade as one renderable; print it with ``rich.console.Console().print``."""
+    grade = view.grade
     words = grade_words(grade)
     heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
     verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.next_step}")

@@ -1,11 +1,12 @@
-"""Who may see what of a grade: the part that a student is shown, and the trial that is worth a closer look.
+"""What a reader may see of a grade, decided once: staff, a student, or a gradebook that students look into.
 
-It hides, it never re-marks: what is left keeps the marks and messages it had.
+It hides, it never re-marks: what is left keeps the marks and messages it had. Nothing is rendered here, and what
+renders a view asks no more who reads it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
@@ -16,7 +17,32 @@ from sim.recording import Verdict
 BEFORE_PUBLICATION = frozenset({"visible"})
 
 
-def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> Grade:
+@dataclass(frozen=True, slots=True)
+class View:
+    """A grade as one reader may see it: ``grade`` is what is left of it, ``withheld`` says that it is not all."""
+
+    grade: Grade
+    staff: bool
+    withheld: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GradebookView:
+    """A grade for a gradebook: ``entry`` has every criterion, told as to whoever may see it, and no trials.
+
+    ``shown`` is what the student sees at once.
+    """
+
+    entry: Grade
+    shown: Grade
+
+
+def staff_view(grade: Grade) -> View:
+    """All of it."""
+    return View(grade, staff=True, withheld=False)
+
+
+def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> View:
     """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
 
     Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
@@ -25,7 +51,7 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     """
     kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
     new_index = {old: new for new, old in enumerate(kept)}
-    return replace(
+    left = replace(
         grade,
         criteria=tuple(
             replace(_without_hidden_trials(result, new_index), for_staff="", unjudged="")
@@ -34,6 +60,28 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
         ),
         trials=tuple(grade.trials[index] for index in kept),
         cost=grade.cost and replace(grade.cost, spent=None),
+    )
+    withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
+    return View(left, staff=False, withheld=withheld)
+
+
+def gradebook_view(grade: Grade) -> GradebookView:
+    """All marks with their visibilities, which the gradebook heeds by itself."""
+    told = tuple(_told(grade, result) for result in grade.criteria)
+    return GradebookView(replace(grade, criteria=told, trials=()), student_view(grade).grade)
+
+
+def is_for_staff(visibility: str) -> bool:
+    """Whether what has this visibility is kept from students before publication."""
+    return visibility not in BEFORE_PUBLICATION
+
+
+def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
+    """Whether a criterion is hidden itself, or shows what was seen in hidden trials."""
+    return is_for_staff(result.visibility) or any(
+        is_for_staff(grade.trials[prediction.trial].visibility)
+        for prediction in result.predictions
+        if 0 <= prediction.trial < len(grade.trials)
     )
 
 
@@ -55,6 +103,12 @@ def worst_trial(grade: Grade, scenario: str) -> int:
 def scenarios(grade: Grade) -> tuple[str, ...]:
     """The scenarios of the grade's trials, in the order they were run."""
     return tuple(dict.fromkeys(trial.scenario for trial in grade.trials))
+
+
+def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
+    """The criterion with what is told to whoever sees it."""
+    view = student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
+    return replace(view.grade.criteria[0], evidence=(), predictions=())
 
 
 def _severity(trial: TrialResult) -> int:

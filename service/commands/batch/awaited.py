@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from rich.console import Console
 
 from responders.sandbox.manager import Sandboxes
-from service.commands.waiting import Waiting
+from service.commands.batch.waiting import Waiting
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier

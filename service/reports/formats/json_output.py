@@ -1,23 +1,27 @@
-"""A grade as the JSON that ``robomark grade --format json`` prints.
+"""A grade, or the grades of a batch, as JSON.
 
-It shows all of the grade it is given; pass it a student's view where a student reads it.
+Whoever reads it, it shows all of the view it is given.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
-from decimal import Decimal
 from typing import Any
 
-from service.grading.grade import Accuracy, Grade
+from service.grading.grade import Accuracy
+from service.reports.formats.registry import document, table
+from service.reports.readable import json_number
 from service.reports.trace import storable
+from service.reports.view import View, staff_view
 
 SCHEMA = 1
 
 
-def json_document(grade: Grade) -> dict[str, Any]:
-    """``grade`` as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification."""
+def json_document(view: View) -> dict[str, Any]:
+    """The grade as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification."""
+    grade = view.grade
     return {
         "schema": SCHEMA,
         "assignment": grade.assignment,
@@ -54,14 +58,16 @@ def json_document(grade: Grade) -> dict[str, Any]:
     }
 
 
-def json_text(grade: Grade) -> str:
+@document("json", ".json", staff_view)
+def json_text(view: View) -> str:
     """The document as indented ASCII JSON."""
-    return json.dumps(json_document(grade), indent=2, allow_nan=False)
+    return json.dumps(json_document(view), indent=2, allow_nan=False) + "\n"
 
 
-def json_number(value: Decimal) -> int | float:
-    """A Decimal as JSON writes it: whole numbers without a point."""
-    return int(value) if value == value.to_integral_value() else float(value)
+@table("json", ".json", staff_view)
+def json_list(views: Sequence[View]) -> str:
+    """The documents of a batch, each with its student."""
+    return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

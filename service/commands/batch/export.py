@@ -5,25 +5,19 @@ What a document says is ``service.reports``'.
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated
 
 import typer
 
-from service.commands.batch_control import BatchId
-from service.commands.batch_tables import unjudged_words
+from service.commands.batch.control import BatchId
+from service.commands.batch.tables import unjudged_words
+from service.commands.format_option import format_option
 from service.grading.grade import Grade
 from service.home import for_the_user
-from service.reports.csv_output import marks_csv, moodle_csv
-from service.reports.gradescope import gradescope_text
-from service.reports.json_output import json_document
-from service.reports.junit import junit_text
+from service.reports.formats import FORMATS
 from service.reports.written import file_stems
 from service.settings import load_settings
 from service.store import batches, grades, regrades
@@ -33,39 +27,21 @@ from service.store.models import JobState
 from sim.errors import UsageError
 
 
-class ExportFormat(StrEnum):
-    """What ``batch export`` writes."""
-
-    CSV = "csv"
-    MOODLE = "moodle"
-    GRADESCOPE = "gradescope"
-    JUNIT = "junit"
-    JSON = "json"
-
-
-@dataclass(frozen=True, slots=True)
-class _ForEach:
-    """A format with a document of its own for each submission."""
-
-    suffix: str
-    text: Callable[[Grade], str]
-
-
 def export(
     batch: BatchId,
-    form: Annotated[ExportFormat, typer.Option("--format", help="What to write.")] = ExportFormat.CSV,
+    form: Annotated[str, format_option("What to write.", FORMATS)] = "csv",
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", "--output", help="A file instead of the screen; for gradescope and junit, a folder."
+            "-o", "--out", "--output", help="A file instead of the screen; a folder where each submission has a file."
         ),
     ] = None,
     published: Annotated[bool, typer.Option("--published", help="Only the grades that are published.")] = False,
 ) -> None:
     """The marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON."""
-    each = _FOR_EACH.get(form)
-    if each is not None and output is None:
-        raise UsageError(f"{form.value} is a file for each submission; name a folder with --out")
+    chosen = FORMATS[form]
+    if chosen.table is None and output is None:
+        raise UsageError(f"{form} is a file for each submission; name a folder with --out")
     with open_store(load_settings()) as store:
         with store.reading() as session:
             batch_id = batches.find_batch(session, batch)
@@ -76,10 +52,11 @@ def export(
             print(f"robomark: {waiting} regrades are not published: these are the grades that stand", file=sys.stderr)
         if unjudged := unjudged_words(graded):
             print(f"robomark: {unjudged}", file=sys.stderr)
-        if each is not None and output is not None:
-            _write_each(store, graded, each, output)
+        if chosen.table is None:
+            if chosen.document is not None and output is not None:
+                _write_each(store, graded, chosen.document, chosen.suffix, output)
             return
-        text = _WHOLE[form]([grade for _, grade in _grades(store, graded)])
+        text = chosen.table([grade for _, grade in _grades(store, graded)])
     if output is None:
         sys.stdout.write(text)
     else:
@@ -96,7 +73,9 @@ def _exported(lines: Sequence[JobLine], *, published: bool) -> list[JobLine]:
     return [line for line in shown if line.published_at is not None] if published else shown
 
 
-def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: Path) -> None:
+def _write_each(
+    store: Store, lines: Sequence[JobLine], document: Callable[[Grade], str], suffix: str, folder: Path
+) -> None:
     """A file a submission, named after its student, and after its assignment where one student has several."""
     try:
         with for_the_user():
@@ -105,7 +84,7 @@ def _write_each(store: Store, lines: Sequence[JobLine], each: _ForEach, folder: 
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
     stems = file_stems([(line.student, line.assignment) for line in lines])
     for stem, (_, grade) in zip(stems, _grades(store, lines), strict=True):
-        _write(folder / f"{stem}{each.suffix}", each.text(grade))
+        _write(folder / f"{stem}{suffix}", document(grade))
     print(f"{len(stems)} files in {folder}")
 
 
@@ -121,18 +100,3 @@ def _grades(store: Store, lines: Iterable[JobLine]) -> Iterator[tuple[JobLine, G
     for line in lines:
         with store.reading() as session:
             yield line, grades.load(session, line.id)
-
-
-def _json(found: Sequence[Grade]) -> str:
-    return json.dumps([{"student": grade.student, **json_document(grade)} for grade in found], indent=2) + "\n"
-
-
-_WHOLE: Mapping[ExportFormat, Callable[[Sequence[Grade]], str]] = MappingProxyType(
-    {ExportFormat.CSV: marks_csv, ExportFormat.MOODLE: moodle_csv, ExportFormat.JSON: _json}
-)
-_FOR_EACH: Mapping[ExportFormat, _ForEach] = MappingProxyType(
-    {
-        ExportFormat.GRADESCOPE: _ForEach(".json", gradescope_text),
-        ExportFormat.JUNIT: _ForEach(".xml", junit_text),
-    }
-)

@@ -10,9 +10,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from service.commands.batch_control import BatchId
-from service.commands.batch_tables import changes_table
-from service.commands.batch_waiting import marks_awaited
+from service.commands.batch.awaited import marks_awaited
+from service.commands.batch.control import BatchId
+from service.commands.batch.tables import changes_table
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
