@@ -21,7 +21,7 @@ from service.reports.formats.gradescope import gradescope_text
 from service.reports.formats.json_output import json_text
 from service.reports.formats.text import plain_text
 from service.reports.html import report
-from service.reports.plots import draw_all
+from service.reports.plots.drawn import draw_all
 from service.reports.view import gradebook_view, student_view
 from sim.recording import Pose
 from submissions.assignment import Assignment, Limits, Parts, Scenario, Training, WorldSpec

@@ -13,11 +13,11 @@ from PIL import Image as Pixels
 
 import report_builders as build
 from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, TrialResult
-from service.reports.confusion_plot import draw_confusion
 from service.reports.html import report
-from service.reports.misread_plot import draw_misread, misread
-from service.reports.plots import draw_all, plots_of
-from service.reports.track_plot import along_the_way, draw_track, taken, tracks, worst_track
+from service.reports.plots.confusion import draw_confusion
+from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.plots.misread import draw_misread, misread
+from service.reports.plots.track import along_the_way, draw_track, taken, tracks, worst_track
 from service.reports.view import student_view
 from sim.floors import floor
 from sim.recording import Image, Pose

@@ -13,7 +13,7 @@ import report_builders as build
 from service.grading.grade import Grade
 from service.reports.html import BatchRow, batch_index, report
 from service.reports.page import page_of, timeline
-from service.reports.plots import draw_all, plots_of
+from service.reports.plots.drawn import draw_all, plots_of
 from service.reports.view import staff_view, student_view
 from sim.recording import Fault, Verdict
 

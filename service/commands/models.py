@@ -133,7 +133,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def _write(result: Evaluation, folder: Path) -> None:
-    from service.reports.model_plots import evaluation_plots
+    from service.reports.plots.models import evaluation_plots
 
     numbers = json.dumps({"name": result.card.name} | asdict(result.measured), indent=1) + "\n"
     files = {f"{result.card.name}.json": numbers.encode()} | evaluation_plots(result)

@@ -20,8 +20,8 @@ from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
-from service.reports.path_plot import draw_path
-from service.reports.plot_style import png
+from service.reports.plots.path import draw_path
+from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
 from sim.errors import UsageError

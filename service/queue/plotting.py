@@ -15,7 +15,7 @@ PREFIX = "plot-"
 def draw(grade: Grade, assignment: Assignment) -> list[File]:
     """Every plot of the grade, named ``plot-<name>.png``; floors of the assignment's own are drawn as such."""
     # A worker that only grades need not load the drawing library.
-    from service.reports.plots import draw_all
+    from service.reports.plots.drawn import draw_all
     from sim.floors import floor_from_image
 
     world = assignment.world

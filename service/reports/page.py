@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
 from service.reports.faults import FaultGroup, fault_groups
-from service.reports.plots import Plot, plots_of
+from service.reports.plots.drawn import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial

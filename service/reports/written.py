@@ -13,7 +13,7 @@ from pathlib import Path
 from service.grading.grade import Grade
 from service.home import for_the_user
 from service.reports.html import report
-from service.reports.plots import draw_all
+from service.reports.plots.drawn import draw_all
 from service.reports.view import student_view
 from sim.errors import UsageError
 from submissions.submission import Submission

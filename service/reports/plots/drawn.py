@@ -14,16 +14,16 @@ from typing import Literal
 from matplotlib.figure import Figure
 
 from service.grading.grade import AccuracyCurve, CriterionResult, Grade
-from service.reports.confusion_plot import draw_confusion
-from service.reports.conversation_plot import draw_conversation
-from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves
-from service.reports.misread_plot import draw_misread, misread
-from service.reports.path_plot import Pixels, draw_path
-from service.reports.plot_style import png
-from service.reports.predictions_plot import chosen_predictions, draw_predictions, is_right
+from service.reports.plots.confusion import draw_confusion
+from service.reports.plots.conversation import draw_conversation
+from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.misread import draw_misread, misread
+from service.reports.plots.path import Pixels, draw_path
+from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
+from service.reports.plots.sensor import draw_sensors
+from service.reports.plots.style import png
+from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
-from service.reports.sensor_plot import draw_sensors
-from service.reports.track_plot import draw_track, tracks, worst_track
 from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.errors import UsageError
 from sim.floors import floor as floor_of

@@ -1,6 +1,6 @@
 """The conversation of a trial as steps between parties, the way a sequence diagram tells it.
 
-It decides what is told and what is left out; ``conversation_plot.py`` draws it.
+It decides what is told and what is left out; ``conversation.py`` draws it.
 """
 
 from __future__ import annotations

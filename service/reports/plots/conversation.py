@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from service.grading.grade import TrialResult
-from service.reports.plot_style import (
+from service.reports.plots.sequence import Gap, SequenceDiagram, Step, conversation
+from service.reports.plots.style import (
     FAINT,
     FAULT,
     HEAD,
@@ -28,7 +29,6 @@ from service.reports.plot_style import (
     font,
     new_figure,
 )  # fmt: skip
-from service.reports.sequence import Gap, SequenceDiagram, Step, conversation
 
 _TIMES = 0.44  # inches for the times at the left
 _FIRST = 0.28  # from there to the robot's lane

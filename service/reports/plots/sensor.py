@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
-from service.reports.plot_style import (
+from service.reports.plots.style import (
     FAINT,
     FAULT,
     HEAD,

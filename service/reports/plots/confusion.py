@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from service.grading.grade import Accuracy, CriterionResult
-from service.reports.plot_style import FAINT, HEAD, INK, RULE, WIDTH, axes_at, drawable, font, new_figure, write
+from service.reports.plots.style import FAINT, HEAD, INK, RULE, WIDTH, axes_at, drawable, font, new_figure, write
 from service.reports.readable import one_line
 
 NO_ANSWER = "no answer"

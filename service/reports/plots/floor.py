@@ -1,6 +1,6 @@
 """Draws a floor by itself: the image with a scale in mm, where the robot starts, obstacles and what has a label.
 
-The floors' images are ``sim/floors``'; a robot's path over one is drawn in ``path_plot.py``.
+The floors' images are ``sim/floors``'; a robot's path over one is drawn in ``path.py``.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from service.reports.plot_style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
+from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
 from sim.floors import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
-from service.reports.plot_style import (
+from service.reports.plots.style import (
     FAINT,
     FAULT,
     HEAD,

@@ -16,9 +16,10 @@ from models.cards import Curve as Counted
 from models.cards import Tally
 from models.evaluation import Answered, Evaluation
 from models.preprocessing import Grey
-from service.reports import curve_plot
-from service.reports.confusion_plot import ConfusionTable, draw_table
-from service.reports.plot_style import (
+from service.reports.plots.confusion import ConfusionTable, draw_table
+from service.reports.plots.curve import AccuracyPanel, draw_curves
+from service.reports.plots.curve import Curve as DrawnCurve
+from service.reports.plots.style import (
     FAINT,
     FAULT,
     HEAD,
@@ -67,9 +68,9 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
     panels: dict[str, list[Counted]] = {}
     for curve in evaluation.measured.curves:
         panels.setdefault(curve.varied, []).append(curve)
-    return curve_plot.draw_curves(
+    return draw_curves(
         [
-            curve_plot.AccuracyPanel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
+            AccuracyPanel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
             for varied, curves in panels.items()
         ],
         f"{evaluation.card.name}: how robust it is",
@@ -77,10 +78,10 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
     )
 
 
-def _curve(counted: Counted) -> curve_plot.Curve:
+def _curve(counted: Counted) -> DrawnCurve:
     intervals = [tally.interval for tally in counted.tallies]
     counts = {tally.n for tally in counted.tallies}
-    return curve_plot.Curve(
+    return DrawnCurve(
         label=f"{counted.under}, n = {counts.pop()}" if len(counts) == 1 else counted.under,
         x=counted.values,
         share=tuple(tally.share for tally in counted.tallies),

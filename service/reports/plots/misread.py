@@ -16,8 +16,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from service.grading.grade import Prediction
-from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
-from service.reports.predictions_plot import focus_image, is_right
+from service.reports.plots.predictions import focus_image, is_right
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
 
 MOST_MISREAD = 6

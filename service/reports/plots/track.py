@@ -17,9 +17,10 @@ from matplotlib.figure import Figure
 from models.intervals import wilson
 from service.grading.grade import Prediction, TrialResult
 from service.grading.judging.places import part_at
-from service.reports.curve_plot import Curve, draw_curve
-from service.reports.path_plot import Pixels, View, draw_floor
-from service.reports.plot_style import (
+from service.reports.plots.curve import Curve, draw_curve
+from service.reports.plots.path import Pixels, View, draw_floor
+from service.reports.plots.predictions import is_right
+from service.reports.plots.style import (
     FAINT,
     FAULT,
     HEAD,
@@ -34,7 +35,6 @@ from service.reports.plot_style import (
     set_tick_type,
     write,
 )
-from service.reports.predictions_plot import is_right
 from sim.recording import Recording
 
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.56

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image as Pixels
 
 from service.grading.grade import Prediction
-from service.reports.plot_style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
 from sim.recording import Image
 
