@@ -11,8 +11,8 @@ from responders.conversation import Code, ResponderSpec
 from responders.sandbox.running_child import ChildLimits
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
-from sim.backgrounds import floor
 from sim.camera import BulletCamera, CachedCamera, LightCamera
+from sim.floors import floor
 from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World

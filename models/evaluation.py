@@ -12,13 +12,11 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from models import digits, networks, shapes
+from models import networks
 from models.cards import Card, Curve, Measured, Tally, card, weights_bytes
 from models.images import LabelledPose, Photographer, Shift
 from models.preprocessing import Grey, features
-from models.tasks import Task
-
-TASKS = {task.name: task for task in (digits.DIGITS, digits.DIGITS_28, shapes.TASK)}
+from models.tasks import Task, tasks
 
 Axis = Literal["x", "y", "heading", "noise"]
 
@@ -61,7 +59,7 @@ class Evaluation:
 def evaluate(name: str) -> Evaluation:
     """Run the packaged classifier over its whole test. Raises UsageError for an unknown name."""
     about = card(name)
-    measured, answered = measure(TASKS[name], networks.read(weights_bytes(name)))
+    measured, answered = measure(tasks()[name], networks.read(weights_bytes(name)))
     return Evaluation(about, measured, answered)
 
 

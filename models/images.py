@@ -11,9 +11,9 @@ from types import TracebackType
 
 from models.preprocessing import Grey, focus
 from sim.arena import Arena
-from sim.backgrounds import Floor, floor
 from sim.camera import Cameras
 from sim.chance import Stream
+from sim.floors import Floor, floor
 from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World

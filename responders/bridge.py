@@ -17,10 +17,10 @@ from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.arena import Arena
-from sim.backgrounds import Floor
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
+from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Verdict
 from sim.robot import Robot

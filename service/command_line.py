@@ -31,7 +31,7 @@ _COMMANDS: Mapping[str, str] = MappingProxyType(
     {
         "run": "run:run",
         "grade": "grade:grade",
-        "batch": "batch:batch_app",
+        "batch": "batch.app:batch_app",
         "assignments": "assignments:assignments_app",
         "models": "models:models_app",
         "floors": "floors:floors",

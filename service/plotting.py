@@ -12,8 +12,8 @@ from submissions.assignment import Assignment
 def draw(grade: Grade, assignment: Assignment) -> dict[str, bytes]:
     """Every plot of the grade, name -> PNG; floors of the assignment's own are drawn as such."""
     # A worker that only grades need not load the drawing library.
-    from service.reports.plots import draw_all
-    from sim.backgrounds import floor_from_image
+    from service.reports.plots.drawn import draw_all
+    from sim.floors import floor_from_image
 
     world = assignment.world
     images = {}

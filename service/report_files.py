@@ -11,7 +11,8 @@ from pathlib import Path
 
 from service.grading.grade import Grade
 from service.plotting import draw
-from service.reports.html import BatchRow, batch_index, staff_report, student_report
+from service.reports.html import BatchRow, batch_index, report
+from service.reports.view import staff_view, student_view
 from service.reports.written import file_stems, write_page
 from service.store import intake, plots, policies, results
 from service.store.batches import JobLine
@@ -40,11 +41,8 @@ def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: 
     if assignment is not None:
         drawn = draw(grade, assignment)
     found = drawn or {}
-    if line.staff_only is None:
-        page = student_report(grade, found, submission, released)
-    else:
-        page = staff_report(grade, found, submission)
-    return Written(write_page(folder, f"{stem}.html", page), found)
+    view = student_view(grade, released) if line.staff_only is None else staff_view(grade)
+    return Written(write_page(folder, f"{stem}.html", report(view, found, submission)), found)
 
 
 def write_reports(store: Store, lines: Sequence[JobLine], folder: Path) -> list[Path]:

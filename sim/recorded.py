@@ -5,7 +5,7 @@ Whatever is drawn or judged of it is the service's.
 
 from __future__ import annotations
 
-from sim.backgrounds import Floor, floor, names
+from sim.floors import Floor, floor, names
 from sim.recording import Pose, Recording
 from sim.robot import ROBOTS, Robot
 

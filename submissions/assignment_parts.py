@@ -13,8 +13,8 @@ from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
-from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, label_names, names
 from sim.errors import UsageError
+from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
 from sim.recording import Pose
 from sim.robot import usual_robot
 from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, Training, WorldSpec
@@ -137,8 +137,9 @@ def _ground(table: WorldTable, files: Files, problems: Problems) -> Floor | None
 
 def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -> WorldSpec:
     name = table.background
-    if "sheet" in table.model_fields_set and name not in SEEDED:
-        problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {listed(SEEDED)}")
+    if "sheet" in table.model_fields_set and name not in seeded_names():
+        seeded = listed(seeded_names())
+        problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {seeded}")
     obstacles = table.obstacles if "obstacles" in table.model_fields_set else ground.obstacles
     for number, (x, y, width, height) in enumerate(obstacles):
         if width <= 0 or height <= 0 or not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):

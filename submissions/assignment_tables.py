@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from sim.backgrounds import OBSTACLE_PRESETS
+from sim.floors import OBSTACLE_PRESETS
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.strict_table import Shape, StrictTable

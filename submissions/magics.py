@@ -11,8 +11,8 @@ import shlex
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from sim.backgrounds import OBSTACLE_PRESETS, names, start_of
 from sim.errors import UsageError
+from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
 from sim.robot import ROBOTS, WIDE_EYES, usual_robot
 

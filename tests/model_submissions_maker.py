@@ -22,8 +22,8 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 
 from models import weights_bytes
+from models.families.shapes import TASK
 from models.networks import read
-from models.shapes import TASK
 
 FOLDER = Path(__file__).parent / "model_submissions"
 #: What the hostile pickle would make, if it could.

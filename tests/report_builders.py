@@ -26,7 +26,7 @@ from service.grading.grade import (
     Shown,
     TrialResult,
 )
-from sim.backgrounds import floor
+from sim.floors import floor
 from sim.recording import (
     Call,
     Datum,

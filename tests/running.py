@@ -10,7 +10,7 @@ from responders.conversation import Code, ResponderSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.trial_runner import TrialRunner
-from sim.backgrounds import floor
+from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
 from sim.recording import Pose, Recording
 from sim.robot import robot

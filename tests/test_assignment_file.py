@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.backgrounds import HEIGHT, WIDTH
 from sim.errors import AssignmentError, UsageError
+from sim.floors import HEIGHT, WIDTH
 from sim.recording import Pose
 from submissions.assignment_file import (
     AssignmentProblems,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.backgrounds import floor
 from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, sensor_mask
+from sim.floors import floor
 
 MARGIN = 400
 

@@ -20,8 +20,8 @@ from service.grading.judging.outcome import Outcome
 from service.grading.judging.source_answers import SourceAnswers
 from service.grading.static_analysis import SubmittedParts, analyse
 from service.grading.trial_runner import TrialRunner
-from service.reports.audience import student_view
-from service.reports.text import plain_text
+from service.reports.formats.text import plain_text
+from service.reports.view import staff_view, student_view
 from sim.recording import Verdict
 from submissions.assignment import Assignment, Limits, Parts, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
@@ -455,7 +455,7 @@ def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     assert asked.unjudged
     assert ended.marks == 2
     assert not ended.unjudged
-    told = plain_text(result)
+    told = plain_text(staff_view(result))
     assert "For staff: Could not be judged: " in told
     shown = plain_text(student_view(result))
     assert "This could not be judged; staff will look at it." in shown

@@ -10,6 +10,7 @@ import pytest
 
 from command import robomark
 from service.cli import main
+from service.reports.formats import FORMATS
 from submissions.assignment_file import assignment_folder
 
 
@@ -21,7 +22,10 @@ from submissions.assignment_file import assignment_folder
         ("run x.py -Q", "no such option: -Q"),
         ("run x.py -x", "requires an argument"),
         ("run x.py --seconds nan", "invalid value for '--seconds'"),
-        ("grade x --format foo", "'foo' is not one of 'text', 'json', 'gradescope', 'junit'"),
+        (
+            "grade x --format foo",
+            f"'foo' is not one of {', '.join(repr(name) for name, form in FORMATS.items() if form.document)}",
+        ),
         ("grade nothing-there -a echo-responder", "nothing-there: does not exist"),
         ("run x.py --picture out.gif", "--picture out.gif: expected a name that ends in .png"),
         ("grade x -a /usr", "/usr: has no assignment.toml in it"),

@@ -12,9 +12,9 @@ from notebook_builder import notebook
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots import draw_all
+from service.reports.plots.drawn import draw_all
 from service.store.recordings import from_bytes, to_bytes
-from sim.backgrounds import floor, label_names
+from sim.floors import floor, label_names
 from sim.recording import SENSOR_SIDE, Image
 from submissions.assignment import Assignment
 from submissions.assignment_file import AssignmentProblems, read_assignment

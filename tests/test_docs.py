@@ -16,8 +16,9 @@ import pytest
 from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
+from service.reports.formats import FORMATS
 from service.settings import Settings
-from sim.backgrounds import OBSTACLE_PRESETS
+from sim.floors import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
 from submissions.assignment_file import find_assignment
 from submissions.assignment_tables import (
@@ -111,6 +112,11 @@ def test_every_kind_of_criterion_has_a_section_and_every_group_is_linked_for_ins
     linked = set(re.findall(r"\(criteria\.md#([\w-]+)\)", (ROOT / "docs" / "instructors.md").read_text()))
     assert anchors
     assert anchors <= linked <= anchors | SCHEMAS.keys()
+
+
+def test_every_output_format_is_named_for_instructors() -> None:
+    told = (ROOT / "docs" / "instructors.md").read_text()
+    assert [name for name in FORMATS if f"`{name}`" not in told] == []
 
 
 @pytest.mark.parametrize("kind", sorted(SCHEMAS))

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from command import robomark
-from sim.backgrounds import names
+from sim.floors import names
 
 
 def test_the_page_shows_every_floor_by_name_and_loads_nothing(tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ from responders.sandbox import running_child
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.arena import Arena
-from sim.backgrounds import floor
 from sim.camera import Cameras
+from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise

@@ -16,13 +16,13 @@ import pytest
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.audience import student_view
-from service.reports.csv_output import moodle_csv
-from service.reports.gradescope import gradescope_text
-from service.reports.html import student_report
-from service.reports.json_output import json_text
-from service.reports.plots import draw_all
-from service.reports.text import plain_text
+from service.reports.formats.csv_output import moodle_csv
+from service.reports.formats.gradescope import gradescope_text
+from service.reports.formats.json_output import json_text
+from service.reports.formats.text import plain_text
+from service.reports.html import report
+from service.reports.plots.drawn import draw_all
+from service.reports.view import gradebook_view, student_view
 from sim.recording import Pose
 from submissions.assignment import Assignment, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment_file import find_assignment
@@ -68,11 +68,11 @@ def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) 
     """Everything that is made of a grade for a student to read."""
     view = student_view(graded)
     return {
-        "report": student_report(graded, plots, submission),
+        "report": report(student_view(graded), plots, submission),
         "json": json_text(view),
         "text": plain_text(view),
-        "gradescope": gradescope_text(graded),
-        "moodle": moodle_csv([graded]),
+        "gradescope": gradescope_text(gradebook_view(graded)),
+        "moodle": moodle_csv([gradebook_view(graded)]),
         "view": repr(view),
     }
 

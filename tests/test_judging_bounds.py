@@ -24,7 +24,7 @@ from service.grading.judging.bounded import Bounds, bounds_for, judge_within
 from service.grading.judging.case import StaticAnalysis
 from service.grading.judging.judge import judge, judge_one
 from service.grading.trial_runner import TrialRunner
-from service.reports.sequence import MOST_CALL_STEPS, Gap, conversation
+from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, conversation
 from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Line, Message, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec

@@ -15,7 +15,7 @@ from driving import along, criterion, driven, judged, measured, passes, rest, sp
 from service.grading.judging.geometry import along as along_line
 from service.grading.judging.geometry import covered, distance_to, positions
 from service.grading.judging.point import rounds
-from sim.backgrounds.centrelines import centrelines
+from sim.floors.centrelines import centrelines
 from sim.recording import Pose, Touch
 from submissions.criteria.places import Area, LineToFollow
 

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import judge
 from service.grading.judging.words import tokens_of, words_of
-from sim.backgrounds import floor
+from sim.floors import floor
 from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion

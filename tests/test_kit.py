@@ -18,7 +18,7 @@ from PIL import Image
 from sklearn.neural_network import MLPClassifier
 
 from models import weights_bytes
-from sim import backgrounds
+from sim import floors
 
 KIT = Path(__file__).parent.parent / "responders" / "kit"
 KIT_MODULES = ("nbev3devsim.load_nbev3devwidget", "nn_tools.sensor_data", "nn_tools.network_views")
@@ -52,7 +52,7 @@ def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
 
 def raw(column: int, row: int) -> str:
     """The numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
-    window = backgrounds.floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
+    window = floors.floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
     rows, columns = np.mgrid[0:20, 0:20]
     seen = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
     rgb = np.where(seen[:, :, None], window, np.array([245, 226, 225]))
@@ -95,7 +95,7 @@ def test_a_pair_is_the_shape_and_its_label(kit: Kit, code: int) -> None:
     assert dark.sum() == black
     assert tuple(np.flatnonzero(dark.any(axis=1))[[0, -1]]) == rows
     assert tuple(np.flatnonzero(dark.any(axis=0))[[0, -1]]) == columns
-    assert np.unique(grey(right)).tolist() == [backgrounds.LABEL_GREYS[code]]
+    assert np.unique(grey(right)).tolist() == [floors.LABEL_GREYS[code]]
 
 
 def test_which_pair(kit: Kit) -> None:

@@ -11,13 +11,14 @@ from matplotlib.figure import Figure
 from PIL import Image
 from typer.testing import CliRunner
 
-from models import card, shapes
+from models import card
 from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
+from models.families import shapes
 from models.images import Photographer, Shift
 from service.commands.models import models_app
-from service.reports.curve_plot import AccuracyPanel, Curve, draw_curves
-from service.reports.model_plots import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
 
 
 @pytest.fixture(scope="module")

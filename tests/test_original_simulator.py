@@ -11,8 +11,8 @@ import pytest
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
-from sim.backgrounds import floor
 from sim.camera import CachedCamera
+from sim.floors import floor
 from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World

@@ -17,7 +17,7 @@ from sqlalchemy import func, select
 from builders import comparable, grading_request, settings_in
 from databases import fresh_database
 from processes import children, command_line, descendants, until
-from service.commands.waiting import Waiting
+from service.commands.batch.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.preflight import preflight

@@ -19,9 +19,9 @@ from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.per_class import class_scores
 from service.grading.judging.truths import NO_IMAGE
-from service.reports.audience import student_view
 from service.reports.recognition_table import recognition_tables
-from sim.backgrounds import SHAPES
+from service.reports.view import student_view
+from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment_file import AssignmentProblems, read_assignment
@@ -386,6 +386,6 @@ def test_the_levels_of_a_hidden_sweep_are_not_told() -> None:
 
 def test_a_student_sees_no_curve_of_hidden_trials() -> None:
     grade = build.swept_grade()
-    assert student_view(grade).criteria[0].curves
+    assert student_view(grade).grade.criteria[0].curves
     hidden = replace(grade, trials=(*grade.trials[:-1], replace(grade.trials[-1], visibility="hidden")))
-    assert not student_view(hidden).criteria[0].curves
+    assert not student_view(hidden).grade.criteria[0].curves

@@ -13,12 +13,13 @@ from PIL import Image as Pixels
 
 import report_builders as build
 from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, TrialResult
-from service.reports.confusion_plot import draw_confusion
-from service.reports.html import student_report
-from service.reports.misread_plot import draw_misread, misread
-from service.reports.plots import draw_all, plots_of
-from service.reports.track_plot import along_the_way, draw_track, taken, tracks, worst_track
-from sim.backgrounds import floor
+from service.reports.html import report
+from service.reports.plots.confusion import draw_confusion
+from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.plots.misread import draw_misread, misread
+from service.reports.plots.track import along_the_way, draw_track, taken, tracks, worst_track
+from service.reports.view import student_view
+from sim.floors import floor
 from sim.recording import Image, Pose
 
 
@@ -105,7 +106,7 @@ def test_standing_still_is_no_track() -> None:
 @pytest.mark.parametrize("make", [build.swept_grade, build.hostile_grade])
 def test_the_page_has_the_figures(make: object) -> None:
     grade = make()  # type: ignore[operator]
-    page = student_report(grade, {})
+    page = report(student_view(grade), {})
     assert "Class by class" in page
     if make is build.swept_grade:
         assert "Images sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page

@@ -11,7 +11,7 @@ from models import weights_bytes
 from responders import library
 from running import run_program
 from service.grading.trial_runner import TrialRunner
-from sim.backgrounds import SHAPES
+from sim.floors import SHAPES
 from sim.recording import Pose, Recording, Verdict
 from sim.world import Noise
 

@@ -11,9 +11,10 @@ import pytest
 
 import report_builders as build
 from service.grading.grade import Grade
-from service.reports.html import BatchRow, batch_index, staff_report, student_report
+from service.reports.html import BatchRow, batch_index, report
 from service.reports.page import page_of, timeline
-from service.reports.plots import draw_all, plots_of
+from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.view import staff_view, student_view
 from sim.recording import Fault, Verdict
 
 #: All that the templates write; anything else came from somewhere it should not.
@@ -69,7 +70,7 @@ class Reader(HTMLParser):
 
 @pytest.fixture(scope="module")
 def hostile() -> tuple[str, Reader]:
-    page = student_report(build.hostile_grade(), {}, build.faulty_submission())
+    page = report(student_view(build.hostile_grade()), {}, build.faulty_submission())
     return page, Reader(page)
 
 
@@ -93,14 +94,14 @@ def test_source_with_hostile_lines_is_escaped() -> None:
     grade, submission = build.faulty_grade(), build.faulty_submission()
     assert submission.program is not None
     program = replace(submission.program, name="</pre><img src=x>", text="a\nb\n" + build.HOSTILE.replace("\u2028", ""))
-    reader = Reader(student_report(grade, {}, replace(submission, program=program)))
+    reader = Reader(report(student_view(grade), {}, replace(submission, program=program)))
     assert reader.tags <= TAGS
     assert reader.values("img", "src") == []
 
 
 def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     grade = build.shape_grade()
-    reader = Reader(student_report(grade, draw_all(grade)))
+    reader = Reader(report(student_view(grade), draw_all(grade)))
     sources = reader.values("img", "src")
     assert len(sources) == 7
     assert all(source.startswith("data:image/png;base64,") for source in sources)
@@ -118,7 +119,7 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
 def test_students_see_nothing_hidden_and_staff_see_all() -> None:
     grade = build.hidden_grade()
     plots = draw_all(grade)
-    student, staff = student_report(grade, plots), staff_report(grade, plots)
+    student, staff = report(student_view(grade), plots), report(staff_view(grade), plots)
     assert "SECRET" not in student
     assert "Further parts of the assignment are marked, but not shown" in student
     assert "SECRETCRITERION" in staff
@@ -132,13 +133,13 @@ def test_students_see_nothing_hidden_and_staff_see_all() -> None:
     assert hidden_images
     assert not any(image in student for image in hidden_images)
     first_hidden = replace(grade, trials=grade.trials[::-1])
-    assert "SECRETSCENARIO" not in student_report(first_hidden, {})
-    after = student_report(grade, plots, released=frozenset({"visible", "hidden"}))
+    assert "SECRETSCENARIO" not in report(student_view(first_hidden), {})
+    after = report(student_view(grade, frozenset({"visible", "hidden"})), plots)
     assert "SECRETCRITERION" in after
 
 
 def test_headline_criteria_and_stamp() -> None:
-    reader = Reader(student_report(build.shape_grade(), {}))
+    reader = Reader(report(student_view(build.shape_grade()), {}))
     assert "7of 8 marks" in reader.text
     assert "5 / 6" in reader.text
     assert "Most is to be gained at “Names the right shape”" in reader.text
@@ -146,16 +147,16 @@ def test_headline_criteria_and_stamp() -> None:
     assert "First missed in each-shape, trial 5" in reader.text
     assert build.shape_grade().assignment_version in reader.text
     assert "Robomark 0.1.0" in reader.text
-    strong = Reader(student_report(replace(build.shape_grade(), sandbox="process limits, landlock, seccomp"), {}))
+    strong = Reader(report(student_view(replace(build.shape_grade(), sandbox="process limits, landlock, seccomp")), {}))
     assert strong.text.count("sandbox: ") == 1
 
 
 def test_faults_show_line_numbers_and_the_students_own_line() -> None:
-    with_source = Reader(student_report(build.faulty_grade(), {}, build.faulty_submission())).text
+    with_source = Reader(report(student_view(build.faulty_grade()), {}, build.faulty_submission())).text
     assert "Robot program (robot.py), line 3" in with_source
     assert "3    print(1 / (i - i))" in with_source
     assert "Did you mean parser?" in with_source
-    without = Reader(student_report(build.faulty_grade(), {})).text
+    without = Reader(report(student_view(build.faulty_grade()), {})).text
     assert "Robot program, line 3" in without
     assert "print(1 / (i - i))" not in without
 
@@ -164,7 +165,7 @@ def test_a_line_number_outside_the_file_gives_no_excerpt() -> None:
     submission = build.faulty_submission()
     assert submission.responder is not None
     short = replace(submission, responder=replace(submission.responder, text=""))
-    groups = page_of(build.faulty_grade(), short).faults
+    groups = page_of(staff_view(build.faulty_grade()), short).faults
     assert groups[0].excerpt == ()
     assert groups[0].where == "Responder (responder.py), line 2"
 
@@ -174,11 +175,11 @@ def test_time_that_was_up_is_told_and_not_called_wrong() -> None:
     grade = build.line_follower_grade()
     recording = replace(grade.trials[0].recording, faults=(time_up,))
     ended = replace(grade, trials=(replace(grade.trials[0], recording=recording),))
-    reader = Reader(student_report(ended, {}))
+    reader = Reader(report(student_view(ended), {}))
     assert "How it ended" in reader.text
     assert "What went wrong" not in reader.text
     assert ("10.00", "stopped") in [(entry.t, entry.kind) for entry in timeline(recording)]
-    assert "What went wrong" in Reader(student_report(build.faulty_grade(), {})).text
+    assert "What went wrong" in Reader(report(student_view(build.faulty_grade()), {})).text
 
 
 def test_timelines_are_capped_and_say_so() -> None:
@@ -188,8 +189,8 @@ def test_timelines_are_capped_and_say_so() -> None:
 
 
 def test_messages_name_images_and_losses() -> None:
-    assert "IMG_DATA::{left, right}" in Reader(student_report(build.shape_grade(), {})).text
-    assert "never (lost)" in Reader(student_report(build.faulty_grade(), {})).text
+    assert "IMG_DATA::{left, right}" in Reader(report(student_view(build.shape_grade()), {})).text
+    assert "never (lost)" in Reader(report(student_view(build.faulty_grade()), {})).text
 
 
 @pytest.mark.parametrize("verdict", list(Verdict))
@@ -197,10 +198,10 @@ def test_a_grade_with_nothing_in_it_still_has_a_page(verdict: Verdict) -> None:
     grade = build.faulty_grade()
     empty = replace(build.line_follower_recording(0), verdict=verdict)
     trials = (replace(grade.trials[0], recording=empty),)
-    Reader(student_report(replace(grade, trials=trials, criteria=()), {}))
+    Reader(report(student_view(replace(grade, trials=trials, criteria=())), {}))
     bare: Grade = replace(grade, trials=(), criteria=())
     assert plots_of(bare) == ()
-    assert "0of 0 marks" in Reader(student_report(bare, draw_all(bare))).text
+    assert "0of 0 marks" in Reader(report(student_view(bare), draw_all(bare))).text
 
 
 def test_batch_index_links_and_escapes() -> None:

@@ -13,21 +13,22 @@ from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobLimits, Spent
-from service.grading.grade import Cost, Grade
-from service.reports.audience import student_view, worst_trial
-from service.reports.csv_output import marks_csv, moodle_csv
-from service.reports.gradescope import gradescope_document, gradescope_text
-from service.reports.html import staff_report, student_report
-from service.reports.json_output import json_document, json_text
-from service.reports.junit import junit_text
-from service.reports.rich_text import rich_report
-from service.reports.text import plain_text
-from service.reports.verdict_words import verdict_words
+from service.grading.grade import Cost
+from service.reports.formats import FORMATS
+from service.reports.formats.csv_output import marks_csv, moodle_csv
+from service.reports.formats.gradescope import gradescope_document, gradescope_text
+from service.reports.formats.json_output import json_document, json_text
+from service.reports.formats.junit import junit_text
+from service.reports.formats.rich_text import rich_report
+from service.reports.formats.text import plain_text
+from service.reports.html import report
+from service.reports.view import View, gradebook_view, staff_view, student_view, worst_trial
+from service.reports.words import verdict_words
 from sim.recording import Verdict
 
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
-    document = json.loads(json_text(build.shape_grade()))
+    document = json.loads(json_text(staff_view(build.shape_grade())))
     assert list(document) == ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy"]
     assert document["schema"] == 1
     assert list(document["criteria"][0]) == ["id", "title", "marks", "max_marks", "message"]
@@ -39,53 +40,53 @@ def test_json_has_exactly_the_keys_of_the_schema() -> None:
 
 
 def test_json_without_classification_and_with_half_marks() -> None:
-    document = json_document(build.line_follower_grade())
+    document = json_document(staff_view(build.line_follower_grade()))
     assert document["accuracy"] is None
     assert document["marks"] == 4.5
     assert isinstance(document["max_marks"], int)
 
 
 def test_hostile_text_survives_strict_json() -> None:
-    text = json_text(build.hostile_grade())
+    text = json_text(staff_view(build.hostile_grade()))
     assert text.isascii()
     assert json.loads(text)["criteria"][0]["title"].encode()  # no lone surrogate is left
 
 
 def test_gradescope_leaves_hiding_to_gradescope_but_tells_nothing_at_the_top() -> None:
-    document = gradescope_document(build.hidden_grade())
+    document = gradescope_document(gradebook_view(build.hidden_grade()))
     assert [test["visibility"] for test in document["tests"]] == ["visible", "visible", "hidden"]
     assert sum(test["score"] for test in document["tests"]) == document["score"] == 8
     assert [test["status"] for test in document["tests"]] == ["failed", "passed", "failed"]
     assert "SECRET" not in document["output"]
     assert document["output_format"] == "text"
-    json.loads(gradescope_text(build.hostile_grade()))
+    json.loads(gradescope_text(gradebook_view(build.hostile_grade())))
 
 
 def test_gradescope_names_the_line_of_a_fault() -> None:
-    output = gradescope_document(build.faulty_grade())["output"]
+    output = gradescope_document(gradebook_view(build.faulty_grade()))["output"]
     assert re.search(r"line \d+: ", output)
 
 
 def test_junit_counts_failures_and_is_well_formed_whatever_was_printed() -> None:
-    suite = ElementTree.fromstring(junit_text(build.shape_grade()))[0]
+    suite = ElementTree.fromstring(junit_text(staff_view(build.shape_grade())))[0]
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
     failure = suite.find("testcase/failure")
     assert failure is not None
     assert failure.get("message") == "5 of 6 marks"
-    hostile = ElementTree.fromstring(junit_text(build.hostile_grade()))
+    hostile = ElementTree.fromstring(junit_text(staff_view(build.hostile_grade())))
     assert "<script>alert(1)</script>" in hostile[0][1].attrib["name"]
 
 
 def test_junit_calls_an_unmarked_grade_an_error() -> None:
     grade = build.faulty_grade()
     trial = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=Verdict.HOST_ERROR))
-    suite = ElementTree.fromstring(junit_text(replace(grade, trials=(trial,))))[0]
+    suite = ElementTree.fromstring(junit_text(staff_view(replace(grade, trials=(trial,)))))[0]
     assert (suite.get("failures"), suite.get("errors")) == ("0", "1")
 
 
 def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
     evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
-    rows = list(csv.DictReader(io.StringIO(marks_csv([build.shape_grade(), evil]))))
+    rows = list(csv.DictReader(io.StringIO(marks_csv([staff_view(build.shape_grade()), staff_view(evil)]))))
     assert rows[0]["student"] == "s1234567"
     assert rows[0]["accuracy"] == "0.8333"
     assert rows[0]["marks: names-the-right-shape"] == "5"
@@ -94,14 +95,14 @@ def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
 
 
 def test_moodle_feedback_says_nothing_of_hidden_criteria() -> None:
-    row = next(csv.DictReader(io.StringIO(moodle_csv([build.hidden_grade()]))))
+    row = next(csv.DictReader(io.StringIO(moodle_csv([gradebook_view(build.hidden_grade())]))))
     assert row["Grade"] == "8"
     assert "SECRET" not in row["Feedback comments"]
     assert "Names the right shape: 5 of 6" in row["Feedback comments"]
 
 
 def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
-    text = plain_text(build.faulty_grade())
+    text = plain_text(staff_view(build.faulty_grade()))
     assert "0 of 4 marks; error in the responder" in text
     assert "Responder, line 2: NameError" in text
     assert "2 times in 2 of 3 trials" in text
@@ -111,19 +112,19 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
 
 def test_terminals_get_no_control_codes_from_students() -> None:
     grade = build.hostile_grade()
-    for shown in (plain_text(grade), _on_a_terminal(grade)):
+    for shown in (plain_text(staff_view(grade)), _on_a_terminal(staff_view(grade))):
         assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(shown)
         assert "[red]x[/red]" in shown
 
 
 def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
-    view = student_view(build.hidden_grade())
+    view = student_view(build.hidden_grade()).grade
     assert [result.id for result in view.criteria] == ["names-the-right-shape", "asks-aloud"]
     assert {trial.scenario for trial in view.trials} == {"each-shape"}
     assert [prediction.trial for prediction in view.criteria[0].predictions] == [0, 1, 2, 3]
     assert view.criteria[0].accuracy is not None
     assert (view.criteria[0].accuracy.n, view.criteria[0].message[:8]) == (4, "VISIBLE:")
-    released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"}))
+    released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"})).grade
     assert (len(released.criteria), len(released.trials)) == (3, 6)
     assert released.criteria[0].message == build.shape_grade().criteria[0].message
 
@@ -131,13 +132,14 @@ def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
 def test_a_grade_of_before_visible_trials_were_told_apart_tells_nothing_of_trials() -> None:
     grade = build.hidden_grade()
     old = replace(grade, criteria=tuple(replace(result, shown=None) for result in grade.criteria))
-    first = student_view(old).criteria[0]
+    first = student_view(old).grade.criteria[0]
     assert (first.message, first.accuracy, first.curves) == ("Marked in trials that are not shown.", None, ())
 
 
 def test_student_view_where_the_first_trial_is_hidden() -> None:
     grade = build.shape_grade()
-    view = student_view(replace(grade, trials=(replace(grade.trials[0], visibility="hidden"), *grade.trials[1:])))
+    first_hidden = replace(grade, trials=(replace(grade.trials[0], visibility="hidden"), *grade.trials[1:]))
+    view = student_view(first_hidden).grade
     predictions = view.criteria[0].predictions
     assert [(prediction.trial, prediction.truth) for prediction in predictions] == [
         (i, build.SHAPES[i + 1]) for i in range(5)
@@ -161,12 +163,15 @@ def test_every_verdict_has_words(verdict: Verdict) -> None:
 def test_marks_are_not_rounded_on_the_way() -> None:
     grade = build.line_follower_grade()
     tenth = replace(grade.criteria[0], marks=Decimal("0.1"))
-    assert json_document(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2")))))["marks"] == 0.3
+    assert (
+        json_document(staff_view(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2"))))))["marks"]
+        == 0.3
+    )
 
 
-def _on_a_terminal(grade: Grade) -> str:
+def _on_a_terminal(view: View) -> str:
     console = Console(file=io.StringIO(), width=100, color_system=None)
-    console.print(rich_report(grade))
+    console.print(rich_report(view))
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 
@@ -178,15 +183,38 @@ LIMITS = "All trials together may use 240 s of CPU, 20 s of sleep and 64 MB of o
 
 def test_staff_read_what_was_used_and_students_what_may_be() -> None:
     viewed = student_view(COSTLY)
-    for_staff = (plain_text(COSTLY), _on_a_terminal(COSTLY), staff_report(COSTLY, {}))
+    for_staff = (plain_text(staff_view(COSTLY)), _on_a_terminal(staff_view(COSTLY)), report(staff_view(COSTLY), {}))
     assert all(FIGURES in page and LIMITS not in page for page in for_staff)
-    for_students = (plain_text(viewed), _on_a_terminal(viewed), student_report(COSTLY, {}))
+    for_students = (plain_text(viewed), _on_a_terminal(viewed), report(student_view(COSTLY), {}))
     assert all(LIMITS in page and "of 240 s" not in page for page in for_students)
-    assert all("of 240 s" not in text for text in (gradescope_text(COSTLY), moodle_csv([COSTLY])))
-    assert json_document(COSTLY)["cost"]["spent"] == {"kept_bytes": 150_000, "cpu_seconds": 3.21, "sleep_seconds": 0.04}
-    assert json_document(viewed)["cost"] == {"limits": json_document(COSTLY)["cost"]["limits"], "spent": None}
+    assert all(
+        "of 240 s" not in text
+        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([gradebook_view(COSTLY)]))
+    )
+    assert json_document(staff_view(COSTLY))["cost"]["spent"] == {
+        "kept_bytes": 150_000,
+        "cpu_seconds": 3.21,
+        "sleep_seconds": 0.04,
+    }
+    assert json_document(viewed)["cost"] == {
+        "limits": json_document(staff_view(COSTLY))["cost"]["limits"],
+        "spent": None,
+    }
 
 
 def test_of_a_grade_that_was_given_before_this_was_measured_nothing_is_said() -> None:
-    assert all(word not in plain_text(build.shape_grade()) for word in ("Used ", "together"))
-    assert "cost" not in json_document(build.shape_grade())
+    assert all(word not in plain_text(staff_view(build.shape_grade())) for word in ("Used ", "together"))
+    assert "cost" not in json_document(staff_view(build.shape_grade()))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_writes_an_odd_grade_and_ends_its_last_line(name: str) -> None:
+    form, grade = FORMATS[name], build.hostile_grade()
+    assert form.document or form.table
+    assert form.suffix.startswith(".")
+    written = [form.document(grade)] if form.document else []
+    written += [form.table([grade, grade])] if form.table else []
+    for text in written:
+        assert text.endswith("\n")
+        assert "\x1b" not in text
+        text.encode()

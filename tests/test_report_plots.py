@@ -11,14 +11,14 @@ from PIL import Image
 
 import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
-from service.reports.confusion_plot import confusion_table, draw_confusion
-from service.reports.conversation_plot import draw_conversation
-from service.reports.path_plot import draw_path
-from service.reports.plot_style import DPI, WIDTH
-from service.reports.plots import draw_all, plots_of
-from service.reports.predictions_plot import chosen_predictions, focus_image, sensor_image
-from service.reports.sensor_plot import draw_sensors, panels_of, strips_of
-from service.reports.sequence import Gap, Step, conversation
+from service.reports.plots.confusion import confusion_table, draw_confusion
+from service.reports.plots.conversation import draw_conversation
+from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.plots.path import draw_path
+from service.reports.plots.predictions import chosen_predictions, focus_image, sensor_image
+from service.reports.plots.sensor import draw_sensors, panels_of, strips_of
+from service.reports.plots.sequence import Gap, Step, conversation
+from service.reports.plots.style import DPI, WIDTH
 from sim.recording import Call, Message, Pose, Recording
 
 

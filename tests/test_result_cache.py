@@ -11,7 +11,7 @@ from sqlalchemy import update
 import report_builders
 from builders import comparable, echo, grading_request
 from responders.sandbox.meter import JobLimits, Spent
-from service.commands.batch_tables import remarks
+from service.commands.batch.tables import remarks
 from service.grading.grade import Cost, Grade
 from service.store import artifacts, batches, jobs, metrics, plots, results, self_tests
 from service.store.engine import Store

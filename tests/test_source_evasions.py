@@ -16,11 +16,11 @@ import pytest
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.audience import student_view
-from service.reports.csv_output import marks_csv
-from service.reports.html import staff_report, student_report
-from service.reports.json_output import json_text
-from service.reports.text import plain_text
+from service.reports.formats.csv_output import marks_csv
+from service.reports.formats.json_output import json_text
+from service.reports.formats.text import plain_text
+from service.reports.html import report
+from service.reports.view import staff_view, student_view
 from sim.recording import Pose, Verdict
 from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
 from submissions.bundle import read_submission
@@ -157,9 +157,14 @@ def test_what_staff_are_told_no_student_reads(tmp_path: Path, runner: TrialRunne
     case = {"avoids": ["eval"], "text": "import gc\ndef f(): return True\n"}
     result = graded(case, tmp_path, runner)
     words = "line 1 has gc"
-    for staff in (plain_text(result), json_text(result), marks_csv([result]), staff_report(result, {})):
+    for staff in (
+        plain_text(staff_view(result)),
+        json_text(staff_view(result)),
+        marks_csv([staff_view(result)]),
+        report(staff_view(result), {}),
+    ):
         assert words in staff
-    assert words not in student_report(result, {})
+    assert words not in report(student_view(result), {})
     shown = student_view(result)
     assert all(words not in text for text in (plain_text(shown), json_text(shown), marks_csv([shown])))
 

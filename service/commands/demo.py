@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.batch import submit_and_wait
+from service.commands.batch.app import submit_and_wait
 from submissions.example_folder import examples
 
 _ASSIGNMENT = "shape-recognition"

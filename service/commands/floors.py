@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 from rich.progress import track
 
-from service.reports.floor_plot import draw_floor
 from service.reports.html import PrintedFloor, gallery
-from service.reports.plot_style import png
+from service.reports.plots.floor import draw_floor
+from service.reports.plots.style import png
 from service.reports.written import prepare_folder, write_page
-from sim.backgrounds import floor, label_names, names
+from sim.floors import floor, label_names, names
 
 
 def floors(

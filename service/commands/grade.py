@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from enum import StrEnum
+from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from responders.sandbox.zygote import FULL, NONE
+from service.commands.format_option import format_option
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
-from service.reports.gradescope import gradescope_text
-from service.reports.json_output import json_text
-from service.reports.junit import junit_text
-from service.reports.rich_text import rich_report
-from service.reports.text import plain_text
+from service.reports.formats import FORMATS, Format
 from service.reports.written import prepare_folder, write_report
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
@@ -33,32 +28,8 @@ from submissions.names import alike, cannot_be_told
 from submissions.raw_files import shown
 from submissions.submission import Submission
 
-
-class Format(StrEnum):
-    """What ``grade`` prints."""
-
-    TEXT = "text"
-    JSON = "json"
-    GRADESCOPE = "gradescope"
-    JUNIT = "junit"
-
-
-def _text(grade: Grade) -> None:
-    console = Console()
-    if console.is_terminal:
-        console.print(rich_report(grade))
-    else:
-        sys.stdout.write(plain_text(grade))
-
-
-_PRINT: Mapping[Format, Callable[[Grade], None]] = MappingProxyType(
-    {
-        Format.TEXT: _text,
-        Format.JSON: lambda grade: print(json_text(grade)),
-        Format.GRADESCOPE: lambda grade: print(gradescope_text(grade)),
-        Format.JUNIT: lambda grade: print(junit_text(grade)),
-    }
-)
+#: The formats that have a document for one grade.
+_DOCUMENTS = tuple(name for name, form in FORMATS.items() if form.document is not None)
 
 
 def grade(
@@ -67,7 +38,7 @@ def grade(
         str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
-    form: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
@@ -93,13 +64,21 @@ def grade(
                 print(f"robomark: {error}", file=sys.stderr)
                 worst = worst if worst is not None and not isinstance(worst, UsageError) else error
                 continue
-            _PRINT[form](graded)
+            _print(FORMATS[form], graded)
             if report is not None:
                 written = write_report(report, graded, submission, named_by(path))
                 print(f"report: {written}", file=sys.stderr)
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")
+
+
+def _print(form: Format, graded: Grade) -> None:
+    console = Console()
+    if form.on_terminal is not None and console.is_terminal:
+        console.print(form.on_terminal(graded))
+    elif form.document is not None:
+        sys.stdout.write(form.document(graded))
 
 
 def _like_others(paths: Sequence[Path]) -> dict[Path, str]:

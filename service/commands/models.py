@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 models_app = typer.Typer(help="List, train and evaluate classifiers.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(help="The model's name, such as shapes, digits or digits-28.")]
+Name = Annotated[str, typer.Argument(help="The model's name, as the list has it.")]
 Report = Annotated[
     Path | None, typer.Option("--report", metavar="DIR", help="Write the plots and the numbers into this folder.")
 ]
@@ -133,7 +133,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def _write(result: Evaluation, folder: Path) -> None:
-    from service.reports.model_plots import evaluation_plots
+    from service.reports.plots.models import evaluation_plots
 
     numbers = json.dumps({"name": result.card.name} | asdict(result.measured), indent=1) + "\n"
     files = {f"{result.card.name}.json": numbers.encode()} | evaluation_plots(result)

@@ -14,14 +14,15 @@ from rich.table import Table
 from rich.text import Text
 
 from responders.sandbox import control_group
-from service.commands.batch_tables import remarks
+from service.commands.batch.tables import remarks
 from service.commands.grade import warn_of_no_sandbox
 from service.doctor import examine
 from service.home import for_the_user
 from service.queue.broker import EmbeddedBroker
 from service.queue.worker import run_worker
 from service.report_files import write_report
-from service.reports.text import plain_text
+from service.reports.formats.text import plain_text
+from service.reports.view import staff_view
 from service.reports.written import file_stem
 from service.settings import Settings, load_settings
 from service.store import batches, results
@@ -82,7 +83,7 @@ def show(
                 sys.stdout.write(_not_graded(line))
                 return
             graded = results.load(session, line.id)
-        sys.stdout.write(plain_text(graded))
+        sys.stdout.write(plain_text(staff_view(graded)))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         print("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if report is None:

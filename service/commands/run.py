@@ -20,12 +20,12 @@ from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
-from service.reports.path_plot import draw_path
-from service.reports.plot_style import png
+from service.reports.plots.path import draw_path
+from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
-from sim.backgrounds import floor
 from sim.errors import UsageError
+from sim.floors import floor
 from sim.recorded import floor_of
 from sim.recording import Recording
 from sim.robot import robot

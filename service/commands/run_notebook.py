@@ -15,7 +15,7 @@ from responders.sandbox.running_child import ChildLimits
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from service.reports.readable import readable
-from sim.backgrounds import floor
+from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise

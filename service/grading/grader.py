@@ -23,9 +23,9 @@ from service.grading.static_analysis import SubmittedParts, analyse, does_withou
 from service.grading.training import with_models_answers
 from service.grading.trial_runner import TrialRunner
 from service.version import GRADER_VERSION
-from sim.backgrounds import Floor, floor, floor_from_image
 from sim.chance import Stream
 from sim.errors import AssignmentError, UsageError
+from sim.floors import Floor, floor, floor_from_image
 from sim.motion import Physics
 from sim.recording import Recording
 from sim.robot import robot

@@ -13,9 +13,9 @@ from responders.channel import Channel
 from responders.conversation import Code
 from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
-from sim.backgrounds import floor
 from sim.chance import Stream
 from sim.errors import UsageError
+from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise

@@ -1,4 +1,4 @@
-"""A grade as one self-contained HTML file, for the student or for staff; the index of a batch; the page of floors.
+"""A grade as one self-contained HTML file; the index of a batch; the page of floors.
 
 Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
 the pages load nothing, run nothing and send nothing.
@@ -19,11 +19,10 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from service.grading.grade import Grade
-from service.reports.audience import BEFORE_PUBLICATION, student_view
 from service.reports.page import page_of
 from service.reports.readable import number, readable
-from service.reports.verdict_words import verdict_words
+from service.reports.view import View
+from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
 
@@ -57,24 +56,13 @@ def gallery(floors: Sequence[PrintedFloor]) -> str:
     return _render("gallery.html", floors=shown)
 
 
-def student_report(
-    grade: Grade,
-    plots: Mapping[str, bytes],
-    submission: Submission | None = None,
-    released: frozenset[str] = BEFORE_PUBLICATION,
-) -> str:
-    """The page a student reads: nothing of hidden criteria or trials, and the source lines at fault if given.
+def report(view: View, plots: Mapping[str, bytes], submission: Submission | None = None) -> str:
+    """The page of one grade, with the source lines at fault if the submission is given.
 
     ``plots`` are those of ``draw_all``; the ones that are missing are left out.
     """
-    view = student_view(grade, released)
-    withheld = len(view.criteria) < len(grade.criteria) or len(view.trials) < len(grade.trials)
-    return _page(view, plots, submission, staff=False, withheld=withheld)
-
-
-def staff_report(grade: Grade, plots: Mapping[str, bytes], submission: Submission | None = None) -> str:
-    """The page staff read: everything, with the visibility of each criterion and trial."""
-    return _page(grade, plots, submission, staff=True, withheld=False)
+    images = {name: _data_uri(data) for name, data in plots.items()}
+    return _render("report.html", page=page_of(view, submission), images=images)
 
 
 def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "") -> str:
@@ -93,14 +81,6 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "
         for row in rows
     ]
     return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox)
-
-
-def _page(
-    grade: Grade, plots: Mapping[str, bytes], submission: Submission | None, *, staff: bool, withheld: bool
-) -> str:
-    images = {name: _data_uri(data) for name, data in plots.items()}
-    page = page_of(grade, submission)
-    return _render("report.html", page=page, images=images, staff=staff, withheld=withheld)
 
 
 def _render(template: str, **context: object) -> str:

@@ -1,6 +1,6 @@
 """What a report page tells of a grade, section by section, as plain data that a template lays out.
 
-Nothing is escaped here, and nothing is hidden: the grade that comes in is already the reader's view.
+Nothing is escaped here, and nothing is hidden: what comes in is the reader's view already.
 """
 
 from __future__ import annotations
@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
-from service.reports.audience import scenarios, worst_trial
 from service.reports.faults import FaultGroup, fault_groups
-from service.reports.plots import Plot, plots_of
+from service.reports.plots.drawn import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
-from service.reports.text import cost_words
-from service.reports.verdict_words import VerdictWords, grade_words, verdict_words
+from service.reports.view import View, scenarios, worst_trial
+from service.reports.words import VerdictWords, cost_words, grade_words, verdict_words
 from sim.recording import Fault, Message, Recording, Verdict
 from submissions.submission import Submission
 
@@ -112,10 +111,13 @@ class Page:
     notes: tuple[str, ...]
     cost: str
     weak_sandbox: bool
+    staff: bool
+    withheld: bool
 
 
-def page_of(grade: Grade, submission: Submission | None = None) -> Page:
-    """Everything a report says about ``grade``."""
+def page_of(view: View, submission: Submission | None = None) -> Page:
+    """Everything a report says of what the reader may see."""
+    grade = view.grade
     plots = plots_of(grade)
     lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
     faults = fault_groups(grade, submission)
@@ -138,6 +140,8 @@ def page_of(grade: Grade, submission: Submission | None = None) -> Page:
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
         cost=cost_words(grade),
         weak_sandbox=PROCESS_LIMITS in grade.sandbox,
+        staff=view.staff,
+        withheld=view.withheld,
     )
 
 

@@ -53,6 +53,11 @@ def number(value: Decimal) -> str:
     return plain.rstrip("0").rstrip(".") if "." in plain else plain
 
 
+def json_number(value: Decimal) -> int | float:
+    """A Decimal as JSON writes it: whole numbers without a point."""
+    return int(value) if value == value.to_integral_value() else float(value)
+
+
 def _spelled(line: str) -> str:
     pieces: list[str] = []
     marks = 0

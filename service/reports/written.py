@@ -12,8 +12,9 @@ from pathlib import Path
 
 from service.grading.grade import Grade
 from service.home import for_the_user
-from service.reports.html import student_report
-from service.reports.plots import draw_all
+from service.reports.html import report
+from service.reports.plots.drawn import draw_all
+from service.reports.view import student_view
 from sim.errors import UsageError
 from submissions.submission import Submission
 
@@ -70,5 +71,5 @@ def write_page(folder: Path, name: str, page: str) -> Path:
 
 def write_report(folder: Path, grade: Grade, submission: Submission, written: str) -> Path:
     """Draw the plots of a grade and write the report, called after the student as the name was written; where it is."""
-    page = student_report(grade, draw_all(grade), submission)
+    page = report(student_view(grade), draw_all(grade), submission)
     return write_page(folder, f"{file_stem(written)}.html", page)

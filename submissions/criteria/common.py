@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from sim.backgrounds import Floor
 from sim.errors import UsageError
+from sim.floors import Floor
 from submissions.strict_table import StrictTable
 
 if TYPE_CHECKING:

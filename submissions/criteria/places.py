@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from sim.backgrounds.centrelines import centrelines
+from sim.floors.centrelines import centrelines
 from submissions.strict_table import Shape, StrictTable
 
 #: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.

@@ -17,7 +17,7 @@ from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import decoded
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import quoted
-from sim.backgrounds import label_names
+from sim.floors import label_names
 from sim.recorded import floor_of, pose_after, seconds_at
 from sim.recording import Image, Recording
 from submissions.criteria.collecting import Collects

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pixels
 
-from sim.backgrounds import SHAPES
+from sim.floors import SHAPES
 from sim.recording import Image
 
 #: Of the greys of neighbouring labels, half the smallest distance; a median further off is no label's.

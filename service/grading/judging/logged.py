@@ -17,8 +17,8 @@ from service.grading.judging.geometry import Side, floor_share, footprint_at, li
 from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
-from sim.backgrounds import Floor
 from sim.camera import HEIGHT, WIDTH, sensor_mask
+from sim.floors import Floor
 from sim.recorded import TICKS_PER_SECOND, floor_of, pose_after, pose_at, seconds_at, ticks_until
 from sim.recording import Datum, Image, Recording
 from sim.sensors import Footprint

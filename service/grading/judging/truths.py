@@ -12,7 +12,7 @@ from service.grading.grade import TrialResult
 from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import part_at
 from service.grading.judging.label_patches import decoded
-from sim.backgrounds import label_names
+from sim.floors import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment import Assignment
 from submissions.criteria.recognition import Recognition

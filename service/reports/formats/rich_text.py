@@ -1,0 +1,66 @@
+"""A grade in a terminal with Rich: marks table, verdict, faults.
+
+Student text goes in as ``rich.text.Text``, so square brackets in it are never markup.
+"""
+
+from __future__ import annotations
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from service.grading.grade import Grade
+from service.reports.faults import FaultGroup, fault_groups
+from service.reports.formats.registry import on_terminal
+from service.reports.readable import number, one_line, readable
+from service.reports.view import View, staff_view
+from service.reports.words import accuracy_words, cost_words, grade_words
+
+_STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
+
+
+@on_terminal("text", staff_view)
+def rich_report(view: View) -> RenderableType:
+    """The grade as one renderable; print it with ``rich.console.Console().print``."""
+    grade = view.grade
+    words = grade_words(grade)
+    heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
+    verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.next_step}")
+    parts: list[RenderableType] = [heading, marks_table(grade), verdict]
+    parts += [_fault(group) for group in fault_groups(grade)]
+    if grade.accuracy is not None:
+        parts.append(Text(accuracy_words(grade)))
+    parts += [Text(f"Note: {readable(note, 300)}", style="dim") for note in grade.notes[:20]]
+    parts += [Text(cost_words(grade), style="dim")] if grade.cost else []
+    parts.append(Text(f"sandbox: {one_line(grade.sandbox)}", style="dim"))
+    return Group(*parts)
+
+
+def marks_table(grade: Grade) -> Table:
+    """Criteria with marks and messages, and the total in the footer."""
+    table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
+    table.add_column("Marks", justify="right", no_wrap=True, footer=_marks(grade))
+    table.add_column("Criterion", footer=Text("in all"))
+    for result in grade.criteria:
+        full = result.marks >= result.max_marks
+        style = "green" if full else ("red" if result.marks == 0 else "yellow")
+        marks = Text(f"{number(result.marks)} / {number(result.max_marks)}", style=style)
+        message = Text(readable(result.message, 600, lines=6), style="dim")
+        if result.for_staff:
+            message.append(f"\nFor staff: {readable(result.for_staff, 600)}")
+        table.add_row(marks, Group(Text(one_line(result.title)), message))
+    return table
+
+
+def _marks(grade: Grade) -> Text:
+    return Text(f"{number(grade.marks)} / {number(grade.max_marks)}", style="bold")
+
+
+def _fault(group: FaultGroup) -> RenderableType:
+    text = Text.assemble((group.where, "bold"), f": {group.message}")
+    if group.hint:
+        text.append(f"\n{group.hint}")
+    text.append(f"\n({group.how_often})", style="dim")
+    return Padding(text, (0, 0, 0, 2))

@@ -1,0 +1,141 @@
+"""Draws who was taken for whom: truths down, answers across, counts in the cells, totals at the right.
+
+It counts nothing anew; all numbers are those of the criterion's ``Accuracy``.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from service.grading.grade import Accuracy, CriterionResult
+from service.reports.plots.style import FAINT, HEAD, INK, RULE, WIDTH, axes_at, drawable, font, new_figure, write
+from service.reports.readable import one_line
+
+NO_ANSWER = "no answer"
+_LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the truths at the left
+_SHORT = 6  # characters of a name that needs little room
+_TOTALS = 2.55  # cells for what stands right of the counts
+_HEADS, _SHORT_HEADS = 0.86, 0.42  # for the answers at the top
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionTable:
+    """Counts, one row a truth, one column an answer; ``totals`` are the rows' sums."""
+
+    truths: tuple[str, ...]
+    answers: tuple[str, ...]
+    counts: tuple[tuple[int, ...], ...]
+    totals: tuple[int, ...]
+
+
+def confusion_table(accuracy: Accuracy) -> ConfusionTable:
+    """All labels in their order, then answers that are no label, then ``no answer`` if there was one."""
+    seen = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
+    truths = tuple(dict.fromkeys((*accuracy.labels, *seen)))
+    given = dict.fromkeys(answer for _, answer, _ in accuracy.confusion if answer is not None)
+    answers = tuple(dict.fromkeys((*truths, *given)))
+    counts = {(truth, answer): 0 for truth in truths for answer in (*answers, None)}
+    for truth, answer, count in accuracy.confusion:
+        counts[truth, answer] += count
+    columns: tuple[str | None, ...] = (*answers, None) if any(counts[t, None] for t in truths) else answers
+    rows = tuple(tuple(counts[truth, column] for column in columns) for truth in truths)
+    names = tuple(NO_ANSWER if column is None else column for column in columns)
+    return ConfusionTable(truths, names, rows, tuple(sum(row) for row in rows))
+
+
+def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> Figure:
+    """The confusion matrix of ``accuracy`` with its value, interval and n."""
+    subtitle = (
+        f"accuracy {accuracy.value:.2f}, 95 % interval {accuracy.low:.2f} to {accuracy.high:.2f}, "
+        f"n = {accuracy.n} {counted(accuracy)}; {one_line(result.title, 34)}"
+    )
+    return draw_table(confusion_table(accuracy), title, subtitle)
+
+
+def counted(accuracy: Accuracy) -> str:
+    """What ``n`` counts: ``images`` or ``patterns``."""
+    return accuracy.counts.of if accuracy.counts is not None else "images"
+
+
+def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
+    """The confusion matrix of ``table``, whoever counted it."""
+    across = len(table.answers) + _TOTALS
+    labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
+    cell = min(0.56, (WIDTH - labels - 0.14) / across)
+    body = cell * (len(table.truths) + 0.85)
+    heads = _HEADS if any(len(answer) > _SHORT for answer in table.answers) else _SHORT_HEADS
+    figure = new_figure(HEAD + heads + body + 0.42, title, subtitle)
+    axes = axes_at(figure, labels, 0.42, cell * across, body + heads)
+    axes.set_axis_off()
+    axes.set_xlim(0, across)
+    axes.set_ylim(body / cell, -heads / cell)
+    size = 9.0 if cell > 0.4 else max(5.0, 22 * cell)
+    _draw_names(axes, table, size * 0.82)
+    _draw_cells(axes, table, size)
+    write(figure, 0.08, 0.24, "rows: what it was;  columns: what was answered;  framed: right", size=7.2, colour=FAINT)
+    write(figure, 0.08, 0.10, "recall: right of what it was;  precision: right of what was answered", size=7.2,
+          colour=FAINT)  # fmt: skip
+    return figure
+
+
+def _draw_names(axes: Axes, table: ConfusionTable, size: float) -> None:
+    for row, truth in enumerate(table.truths):
+        _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center", rotation=0)
+    for column, answer in enumerate(table.answers):
+        _name(axes, column + 0.42, -0.14, answer, size, ha="left", va="bottom", rotation=52)
+    _name(axes, len(table.answers) + 0.60, -0.14, "in all", size, ha="left", va="bottom", rotation=52)
+    _name(axes, len(table.answers) + 1.75, -0.14, "recall", size, ha="left", va="bottom", rotation=52)
+    _name(axes, -0.12, len(table.truths) + 0.5, "precision", size, ha="right", va="center", rotation=0)
+
+
+def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float) -> None:
+    text = "\n".join(textwrap.wrap(one_line(name, 40), 15, max_lines=2, placeholder="…"))
+    axes.text(
+        x, y, drawable(text), font=font(size), color=INK, ha=ha, va=va, rotation=rotation,
+        rotation_mode="anchor", parse_math=False, linespacing=1.0, clip_on=False,
+    )  # fmt: skip
+
+
+def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
+    for row, counts in enumerate(table.counts):
+        for column, count in enumerate(counts):
+            share = count / table.totals[row] if table.totals[row] else 0.0
+            right = table.answers[column] == table.truths[row]
+            _draw_cell(axes, (column, row), share, right=right)
+            axes.text(
+                column + 0.5, row + 0.5, str(count) if count else "·", font=font(size, bold=count > 0), ha="center",
+                va="center", color="white" if share > 0.55 else (INK if count else FAINT),
+            )  # fmt: skip
+        _figure_text(axes, len(counts) + 0.65, row, str(table.totals[row]), size)
+        right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
+        _figure_text(axes, len(counts) + 1.85, row, _share(right_ones, table.totals[row]), size * 0.82)
+    for column, answer in enumerate(table.answers):
+        if answer in table.truths:
+            answered = sum(counts[column] for counts in table.counts)
+            right_ones = table.counts[table.truths.index(answer)][column]
+            _figure_text(axes, column + 0.5, len(table.truths), _share(right_ones, answered), size * 0.82)
+
+
+def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None:
+    axes.text(x, row + 0.5, text, font=font(size), ha="center", va="center", color=INK)
+
+
+def _share(part: int, whole: int) -> str:
+    """``.83``: narrow, so that ten columns of it can be read; a dash where there is nothing to divide by."""
+    if not whole:
+        return "\N{EN DASH}"
+    return str(part // whole) if part in (0, whole) else f"{part / whole:.2f}".lstrip("0")
+
+
+def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, right: bool) -> None:
+    # One hue from white to dark blue, so that the order survives a greyscale print.
+    shade = tuple(1 - share * (1 - channel) for channel in (0.07, 0.27, 0.47))
+    axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor=RULE, linewidth=0.7))
+    if right:
+        inner = (corner[0] + 0.05, corner[1] + 0.05)
+        axes.add_patch(Rectangle(inner, 0.9, 0.9, facecolor="none", edgecolor=INK, linewidth=1.3, zorder=3))

@@ -1,0 +1,141 @@
+"""Draws how a share falls as conditions get harder: one panel a condition, a line with its 95 % band a curve.
+
+It measures nothing; shares, intervals and counts come from whoever did.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    LEFT,
+    RIGHT,
+    RULE,
+    SAID,
+    WIDTH,
+    axes_at,
+    drawable,
+    font,
+    new_figure,
+    set_tick_type,
+    write,
+)
+from service.reports.readable import one_line
+
+#: Colour, line and marker of the first curve, the second and so on: each differs without colour too.
+_STYLES = ((LEFT, "-", "o"), (RIGHT, "--", "s"), (SAID, ":", "^"), (FAINT, "-.", "D"))
+_LEFT, _RIGHT_MARGIN = 0.62, 0.16
+_PANEL, _BELOW, _ABOVE = 1.22, 0.46, 0.36  # inches: the axes, its labels, its title
+_FOOT = 0.26
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A share at each of ``x``, ascending, with the interval round it and how many were counted."""
+
+    label: str  # for the legend; not shown where a panel has one curve
+    x: tuple[float, ...]
+    share: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    n: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AccuracyPanel:
+    """What is varied and in which unit, the curves, and the share that is asked for, if one is."""
+
+    varied: str
+    unit: str
+    curves: tuple[Curve, ...]
+    level: float | None = None
+
+
+def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
+    """The panels under each other, all with the same upright axis from 0 to 1; ``counted`` is what ``n`` counts."""
+    row = _ABOVE + _PANEL + _BELOW
+    height = HEAD + row * len(panels) + _FOOT
+    figure = new_figure(height, title, subtitle)
+    for place, panel in enumerate(panels):
+        top = height - HEAD - row * place
+        write(figure, 0.08, top - 0.14, one_line(panel.varied, 40), size=9, bold=True, va="center")
+        write(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _counts(panel.curves, counted), size=8, ha="right",
+              va="center", colour=FAINT)  # fmt: skip
+        axes = axes_at(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
+        draw_panel(axes, panel)
+    write(figure, 0.08, 0.09, "line: share right;  band: 95 % interval (Wilson)", size=7.2, colour=FAINT)
+    return figure
+
+
+def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
+    """All curves of one panel into ``axes``, with labelled axes and, where there are several curves, a legend."""
+    axes.set_ylim(-0.04, 1.04)
+    axes.yaxis.set_major_locator(FixedLocator([0, 0.25, 0.5, 0.75, 1]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2f}".rstrip("0").rstrip(".")))
+    axes.grid(axis="y", color=RULE, linewidth=0.5)
+    axes.set_axisbelow(True)
+    for curve, style in zip(panel.curves, _repeated(len(panel.curves)), strict=True):
+        draw_curve(axes, curve, *style)
+    xs = sorted({x for curve in panel.curves for x in curve.x})
+    if len(xs) <= 9:
+        axes.xaxis.set_major_locator(FixedLocator(_readable_ticks(xs)))
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}")))
+    axes.set_xlabel(drawable(f"{one_line(panel.varied, 40)}, {panel.unit}"), font=font(8), color=INK, labelpad=2)
+    axes.set_ylabel("share right", font=font(8), color=INK, labelpad=3)
+    set_tick_type(axes)
+    if panel.level is not None:
+        axes.axhline(panel.level, color=FAULT, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
+        axes.text(
+            0.995, panel.level - 0.03, f"asked for: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
+            va="top", color=FAULT, font=font(7.2),
+        )  # fmt: skip
+    if len(panel.curves) > 1:
+        legend = axes.legend(loc="best", prop=font(7.5), frameon=True, framealpha=0.85, borderpad=0.3)
+        legend.get_frame().set_edgecolor(RULE)
+
+
+def draw_curve(axes: Axes, curve: Curve, colour: str = LEFT, line: str = "-", marker: str = "o") -> None:
+    """One curve into ``axes``: its band, then its line, with a marker at each value that was measured."""
+    if len(curve.x) > 1:
+        axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.18, linewidth=0, zorder=3)
+        for edge in (curve.low, curve.high):
+            axes.plot(curve.x, edge, color=colour, alpha=0.55, linewidth=0.6, zorder=3)
+    else:
+        axes.vlines(curve.x, curve.low, curve.high, color=colour, linewidth=1.2, zorder=3)
+    axes.plot(
+        curve.x, curve.share, color=colour, linestyle=line, marker=marker, markersize=3.4, linewidth=1.4, zorder=4,
+        label=drawable("\n".join(textwrap.wrap(one_line(curve.label, 40), 26))),
+    )  # fmt: skip
+
+
+def _counts(curves: Sequence[Curve], counted: str) -> str:
+    counts = {count for curve in curves for count in curve.n}
+    if not counts:
+        return "n = 0"
+    least, most = min(counts), max(counts)
+    return f"n = {least if least == most else f'{least} to {most}'} {counted} a point"
+
+
+def _readable_ticks(xs: Sequence[float]) -> list[float]:
+    """Those of ``xs`` whose labels do not run into each other: none nearer than an eighteenth of the width."""
+    kept: list[float] = []
+    for x in xs:
+        if not kept or x - kept[-1] >= (xs[-1] - xs[0]) / 18:
+            kept.append(x)
+    return kept
+
+
+def _repeated(count: int) -> list[tuple[str, str, str]]:
+    return [_STYLES[place % len(_STYLES)] for place in range(count)]

@@ -1,0 +1,236 @@
+"""Which plots a grade has, what each is called and says, and all of them drawn.
+
+The drawing is in one module a plot; nothing here is random, timed or kept between calls.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+from service.grading.grade import AccuracyCurve, CriterionResult, Grade
+from service.reports.plots.confusion import draw_confusion
+from service.reports.plots.conversation import draw_conversation
+from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.misread import draw_misread, misread
+from service.reports.plots.path import Pixels, draw_path
+from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
+from service.reports.plots.sensor import draw_sensors
+from service.reports.plots.style import png
+from service.reports.plots.track import draw_track, tracks, worst_track
+from service.reports.readable import one_line
+from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
+from sim.recorded import floor_of
+from sim.recording import Recording
+from submissions.sweep import CONDITIONS, Varied
+
+Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "predictions"]
+_NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """One plot of a grade. ``subject`` indexes the grade's trials, or its criteria where no scenario is given.
+
+    ``name`` ends in ``-staff`` if the plot shows anything that a student may not see before publication.
+    """
+
+    name: str
+    kind: Kind
+    subject: int
+    scenario: str  # empty for what a criterion pools
+    title: str
+    caption: str
+    alt: str
+
+
+def plots_of(grade: Grade) -> tuple[Plot, ...]:
+    """Path and sensors of every scenario's worst trial, conversations of the first and the worst, classifications."""
+    return (*_classifications(grade), *_trials(grade))
+
+
+def draw_all(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[str, bytes]:
+    """Every plot of ``grade`` for staff and for the student, name -> PNG.
+
+    ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
+    y = 1143 mm; a floor that is in neither is drawn white.
+    """
+    drawn: dict[str, bytes] = {}
+    for view in (staff_view(grade), student_view(grade)):
+        for plot in plots_of(view.grade):
+            if plot.name not in drawn:
+                drawn[plot.name] = png(_draw(view.grade, plot, images))
+    return drawn
+
+
+def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
+    if plot.kind == "path":
+        trial = grade.trials[plot.subject]
+        return draw_path(trial, plot.title, _floor(trial.recording, images))
+    if plot.kind == "sensors":
+        return draw_sensors(grade.trials[plot.subject], plot.title)
+    if plot.kind == "conversation":
+        return draw_conversation(grade.trials[plot.subject], plot.title)
+    result = grade.criteria[plot.subject]
+    if plot.kind == "confusion" and result.accuracy is not None:
+        return draw_confusion(result, result.accuracy, plot.title)
+    if plot.kind == "curves":
+        return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
+    if plot.kind == "track":
+        worst = worst_track(result.predictions, grade.trials)
+        floor = _floor(grade.trials[worst].recording, images)
+        return draw_track(result.predictions, grade.trials, plot.title, floor)
+    if plot.kind == "misread":
+        return draw_misread(misread(result.predictions), len(result.predictions), plot.title)
+    return draw_predictions(result.predictions, plot.title)
+
+
+def _panel(curve: AccuracyCurve) -> AccuracyPanel:
+    about = CONDITIONS[curve.along] if curve.along in CONDITIONS else Varied(curve.along, "", 0, 0)
+    levels = curve.levels
+    drawn = Curve(
+        "",
+        tuple(level.at for level in levels),
+        tuple(level.value for level in levels),
+        tuple(level.low for level in levels),
+        tuple(level.high for level in levels),
+        tuple(level.n for level in levels),
+    )
+    return AccuracyPanel(about.words, about.unit, (drawn,), curve.asked)
+
+
+def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
+    """The floor as it was in the trial, with the same digits and label patches."""
+    if recording.background in images:
+        return images[recording.background]
+    floor = floor_of(recording)
+    return floor.pixels if floor else None
+
+
+def _classifications(grade: Grade) -> Iterator[Plot]:
+    for index, result in enumerate(grade.criteria):
+        suffix = _suffix(tells_of_hidden(grade, result))
+        accuracy = result.accuracy
+        if accuracy is not None and accuracy.confusion:
+            right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
+            yield Plot(
+                f"confusion-{_slug(result.id)}{suffix}", "confusion", index, "", _title(grade, "what was answered"),
+                f"What each image showed and what was answered, for “{one_line(result.title, 80)}”.",
+                f"Confusion matrix: {right} of {accuracy.n} images on the diagonal, accuracy {accuracy.value:.2f}, "
+                f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
+            )  # fmt: skip
+        yield from _along(grade, index, result, suffix)
+        if result.predictions:
+            shown = len(chosen_predictions(result.predictions))
+            wrong = [prediction for prediction in result.predictions if not is_right(prediction)]
+            told = "; ".join(
+                f"{one_line(prediction.truth, 40)} answered as {one_line(prediction.answer or 'nothing', 40)}"
+                for prediction in wrong[:4]
+            )
+            yield Plot(
+                f"predictions-{_slug(result.id)}{suffix}",
+                "predictions",
+                index,
+                "",
+                _title(grade, "what the sensor saw"),
+                "What the left light sensor sent, whole and in the focus that a network is shown. "
+                "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
+                f"{shown} sensor images, {len(wrong)} of {len(result.predictions)} answered wrongly"
+                + (f": {told}." if told else "."),
+            )  # fmt: skip
+
+
+def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> Iterator[Plot]:
+    """How accuracy changes along what is swept and along the way, and what was misread."""
+    title = one_line(result.title, 80)
+    if result.curves:
+        told = "; ".join(
+            f"{one_line(curve.along, 20)}: "
+            + ", ".join(f"{level.value:.2f} at {level.at:g}" for level in curve.levels[:9])
+            for curve in result.curves
+        )
+        yield Plot(
+            f"curves-{_slug(result.id)}{suffix}", "curves", index, "", _title(grade, "robustness"),
+            f"How often images were named rightly as conditions got harder, for “{title}”.",
+            f"Curves of accuracy. {told}.",
+        )  # fmt: skip
+    on_track = tracks(result.predictions, grade.trials)
+    if on_track:
+        right = sum(is_right(prediction) for prediction in result.predictions)
+        yield Plot(
+            f"track-{_slug(result.id)}{suffix}", "track", index, "", _title(grade, "along the track"),
+            "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
+            "floor, and in all trials by the way driven.",
+            f"{right} of {len(result.predictions)} images right along the track in {len(on_track)} trials.",
+        )  # fmt: skip
+    wrong = misread(result.predictions)
+    if wrong:
+        yield Plot(
+            f"misread-{_slug(result.id)}{suffix}", "misread", index, "", _title(grade, "what was misread"),
+            "Images that were misread, each beside the nearest one of the same truth that was read rightly, and the "
+            "nearest right one of what it was taken for.",
+            f"{len(wrong)} of {len(result.predictions)} images were misread.",
+        )  # fmt: skip
+
+
+def _trials(grade: Grade) -> Iterator[Plot]:
+    for scenario in scenarios(grade):
+        index = worst_trial(grade, scenario)
+        trial = grade.trials[index]
+        recording = trial.recording
+        name = f"{_slug(scenario)}-{trial.index + 1}{_suffix(is_for_staff(trial.visibility))}"
+        title = _title(grade, scenario)
+        start, end = recording.start, recording.end
+        yield Plot(
+            f"path-{name}", "path", index, scenario, f"{title}: path",
+            "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
+            "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
+            f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
+            f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
+            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches.",
+        )  # fmt: skip
+        light = recording.ticks.left_rgb[:, 0]
+        heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
+        yield Plot(
+            f"sensors-{name}", "sensors", index, scenario, f"{title}: sensors",
+            "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
+            "messages sent, answers received, speech, touches and faults.",
+            f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
+        )  # fmt: skip
+    yield from _conversations(grade)
+
+
+def _conversations(grade: Grade) -> Iterator[Plot]:
+    """Of the first trial in which anything was sent, and of every scenario's worst."""
+    talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
+    worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
+    for index in dict.fromkeys([*talking[:1], *(index for index in worst if index in talking)]):
+        trial = grade.trials[index]
+        messages = trial.recording.messages
+        sent = sum(message.sender == "robot" for message in messages)
+        lost = sum(message.delivered is None for message in messages)
+        suffix = _suffix(is_for_staff(trial.visibility))
+        yield Plot(
+            f"conversation-{_slug(trial.scenario)}-{trial.index + 1}{suffix}", "conversation", index, trial.scenario,
+            f"{_title(grade, trial.scenario)}: conversation",
+            f"Who told whom what in trial {trial.index + 1}; time goes down.",
+            f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
+            f"{lost} never arrived.",
+        )  # fmt: skip
+
+
+def _title(grade: Grade, what: str) -> str:
+    return f"{one_line(grade.assignment_title, 32)}, {one_line(what, 24)}"
+
+
+def _suffix(hidden: bool) -> str:
+    return "-staff" if hidden else ""
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", text)[:60].strip("-.") or "unnamed"

@@ -1,0 +1,37 @@
+"""Draws a floor by itself: the image with a scale in mm, where the robot starts, obstacles and what has a label.
+
+The floors' images are ``sim/floors``'; a robot's path over one is drawn in ``path.py``.
+"""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
+from sim.floors import Floor
+
+_FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
+_LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.56, 0.12, 0.42  # inches
+
+
+def draw_floor(floor: Floor) -> Figure:
+    """The whole floor with x to the right and y upwards, mm."""
+    width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
+    height = width * _FLOOR_HEIGHT / _FLOOR_WIDTH
+    pose = floor.default_pose
+    subtitle = f"start ({whole(pose.x)}, {whole(pose.y)}) heading {whole(pose.heading)}°"
+    names = tuple(dict.fromkeys(label.label for label in floor.labels))
+    if names:
+        subtitle += f"; {len(floor.labels)} places with a label, {len(names)} labels"
+    figure = new_figure(HEAD + height + _FOOT, floor.name, subtitle)
+    axes = axes_at(figure, _LEFT_EDGE, _FOOT, width, height)
+    axes.imshow(floor.pixels[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")
+    for x, y, across, up in floor.obstacles:
+        axes.add_patch(Rectangle((x, y), across, up, facecolor=RULE, edgecolor="black", linewidth=0.8))
+    axes.plot(pose.x, pose.y, marker=(3, 0, pose.heading - 90), color=FAULT, markersize=9, markeredgecolor="white")
+    axes.set_xlim(0, _FLOOR_WIDTH)
+    axes.set_ylim(0, _FLOOR_HEIGHT)
+    axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
+    axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
+    return figure

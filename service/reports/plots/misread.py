@@ -1,0 +1,126 @@
+"""Draws the images that were misread, each beside the nearest ones that were read rightly.
+
+Nearest is by the grey values of the focus that a network is shown; nothing is judged here.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from service.grading.grade import Prediction
+from service.reports.plots.predictions import focus_image, is_right
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.readable import one_line
+
+MOST_MISREAD = 6
+_SIDE, _GAP, _ROW = 1.02, 0.16, 1.40  # inches
+_TEXT = 3 * (_SIDE + _GAP) + 0.08
+
+
+@dataclass(frozen=True, slots=True)
+class Misread:
+    """An image that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
+
+    number: int  # of the image, from 1
+    prediction: Prediction
+    like_truth: Prediction | None
+    like_answer: Prediction | None
+
+
+def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
+    """Every image that was answered, and wrongly, in the order in which they were sent.
+
+    The nearest ones are looked for only for the images that are drawn.
+    """
+    wrong = [
+        (number, prediction)
+        for number, prediction in enumerate(predictions, start=1)
+        if prediction.answer is not None and not is_right(prediction)
+    ]
+    greys = [(prediction, _greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
+    drawn = (
+        Misread(
+            number,
+            prediction,
+            _nearest(prediction, prediction.truth, greys),
+            _nearest(prediction, prediction.answer, greys),
+        )
+        for number, prediction in wrong[:MOST_MISREAD]
+    )
+    return (*drawn, *(Misread(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
+
+
+def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
+    """At most ``MOST_MISREAD`` rows: the image, the nearest right one of its truth, and of what it was taken for."""
+    shown = found[:MOST_MISREAD]
+    height = _ROW * len(shown)
+    count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
+    figure = new_figure(
+        HEAD + 0.2 + height, title, f"{count} misread of n = {images} images; each: the focus that a network sees"
+    )
+    axes = axes_at(figure, 0.02, 0.0, WIDTH - 0.04, height + 0.2)
+    axes.set_axis_off()
+    for column, head in enumerate(("misread", "right, same truth", "right, same answer")):
+        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.06, head, FAINT, 7.4, ha="center")
+    for row, item in enumerate(shown):
+        _draw_row(axes, item, row * _ROW)
+    axes.set_xlim(-0.08, WIDTH - 0.12)
+    axes.set_ylim(height, -0.2)
+    return figure
+
+
+def _draw_row(axes: Axes, item: Misread, y: float) -> None:
+    _draw_image(axes, item.prediction, 0, y, FAULT, 1.8)
+    for column, other in ((1, item.like_truth), (2, item.like_answer)):
+        if other is None:
+            _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE / 2, "none", FAINT, 8, ha="center")
+        else:
+            _draw_image(axes, other, column * (_SIDE + _GAP), y, RULE, 0.8)
+    lines = [
+        (f"{item.number}. ✗ wrong", FAULT, True),
+        ("truth:", FAINT, False),
+        (one_line(item.prediction.truth, 40), INK, False),
+        ("answered:", FAINT, False),
+        (one_line(item.prediction.answer or "", 40), INK, False),
+    ]
+    line = 0
+    for text, colour, bold in lines:
+        for part in textwrap.wrap(text, 22, max_lines=2, placeholder="…") or [""]:
+            _write(axes, _TEXT, y + 0.08 + 0.145 * line, part, colour, 8.2, bold=bold)
+            line += 1
+    for column, other in ((1, item.like_truth), (2, item.like_answer)):
+        if other is not None:
+            name = textwrap.shorten(one_line(other.truth, 40), 17, placeholder="…")
+            _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
+
+
+def _draw_image(axes: Axes, prediction: Prediction, x: float, y: float, colour: str, width: float) -> None:
+    pixels = np.repeat(np.asarray(focus_image(prediction.image))[:, :, None], 3, axis=2)
+    axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=colour, linewidth=width))
+
+
+def _write(
+    axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, ha: str = "left", bold: bool = False
+) -> None:
+    axes.text(x, y, drawable(text), color=colour, font=font(size, bold=bold), ha=ha, va="center", parse_math=False)
+
+
+def _greys(prediction: Prediction) -> NDArray[np.float64]:
+    return np.asarray(focus_image(prediction.image), dtype=np.float64)
+
+
+def _nearest(
+    prediction: Prediction, label: str | None, greys: Sequence[tuple[Prediction, NDArray[np.float64]]]
+) -> Prediction | None:
+    own = _greys(prediction)
+    alike = [(prediction, grey) for prediction, grey in greys if prediction.truth == label and grey.shape == own.shape]
+    return min(alike, key=lambda pair: float(((pair[1] - own) ** 2).sum()), default=(None, own))[0]

@@ -1,0 +1,184 @@
+"""The images of a classifier's evaluation: confusion, misread images beside right ones, and robustness curves.
+
+Everything in them was measured by ``models/evaluation.py``; the drawing of tables and curves is shared with grades.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from models.cards import Curve as Counted
+from models.cards import Tally
+from models.evaluation import Answered, Evaluation
+from models.preprocessing import Grey
+from service.reports.plots.confusion import ConfusionTable, draw_table
+from service.reports.plots.curve import AccuracyPanel, draw_curves
+from service.reports.plots.curve import Curve as DrawnCurve
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    RULE,
+    SAID,
+    WIDTH,
+    axes_at,
+    drawable,
+    font,
+    new_figure,
+    png,
+    write,
+)
+
+MOST_MISREAD = 10
+_SIDE, _GAP, _ROW = 0.86, 0.14, 1.02
+_TEXT = 3 * (_SIDE + _GAP) + 0.16
+
+
+def evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
+    """PNG files by name: ``NAME-confusion.png``, ``NAME-misread.png`` and ``NAME-robustness.png``."""
+    name = evaluation.card.name
+    return {
+        f"{name}-confusion.png": png(draw_evaluation_confusion(evaluation)),
+        f"{name}-misread.png": png(draw_misread(evaluation)),
+        f"{name}-robustness.png": png(draw_robustness(evaluation)),
+    }
+
+
+def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
+    """Who was taken for whom."""
+    measured, classes = evaluation.measured, evaluation.card.classes
+    table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
+    return draw_table(table, f"{evaluation.card.name}: who was taken for whom", in_words(measured.accuracy))
+
+
+def in_words(tally: Tally) -> str:
+    """``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 images``."""
+    low, high = tally.interval
+    return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} images"
+
+
+def draw_robustness(evaluation: Evaluation) -> Figure:
+    """One panel for each condition that was varied."""
+    panels: dict[str, list[Counted]] = {}
+    for curve in evaluation.measured.curves:
+        panels.setdefault(curve.varied, []).append(curve)
+    return draw_curves(
+        [
+            AccuracyPanel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
+            for varied, curves in panels.items()
+        ],
+        f"{evaluation.card.name}: how robust it is",
+        "what the left sensor sees when the robot stands beside the spot, or is noisy",
+    )
+
+
+def _curve(counted: Counted) -> DrawnCurve:
+    intervals = [tally.interval for tally in counted.tallies]
+    counts = {tally.n for tally in counted.tallies}
+    return DrawnCurve(
+        label=f"{counted.under}, n = {counts.pop()}" if len(counts) == 1 else counted.under,
+        x=counted.values,
+        share=tuple(tally.share for tally in counted.tallies),
+        low=tuple(low for low, _ in intervals),
+        high=tuple(high for _, high in intervals),
+        n=tuple(tally.n for tally in counted.tallies),
+    )
+
+
+def draw_misread(evaluation: Evaluation) -> Figure:
+    """At most ``MOST_MISREAD`` images that were misread, each beside its nearest neighbours that were read rightly.
+
+    One neighbour is of the class that it shows, one of the class that it was taken for; near is by the mean square
+    of the difference of greys.
+    """
+    misread = [each for each in evaluation.answered if not each.right]
+    chosen = _one_each(misread)[:MOST_MISREAD]
+    count, total = len(misread), len(evaluation.answered)
+    shown = f"{len(chosen)} of {count}" if len(chosen) < count else f"all {count}" if count else "none"
+    title = f"{evaluation.card.name}: what was misread"
+    if not chosen:
+        figure = new_figure(HEAD + 0.3, title, f"none of n = {total} images was misread")
+        write(figure, 0.08, 0.1, "There is nothing to show.", size=9)
+        return figure
+    heads = 0.40
+    height = heads + _ROW * len(chosen)
+    figure = new_figure(HEAD + height + 0.06, title, f"{shown} misread, of n = {total} images; 14 × 14 grey pixels")
+    axes = axes_at(figure, 0.08, 0.06, WIDTH - 0.16, height)
+    axes.set_axis_off()
+    axes.set_xlim(-0.05, WIDTH - 0.21)
+    axes.set_ylim(height, 0)
+    for column, words in enumerate(("misread", "nearest right\nof that class", "nearest right\nof that answer")):
+        _text(axes, column * (_SIDE + _GAP), heads - 0.20, words, FAINT, 7.4, va="center")
+    right = [each for each in evaluation.answered if each.right]
+    for row, each in enumerate(chosen):
+        _draw_row(axes, evaluation.card.classes, each, right, heads + row * _ROW)
+    return figure
+
+
+def _one_each(misread: Sequence[Answered]) -> list[Answered]:
+    """Each kind of mistake once before any comes twice, and no image twice."""
+    seen: set[bytes] = set()
+    kinds: dict[tuple[int, int], int] = {}
+    ranked = []
+    for number, each in enumerate(misread):
+        image = each.grey.tobytes()
+        if image in seen:
+            continue
+        seen.add(image)
+        kind = (each.place.label, each.answer)
+        kinds[kind] = kinds.get(kind, 0) + 1
+        ranked.append((kinds[kind], number, each))
+    return [each for _, _, each in sorted(ranked, key=lambda entry: entry[:2])]
+
+
+def _draw_row(axes: Axes, classes: tuple[str, ...], each: Answered, right: Sequence[Answered], y: float) -> None:
+    shown, read = each.place.label, each.answer
+    for column, (image, colour) in enumerate(
+        ((each, FAULT), (_nearest(each, right, shown), SAID), (_nearest(each, right, read), SAID))
+    ):
+        if image is not None:
+            _draw_grey(axes, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
+    lines = [
+        (f"shows {classes[shown]}", INK, True),
+        (f"✗ read as {classes[read]}", FAULT, True),
+        (_where(each), FAINT, False),
+    ]
+    for number, (text, colour, bold) in enumerate(lines):
+        _text(axes, _TEXT, y + 0.16 + 0.20 * number, text, colour, 9 if bold else 7.4, bold=bold)
+
+
+def _where(each: Answered) -> str:
+    place = each.place
+    sheet = f", sheet {place.sheet}" if place.sheet else ""
+    noise = f", noise {each.noise:g}" if each.noise else ""
+    return f"x {place.pose.x:g}, y {place.pose.y:g} mm{sheet}{noise}"
+
+
+def _nearest(to: Answered, among: Sequence[Answered], label: int) -> Answered | None:
+    same = [each for each in among if each.place.label == label]
+    if not same:
+        return None
+    greys = np.array([each.grey for each in same], np.float64)
+    return same[int(((greys - to.grey) ** 2).mean(axis=(1, 2)).argmin())]
+
+
+def _draw_grey(axes: Axes, grey: Grey, x: float, y: float, colour: str, *, dashed: bool) -> None:
+    axes.imshow(grey, cmap="gray", vmin=0, vmax=255, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest",
+                aspect="auto")  # fmt: skip
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))
+    edge = Rectangle((x - 0.03, y - 0.03), _SIDE + 0.06, _SIDE + 0.06, facecolor="none", edgecolor=colour,
+                     linewidth=1.0 if dashed else 1.8, linestyle=(0, (2.5, 1.5)) if dashed else "-")  # fmt: skip
+    axes.add_patch(edge)
+
+
+def _text(
+    axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, bold: bool = False, va: str = "top"
+) -> None:
+    axes.text(x, y, drawable(text), color=colour, font=font(size, bold=bold), va=va, parse_math=False,
+              linespacing=1.0)  # fmt: skip

@@ -1,0 +1,356 @@
+"""Draws where the robot went: the path over the floor, with start, end, headings, pen, touches and images taken.
+
+The floor is an image that the caller gives; nothing here knows how floors are made.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.markers import MarkerStyle
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
+from matplotlib.path import Path
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from service.grading.grade import TrialResult
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    LEFT,
+    PEN,
+    RIGHT,
+    RULE,
+    WIDTH,
+    axes_at,
+    drawable,
+    font,
+    new_figure,
+    whole,
+    write,
+)  # fmt: skip
+from sim.recorded import robot_of
+from sim.recording import Pose, Recording
+
+Pixels = NDArray[np.uint8]
+
+FLOOR_WIDTH, FLOOR_HEIGHT = 2362.0, 1143.0
+_MARGIN = 90.0  # mm around the path
+_SMALLEST_VIEW = 520.0  # mm, so that a robot that stands still is seen among its surroundings
+_BEYOND = 700.0  # mm outside the floor that are still shown
+_WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is shown on all of it
+_LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
+_OFF_THE_FLOOR = "#a3aab1"
+_DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The part of the world that is drawn, mm."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    @property
+    def width(self) -> float:
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        return self.top - self.bottom
+
+
+def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
+    """The path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
+    recording = trial.recording
+    points = _points(recording)
+    view = _view(recording, points)
+    plot_width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
+    plot_height = plot_width * view.height / view.width
+    handles = _legend(recording, view)
+    located = view.width < FLOOR_WIDTH
+    legend_rows = -(-len(handles) // _columns(located))
+    foot = 0.42 + max(0.62 if located else 0.0, 0.17 * legend_rows + 0.04)
+    figure = new_figure(HEAD + plot_height + foot, title, _subtitle(trial))
+    axes = axes_at(figure, _LEFT_EDGE, foot, plot_width, plot_height)
+    axes.set_xlim(view.left, view.right)
+    axes.set_ylim(view.bottom, view.top)
+    axes.set_facecolor(_OFF_THE_FLOOR)
+    draw_floor(axes, floor, view)
+    _draw_obstacles(axes, recording)
+    _draw_trace(axes, recording, points)
+    _draw_robot(axes, recording.start, recording, dashed=True)
+    _draw_robot(axes, recording.end, recording, dashed=False)
+    per_inch = view.width / plot_width  # mm
+    _draw_times(axes, recording, points, per_inch)
+    _draw_marks(axes, recording, per_inch)
+    axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
+    axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
+    figure.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_columns(located), prop=font(8),
+        frameon=False, handletextpad=0.5, columnspacing=1.4, labelspacing=0.35, borderaxespad=0.3,
+    )  # fmt: skip
+    if _goes_on(points, view):
+        axes.text(0.5, 0.03, "the path goes on outside this image", transform=axes.transAxes, ha="center",
+                  font=font(7.5, bold=True), color=INK, zorder=9,
+                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
+    if located:
+        _draw_locator(figure, floor, view)
+    return figure
+
+
+def _subtitle(trial: TrialResult) -> str:
+    start, end, recording = trial.recording.start, trial.recording.end, trial.recording
+    return (
+        f"trial {trial.index + 1}; from ({whole(start.x)}, {whole(start.y)}) heading {whole(start.heading)}° to "
+        f"({whole(end.x)}, {whole(end.y)}) heading {whole(end.heading)}° in {recording.end_t:.1f} s"
+    )
+
+
+def _points(recording: Recording) -> NDArray[np.float64]:
+    """x, y, heading of the start and of every tick, shape (n + 1, 3); rows that are not finite are left out."""
+    ticks, start = recording.ticks, recording.start
+    rows = np.column_stack((ticks.x, ticks.y, ticks.heading)) if len(ticks) else np.empty((0, 3))
+    rows = np.vstack(([[start.x, start.y, start.heading]], rows))
+    return rows[np.isfinite(rows).all(axis=1)]
+
+
+def _view(recording: Recording, points: NDArray[np.float64]) -> View:
+    reach = robot_of(recording).reach
+    low_x, low_y = (float(value) for value in points[:, :2].min(axis=0))
+    high_x, high_y = (float(value) for value in points[:, :2].max(axis=0))
+    margin = max(_MARGIN, reach + 15)
+    view = View(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
+    if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
+        view = View(
+            min(0.0, low_x - 60), min(0.0, low_y - 60), max(FLOOR_WIDTH, high_x + 60), max(FLOOR_HEIGHT, high_y + 60)
+        )
+    left, right = max(view.left, -_BEYOND), min(view.right, FLOOR_WIDTH + _BEYOND)
+    bottom, top = max(view.bottom, -_BEYOND), min(view.top, FLOOR_HEIGHT + _BEYOND)
+    return _shaped(View(left, bottom, right, top))
+
+
+def _shaped(view: View) -> View:
+    """``view`` widened to a shape between square and the floor's own."""
+    width, height = max(view.width, _SMALLEST_VIEW), max(view.height, _SMALLEST_VIEW / 1.6)
+    width = max(width, height * 1.1)
+    height = max(height, width * FLOOR_HEIGHT / FLOOR_WIDTH)
+    x, y = (view.left + view.right) / 2, (view.bottom + view.top) / 2
+    return View(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+
+
+def draw_floor(axes: Axes, floor: Pixels | None, view: View) -> None:
+    """The part of the floor that is in ``view``, lifted towards white; without a floor a white one."""
+    if floor is None:
+        axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
+        return
+    rows, columns = floor.shape[:2]
+    left, right = max(0, math.floor(view.left)), min(columns, math.ceil(view.right))
+    top, bottom = max(0, math.floor(rows - view.top)), min(rows, math.ceil(rows - view.bottom))
+    if left >= right or top >= bottom:
+        return
+    step = 2 if right - left > 1300 else 1
+    part = floor[top:bottom, left:right].astype(np.float32)
+    part = part[: part.shape[0] // step * step, : part.shape[1] // step * step]
+    part = part.reshape(part.shape[0] // step, step, part.shape[1] // step, step, 3).mean(axis=(1, 3))
+    # Lifted towards white, so that a path over black stays visible and print saves ink.
+    faded = np.rint(72 + part * (183 / 255)).astype(np.uint8)
+    axes.imshow(
+        faded,
+        extent=(left, left + faded.shape[1] * step, rows - top - faded.shape[0] * step, rows - top),
+        interpolation="nearest",
+        aspect="auto",
+        zorder=0,
+    )
+
+
+def _draw_obstacles(axes: Axes, recording: Recording) -> None:
+    for x, y, width, height in recording.obstacles:
+        axes.add_patch(
+            Rectangle((x, y), width, height, facecolor="#c8cdd2", edgecolor=INK, hatch="////", linewidth=0.9)
+        )
+
+
+def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64]) -> None:
+    for first, last in _pen_strokes(recording, len(points)):
+        axes.plot(points[first:last, 0], points[first:last, 1], color=PEN, linewidth=5.5, solid_capstyle="round")
+    axes.plot(points[:, 0], points[:, 1], color="white", linewidth=3.2, solid_capstyle="round")
+    axes.plot(points[:, 0], points[:, 1], color=LEFT, linewidth=1.5, solid_capstyle="round")
+    for index in _evenly(points, 10):
+        x, y, heading = points[index]
+        axes.plot(
+            [x], [y], linestyle="none", marker=MarkerStyle(_DART, transform=Affine2D().rotate_deg(heading)),
+            markersize=8, color=LEFT, markeredgecolor="white", markeredgewidth=0.7, zorder=4,
+        )  # fmt: skip
+
+
+def _pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
+    """Row ranges of the path that were driven with the pen down."""
+    strokes: list[tuple[int, int]] = []
+    since: int | None = None
+    for tick, down in (*recording.pen, (count, False)):
+        if down and since is None:
+            since = tick
+        elif not down and since is not None:
+            strokes.append((max(0, since), min(count, tick + 1)))
+            since = None
+    return [(first, last) for first, last in strokes if last - first > 1]
+
+
+def _evenly(points: NDArray[np.float64], wanted: int) -> list[int]:
+    """Rows that are evenly far apart in distance and turning, without the first and last."""
+    steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])) + 0.8 * np.abs(np.diff(points[:, 2]))
+    travelled = np.concatenate(([0.0], np.cumsum(steps)))
+    count = min(wanted, int(travelled[-1] // 60))
+    if count < 1:
+        return []
+    goals = travelled[-1] * (np.arange(count) + 0.5) / count
+    return sorted({int(row) for row in np.searchsorted(travelled, goals)} - {0, len(points) - 1})
+
+
+def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -> None:
+    if not math.isfinite(pose.x + pose.y + pose.heading):
+        return
+    robot = robot_of(recording)
+    nose = robot.front
+    outline = [
+        (-robot.half_width, robot.back), (robot.half_width, robot.back), (robot.half_width, nose * 0.55),
+        (robot.half_width * 0.6, nose), (-robot.half_width * 0.6, nose), (-robot.half_width, nose * 0.55),
+    ]  # fmt: skip
+    axes.add_patch(
+        Polygon(
+            [_placed(pose, x, y) for x, y in outline],
+            closed=True,
+            facecolor=(1, 1, 1, 0.12),
+            edgecolor=INK,
+            linewidth=0.9,
+            linestyle=(0, (3, 2)) if dashed else "solid",
+            zorder=2.5,
+        )
+    )
+    for sensor, colour in ((robot.left_light, LEFT), (robot.right_light, RIGHT)):
+        centre = _placed(pose, sensor.x, sensor.y)
+        axes.add_patch(
+            Circle(centre, sensor.diameter / 2, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=2.6)
+        )
+
+
+def _placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """World coordinates of a point of the robot (x right, y forward, mm)."""
+    angle = math.radians(pose.heading - 90)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
+
+
+def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float) -> None:
+    """Small times along the path, where the robot had moved on far enough to read them apart."""
+    ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
+    taken = [end for end in ends if math.isfinite(sum(end))]
+    step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
+    for second in range(step, math.ceil(recording.end_t), step):
+        row = second * 30
+        if row >= len(points):
+            break
+        x, y = float(points[row, 0]), float(points[row, 1])
+        if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
+            continue
+        taken.append((x, y))
+        angle = math.radians(float(points[row, 2]) - 90)
+        axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=LEFT, markeredgewidth=0.9, zorder=5)
+        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6)
+
+
+def _draw_marks(axes: Axes, recording: Recording, per_inch: float) -> None:
+    robot = robot_of(recording)
+    for touch in recording.touches[:40]:
+        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
+        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=8, color=FAULT, markeredgewidth=2, zorder=6)
+    placed: dict[tuple[int, int], list[int]] = {}
+    for count, image in enumerate(recording.images, start=1):
+        x, y = _placed(image.pose, robot.left_light.x, robot.left_light.y)
+        placed.setdefault((round(x / 8), round(y / 8)), []).append(count)
+        corner = (x - image.side / 2, y - image.side / 2)
+        for colour, width in (("white", 2.4), (INK, 1.2)):
+            axes.add_patch(
+                Rectangle(corner, image.side, image.side, facecolor="none", edgecolor=colour, linewidth=width, zorder=6)
+            )
+    for (column, row), counts in placed.items():
+        text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+        _tag(axes, column * 8, row * 8 + 10 + 0.10 * per_inch, text, 7.8)
+    start, end = recording.start, recording.end
+    axes.plot(
+        [start.x], [start.y], "o", markersize=7, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=7
+    )
+    axes.plot([end.x], [end.y], "o", markersize=5.5, color=INK, markeredgecolor="white", markeredgewidth=0.8, zorder=8)
+
+
+def _tag(axes: Axes, x: float, y: float, text: str, size: float) -> None:
+    axes.text(
+        x, y, drawable(text), font=font(size), color=INK, ha="center", va="center", parse_math=False, zorder=9,
+        clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
+    )  # fmt: skip
+
+
+def _goes_on(points: NDArray[np.float64], view: View) -> bool:
+    x, y = points[:, 0], points[:, 1]
+    return bool(((x < view.left) | (x > view.right) | (y < view.bottom) | (y > view.top)).any())
+
+
+def _columns(located: bool) -> int:
+    return 2 if located else 3
+
+
+def _legend(recording: Recording, view: View) -> list[Artist]:
+    """A handle for every kind of thing that is in the image."""
+    handles: list[Artist] = [
+        Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
+               markeredgewidth=1.6, label="start"),
+        Line2D([], [], marker="o", linestyle="none", markersize=5.5, color=INK, label="end"),
+        Line2D([], [], color=LEFT, linewidth=1.5, marker=MarkerStyle(_DART), markersize=8,
+               markeredgecolor="white", label="path and heading"),
+    ]  # fmt: skip
+    if any(down for _, down in recording.pen):
+        handles.append(Line2D([], [], color=PEN, linewidth=5, label="pen"))
+    if recording.images:
+        handles.append(
+            Line2D([], [], marker="s", linestyle="none", markersize=6.5, color="none", markeredgecolor=INK,
+                   markeredgewidth=1.2, label="image sent")
+        )  # fmt: skip
+    if recording.touches:
+        handles.append(
+            Line2D([], [], marker="x", linestyle="none", markersize=7, color=FAULT, markeredgewidth=2, label="touch")
+        )
+    if recording.obstacles:
+        handles.append(Patch(facecolor="#c8cdd2", edgecolor=INK, hatch="////", label="obstacle"))
+    if min(view.left, view.bottom) < -30 or view.right > FLOOR_WIDTH + 30 or view.top > FLOOR_HEIGHT + 30:
+        handles.append(Patch(facecolor=_OFF_THE_FLOOR, label="off the floor"))
+    return handles
+
+
+def _draw_locator(figure: Figure, floor: Pixels | None, view: View) -> None:
+    width = 1.12
+    height = width * FLOOR_HEIGHT / FLOOR_WIDTH
+    axes = axes_at(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)
+    axes.set_xlim(0, FLOOR_WIDTH)
+    axes.set_ylim(0, FLOOR_HEIGHT)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    if floor is not None:
+        small = floor[::6, ::6].astype(np.float32)
+        axes.imshow(
+            np.rint(72 + small * (183 / 255)).astype(np.uint8), extent=(0, FLOOR_WIDTH, 0, FLOOR_HEIGHT), aspect="auto"
+        )
+    axes.add_patch(
+        Rectangle((view.left, view.bottom), view.width, view.height, facecolor="none", edgecolor=FAULT, linewidth=1.4)
+    )
+    write(figure, WIDTH - _RIGHT_EDGE - width - 0.06, 0.10, "whole\nfloor", size=7.6, colour=FAINT, ha="right")

@@ -1,0 +1,110 @@
+"""Draws the images that a light sensor sent: all of it, the focus that a network is shown, and what was answered.
+
+Whether an answer is right was decided when the work was marked; here it is only shown, by sign and word.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+from PIL import Image as Pixels
+
+from service.grading.grade import Prediction
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.readable import one_line
+from sim.recording import Image
+
+MOST_PREDICTIONS = 12
+#: The part of the 20 x 20 image that lies wholly inside the round sensor: left, upper, right, lower.
+FOCUS = (3, 3, 17, 17)
+_CARD_WIDTH, _CARD_HEIGHT = 2.56, 1.77
+_SIDE = 1.13  # inches of an image
+_COLUMNS = 2
+
+
+def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
+    """Cards of at most ``MOST_PREDICTIONS`` images, wrong answers first where not all fit."""
+    shown = chosen_predictions(predictions)
+    rows = -(-len(shown) // _COLUMNS)
+    height = rows * _CARD_HEIGHT
+    figure = new_figure(HEAD + height + 0.06, title, _subtitle(predictions, shown))
+    axes = axes_at(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
+    axes.set_axis_off()
+    for place, number in enumerate(shown):
+        x, y = place % _COLUMNS * _CARD_WIDTH, place // _COLUMNS * _CARD_HEIGHT
+        _draw_card(axes, predictions[number], number + 1, x, y)
+    axes.set_xlim(-0.08, WIDTH - 0.12)
+    axes.set_ylim(height, -0.06)
+    return figure
+
+
+def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
+    """Indices of the images to show, ascending; if there are too many, all wrong ones come first."""
+    order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
+    return tuple(sorted(order[:MOST_PREDICTIONS]))
+
+
+def is_right(prediction: Prediction) -> bool:
+    """Whether the answer was the truth."""
+    return prediction.answer is not None and prediction.answer == prediction.truth
+
+
+def sensor_image(image: Image) -> Pixels.Image:
+    """What the left sensor sent, as an RGB image of ``image.side`` squared."""
+    return Pixels.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
+
+
+def focus_image(image: Image) -> Pixels.Image:
+    """The greyscale crop that a network is shown; sensors of another size than 20 are shown whole."""
+    whole = sensor_image(image).convert("L")
+    return whole.crop(FOCUS) if image.side == 20 else whole
+
+
+def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
+    wrong = sum(not is_right(prediction) for prediction in predictions)
+    count = (
+        f"{len(predictions)} images" if len(shown) == len(predictions) else f"{len(shown)} of {len(predictions)} images"
+    )
+    return f"{count}, {wrong} answered wrongly; each: all 20×20, then the 14×14 focus"
+
+
+def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
+    right = is_right(prediction)
+    whole, focus = np.asarray(sensor_image(prediction.image)), np.asarray(focus_image(prediction.image))
+    _draw_image(axes, whole, x, y)
+    _draw_image(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
+    if prediction.image.side == 20:
+        pixel = _SIDE / 20
+        axes.add_patch(
+            Rectangle((x + FOCUS[0] * pixel, y + FOCUS[1] * pixel), 14 * pixel, 14 * pixel, facecolor="none",
+                      edgecolor=INK, linewidth=0.9, linestyle=(0, (2.5, 1.5)))
+        )  # fmt: skip
+    colour = SAID if right else FAULT
+    if not right:
+        axes.add_patch(
+            Rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, facecolor="none", edgecolor=colour,
+                      linewidth=1.8)
+        )  # fmt: skip
+    sign, word = ("✓", "right") if right else ("✗", "wrong")
+    answer = "no answer" if prediction.answer is None else one_line(prediction.answer, 30)
+    lines = [
+        (f"{number}. {sign} {word}", colour, True),
+        (f"answered: {answer}" if prediction.answer is not None else answer, INK, False),
+        (f"truth: {one_line(prediction.truth, 30)}", FAINT if right else INK, False),
+    ]
+    for row, (text, shade, bold) in enumerate(lines):
+        axes.text(
+            x, y + _SIDE + 0.08 + 0.142 * row, drawable(textwrap.shorten(text, 38, placeholder="…")), color=shade,
+            font=font(8.3, bold=bold), va="top", parse_math=False,
+        )  # fmt: skip
+
+
+def _draw_image(axes: Axes, pixels: NDArray[np.uint8], x: float, y: float) -> None:
+    axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))

@@ -1,0 +1,197 @@
+"""Draws what the robot's sensors read over time, with what it said and sent above.
+
+It shows the recorded readings of every tick, whether or not the program asked for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from service.grading.grade import TrialResult
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    LEFT,
+    RIGHT,
+    RULE,
+    SAID,
+    WIDTH,
+    axes_at,
+    font,
+    new_figure,
+    set_tick_type,
+    write,
+)  # fmt: skip
+from sim.recorded import seconds_at
+from sim.recording import Recording
+
+_LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
+_GAP = 0.20  # between panels, room for the panel's own title
+_ROW = 0.15  # of a strip of events
+_MOST_MARKS = 400  # of one kind; more would be a solid bar
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingCurve:
+    """One reading over time; the second of a panel is drawn dashed."""
+
+    label: str
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingPanel:
+    """Curves that share a unit. ``limits`` None fits them."""
+
+    title: str
+    height: float
+    curves: tuple[ReadingCurve, ...]
+    limits: tuple[float, float] | None = None
+    ticks: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """Moments of one kind, drawn as marks on a line of their own."""
+
+    label: str
+    times: tuple[float, ...]
+    marker: str
+    colour: str
+
+
+def draw_sensors(trial: TrialResult, title: str) -> Figure:
+    """Reflected light (mean red, 0..255), distance (cm), gyro and wheel encoders (degrees) of ``trial``."""
+    recording = trial.recording
+    panels, strips = panels_of(recording), strips_of(recording)
+    strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
+    body = sum(panel.height + _GAP for panel in panels)
+    figure = new_figure(HEAD + strip_height + body + 0.36, title, _subtitle(trial))
+    end = max(recording.end_t, seconds_at(len(recording.ticks)), 0.1)
+    top = float(figure.get_size_inches()[1]) - HEAD
+    width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
+    if strips:
+        top -= strip_height
+        _draw_strips(axes_at(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
+    for number, panel in enumerate(panels):
+        top -= panel.height + _GAP
+        axes = axes_at(figure, _LEFT_EDGE, top, width, panel.height)
+        write(figure, _LEFT_EDGE, top + panel.height + 0.045, panel.title, size=8, bold=True)
+        _draw_panel(axes, panel, recording.ticks.t, end)
+        if len(panel.curves) > 1:
+            _name_curves(figure, panel, top + panel.height + 0.045)
+        if number < len(panels) - 1:
+            axes.tick_params(labelbottom=False)
+        else:
+            axes.set_xlabel("simulated time, s", font=font(8.5), labelpad=1)
+    return figure
+
+
+def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
+    """The panels that ``draw_sensors`` shows, top to bottom."""
+    ticks = recording.ticks
+    return (
+        ReadingPanel(
+            "Reflected light, red 0–255",
+            1.25,
+            (ReadingCurve("left", ticks.left_rgb[:, 0]), ReadingCurve("right", ticks.right_rgb[:, 0])),
+            (-10, 265),
+            (0, 64, 128, 192, 255),
+        ),
+        ReadingPanel(
+            "Ultrasonic, cm", 0.62, (ReadingCurve("distance", ticks.ultrasonic / 10),), (-12, 267), (0, 100, 200)
+        ),
+        ReadingPanel("Gyro, degrees clockwise", 0.62, (ReadingCurve("angle", ticks.gyro),)),
+        ReadingPanel(
+            "Wheel encoders, degrees",
+            0.75,
+            (ReadingCurve("left", ticks.left_position), ReadingCurve("right", ticks.right_position)),
+        ),
+    )
+
+
+def strips_of(recording: Recording) -> tuple[Strip, ...]:
+    """The kinds of events that happened at all, with their times in seconds."""
+    answers = [m for m in recording.messages if m.sender == "responder"]
+    strips = (
+        Strip("sent", tuple(m.t for m in recording.messages if m.sender == "robot"), ">", LEFT),
+        Strip("answer", tuple(m.delivered for m in answers if m.delivered is not None), "<", RIGHT),
+        Strip("said", tuple(line.t for line in recording.spoken), "o", SAID),
+        Strip("touch", tuple(touch.t for touch in recording.touches), "D", FAULT),
+        Strip("fault", tuple(fault.t for fault in recording.faults), "X", FAULT),
+    )
+    return tuple(strip for strip in strips if strip.times)
+
+
+def _subtitle(trial: TrialResult) -> str:
+    noise = []
+    if trial.light_noise:
+        noise.append(f"light noise {trial.light_noise:g}")
+    if trial.motor_noise:
+        noise.append(f"motor noise {trial.motor_noise:g}")
+    return f"trial {trial.index + 1}; {', '.join(noise) or 'no noise'}; one reading every 1/30 s"
+
+
+def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
+    axes.set_xlim(0, end)
+    axes.set_ylim(-0.6, len(strips) - 0.4)
+    axes.set_xticks([])
+    axes.set_yticks(range(len(strips)), [strip.label for strip in reversed(strips)])
+    set_tick_type(axes, 7.5)
+    axes.tick_params(axis="y", length=0)
+    for row, strip in enumerate(reversed(strips)):
+        axes.axhline(row, color=RULE, linewidth=0.6, zorder=0)
+        times = strip.times[:_MOST_MARKS]
+        axes.plot(times, [row] * len(times), strip.marker, color=strip.colour, markersize=4.5, markeredgewidth=0,
+                  clip_on=False)  # fmt: skip
+    for side in axes.spines.values():
+        side.set_visible(False)
+
+
+def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end: float) -> None:
+    axes.set_xlim(0, end)
+    for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
+        axes.plot(times, curve.values, color=colour, linewidth=width, dashes=dashes or (None, None))
+    limits = panel.limits or _fitted(panel)
+    axes.set_ylim(*limits)
+    if panel.ticks:
+        axes.set_yticks(panel.ticks)
+    else:
+        axes.locator_params(axis="y", nbins=4)
+    axes.grid(axis="both", color=RULE, linewidth=0.5, alpha=0.7)
+    axes.spines["top"].set_visible(False)
+    axes.spines["right"].set_visible(False)
+    if not len(times):
+        axes.text(0.5, 0.5, "no time passed", transform=axes.transAxes, ha="center", va="center", color=FAINT,
+                  font=font(8))  # fmt: skip
+
+
+def _fitted(panel: ReadingPanel) -> tuple[float, float]:
+    values = np.concatenate([curve.values for curve in panel.curves])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    if high - low < 10:
+        low, high = (low + high) / 2 - 5, (low + high) / 2 + 5
+    room = 0.08 * (high - low)
+    return low - room, high + room
+
+
+def _name_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
+    right = WIDTH - _RIGHT_EDGE
+    width, height = figure.get_size_inches()
+    for curve, text_x, colour in zip(panel.curves, (right - 0.86, right - 0.30), (LEFT, RIGHT), strict=True):
+        write(figure, text_x, y, curve.label, size=8, colour=INK)
+        ends = [(text_x - 0.25) / width, (text_x - 0.05) / width]
+        line = Line2D(ends, [(y + 0.045) / height] * 2, color=colour, linewidth=1.5)
+        if colour == RIGHT:
+            line.set_dashes((2.6, 1.0))
+        figure.add_artist(line)

@@ -1,0 +1,188 @@
+"""The conversation of a trial as steps between parties, the way a sequence diagram tells it.
+
+It decides what is told and what is left out; ``conversation.py`` draws it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from service.reports.readable import message_words, one_line
+from sim.recording import Call, Message, Recording
+
+#: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
+PARTIES = ("robot", "responder", "parser", "agent", "logger", "network")
+MOST_EXCHANGES = 6
+MOST_STEPS = 40
+#: Of one message, however often it makes the responder call.
+MOST_CALL_STEPS = 60
+_KNOWN: Mapping[str, str] = MappingProxyType({party: party for party in PARTIES})
+
+Kind = Literal["message", "call", "return", "lost", "silence"]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One arrow: ``t`` (seconds) is when it started, None inside the responder, where no time passes."""
+
+    kind: Kind
+    source: str
+    target: str
+    label: str
+    t: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """So many exchanges, or steps inside an exchange, are left out here."""
+
+    count: int
+    what: Literal["exchange", "step"] = "exchange"
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceDiagram:
+    """``parties`` are those that take part, robot and responder always. ``total`` counts all exchanges."""
+
+    parties: tuple[str, ...]
+    steps: tuple[Step | Gap, ...]
+    shown: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Exchange:
+    """A text of the robot's with its answers, or an answer to nothing."""
+
+    sent: int | None
+    answers: tuple[int, ...]
+
+
+def conversation(
+    recording: Recording, most_exchanges: int = MOST_EXCHANGES, most_steps: int = MOST_STEPS
+) -> SequenceDiagram:
+    """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
+
+    Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
+    """
+    exchanges = _exchanges(recording.messages)
+    kept = _chosen(recording, exchanges, most_exchanges, most_steps)
+    timed: list[tuple[float, int, list[Step | Gap]]] = []
+    skipped = 0
+    for number, exchange in enumerate(exchanges):
+        if number not in kept:
+            skipped += 1
+            continue
+        if skipped:
+            timed.append((_begin(recording, exchange), number, [Gap(skipped)]))
+            skipped = 0
+        timed += [(t, number, list(steps)) for t, steps in _told(recording, exchange)]
+    steps = [step for _, _, group in sorted(timed, key=lambda item: item[0]) for step in group]
+    if skipped:
+        steps.append(Gap(skipped))
+    named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
+    parties = tuple(party for party in PARTIES if party in named or party in ("robot", "responder"))
+    return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
+
+
+def troubled(message: Message) -> bool:
+    """Whether a message was lost, never arrived, or could not be read."""
+    return message.delivered is None or bool(message.note)
+
+
+def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
+    answers: dict[int, list[int]] = {}
+    for index, message in enumerate(messages):
+        to = message.reply_to
+        if message.sender == "responder" and to is not None and 0 <= to < len(messages):
+            answers.setdefault(to, []).append(index)
+    answered = {answer for found in answers.values() for answer in found}
+    return [
+        _Exchange(index, tuple(answers.get(index, ()))) if message.sender == "robot" else _Exchange(None, (index,))
+        for index, message in enumerate(messages)
+        if index not in answered
+    ]
+
+
+def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
+    wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(recording, exchange)]
+    half = most_exchanges - most_exchanges // 2
+    order = dict.fromkeys([*range(min(half, len(exchanges))), *wrong, *range(len(exchanges))])
+    kept: set[int] = set()
+    steps = 0
+    for number in list(order)[:most_exchanges]:
+        steps += sum(len(told) for _, told in _told(recording, exchanges[number]))
+        if kept and steps > most_steps:
+            break
+        kept.add(number)
+    return kept
+
+
+def _went_wrong(recording: Recording, exchange: _Exchange) -> bool:
+    indices = [*exchange.answers] if exchange.sent is None else [exchange.sent, *exchange.answers]
+    return not exchange.answers or any(troubled(recording.messages[index]) for index in indices)
+
+
+def _begin(recording: Recording, exchange: _Exchange) -> float:
+    return recording.messages[exchange.answers[0] if exchange.sent is None else exchange.sent].t
+
+
+def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
+    """Groups of steps with the time at which each group is told."""
+    if exchange.sent is not None:
+        message = recording.messages[exchange.sent]
+        steps: list[Step | Gap] = [_crossing(message)]
+        if message.delivered is not None:
+            made = list(_calls(call for call in recording.calls if call.message == exchange.sent))
+            steps += made[:MOST_CALL_STEPS]
+            if len(made) > MOST_CALL_STEPS:
+                steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
+            if not exchange.answers:
+                steps.append(Step("silence", "responder", "robot", "– no answer –"))
+        yield message.t, steps
+    for index in exchange.answers:
+        answer = recording.messages[index]
+        yield (answer.t if answer.delivered is None else answer.delivered), [_crossing(answer)]
+
+
+def _crossing(message: Message) -> Step:
+    source, target = ("robot", "responder") if message.sender == "robot" else ("responder", "robot")
+    label, note = message_words(message.text, 90), one_line(message.note, 30)
+    if message.delivered is None:
+        return Step("lost", source, target, label, message.t, note or "not delivered")
+    shown_at = message.t if message.sender == "robot" else message.delivered
+    return Step("message", source, target, label, shown_at, note)
+
+
+def _calls(calls: Iterable[Call]) -> Iterator[Step]:
+    """Each call, then what was called inside it, then what it returned; ``calls`` come as they ended."""
+    ended: list[tuple[int, list[Step]]] = []  # depth and steps of calls whose caller has not ended yet
+    for call in calls:
+        inner: list[Step] = []
+        while ended and ended[-1][0] > call.depth:
+            inner = ended.pop()[1] + inner
+        ended.append((call.depth, [_made(call), *inner, *_returned(call)]))
+    for _, steps in ended:
+        yield from steps
+
+
+def _made(call: Call) -> Step:
+    name = "" if call.callee in _KNOWN else f"{one_line(call.callee, 20)}: "
+    return Step("call", _party(call.caller, "responder"), _party(call.callee), name + _argument(call))
+
+
+def _argument(call: Call) -> str:
+    return "'IMG_DATA::{left, right}'" if call.argument[1:].startswith("IMG_DATA::{") else one_line(call.argument, 60)
+
+
+def _returned(call: Call) -> Iterator[Step]:
+    if call.result != "None":  # a logger returns nothing
+        yield Step("return", _party(call.callee), _party(call.caller, "responder"), one_line(call.result, 60))
+
+
+def _party(name: str, otherwise: str = "network") -> str:
+    return _KNOWN.get(name, otherwise)

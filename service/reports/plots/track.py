@@ -1,0 +1,210 @@
+"""Draws recognition along a track: where each image was taken on the floor and whether it was named rightly, and the
+share that was right along the way.
+
+What is right was decided when the work was marked; the floor is an image that the caller gives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from models.intervals import wilson
+from service.grading.grade import Prediction, TrialResult
+from service.grading.judging.geometry import part_at
+from service.reports.plots.curve import Curve, draw_curve
+from service.reports.plots.path import Pixels, View, draw_floor
+from service.reports.plots.predictions import is_right
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    LEFT,
+    RULE,
+    SAID,
+    WIDTH,
+    axes_at,
+    font,
+    new_figure,
+    set_tick_type,
+    write,
+)
+from sim.recording import Recording
+
+_LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.56
+_ALONG, _GAP = 1.15, 0.62  # inches: the curve, and what is between it and the floor
+_MOST_BINS = 12
+_LEAST_WAY = 60.0  # mm that images must be apart for a track
+_MARGIN = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One image: where the left sensor was (mm), how far the robot had driven (mm), and what came of it."""
+
+    x: float
+    y: float
+    way: float
+    heading: float  # degrees
+    right: bool
+    answered: bool
+
+
+def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
+    """The trials, by index, in which images were taken at places far enough apart to speak of a track."""
+    found = []
+    for index in dict.fromkeys(prediction.trial for prediction in predictions):
+        places = [part_at(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
+        if len(places) > 2 and max(math.dist(places[0], place) for place in places) >= _LEAST_WAY:
+            found.append(index)
+    return tuple(found)
+
+
+def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
+    """The images of one trial, in the order in which they were sent."""
+    recording = trials[index].recording
+    way = _way_driven(recording)
+    return tuple(
+        Taken(
+            *part_at(recording, "left", prediction.image.pose),
+            way[min(max(prediction.image.tick, 0), len(way) - 1)],
+            prediction.image.pose.heading,
+            is_right(prediction),
+            prediction.answer is not None,
+        )
+        for prediction in predictions
+        if prediction.trial == index
+    )
+
+
+def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> int:
+    """Of the trials with a track the one with the smallest share of right images, the first of equals."""
+
+    def share_right(index: int) -> float:
+        own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
+        return sum(own) / len(own)
+
+    return min(tracks(predictions, trials), key=share_right)
+
+
+def draw_track(
+    predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Pixels | None
+) -> Figure:
+    """The worst trial's images over its floor, and the share right along the way in all trials with a track."""
+    own = tracks(predictions, trials)
+    by_trial = {index: taken(predictions, trials, index) for index in own}
+    worst = worst_track(predictions, trials)
+    images = [item for items in by_trial.values() for item in items]
+    right = sum(item.right for item in images)
+    view = _view(by_trial[worst])
+    width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
+    height = width * view.height / view.width
+    trial = trials[worst]
+    what = f"{right} of n = {len(images)} images right, {len(own)} trials"
+    where = f"floor: {trial.scenario}, trial {trial.index + 1}"
+    figure = new_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{what}; {where}")
+    top = axes_at(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
+    draw_floor(top, floor, view)
+    top.set_xlim(view.left, view.right)
+    top.set_ylim(view.bottom, view.top)
+    _draw_images(top, by_trial[worst], 0.045 * view.width)
+    top.set_xlabel("x, mm", font=font(8), labelpad=1)
+    top.set_ylabel("y, mm", font=font(8), labelpad=1)
+    _draw_along(axes_at(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
+    write(figure, 0.08, 0.09, "beside each place: ○ right  ✗ wrong  □ no answer;   band: 95 % interval, above it: n",
+          size=7.2, colour=FAINT)  # fmt: skip
+    return figure
+
+
+def along_the_way(images: Sequence[Taken]) -> Curve:
+    """The share right in at most twelve stretches of equal length, by the middles of the stretches."""
+    first, last = min(item.way for item in images), max(item.way for item in images)
+    length = max((last - first) / _MOST_BINS, 1.0)
+    bins: dict[int, list[bool]] = {}
+    for item in images:
+        bins.setdefault(min(int((item.way - first) / length), _MOST_BINS - 1), []).append(item.right)
+    places = sorted(bins)
+    counts = [(sum(bins[place]), len(bins[place])) for place in places]
+    intervals = [wilson(*pair) for pair in counts]
+    return Curve(
+        "",
+        tuple(first + (place + 0.5) * length for place in places),
+        tuple(right / count for right, count in counts),
+        tuple(low for low, _ in intervals),
+        tuple(high for _, high in intervals),
+        tuple(count for _, count in counts),
+    )
+
+
+def _draw_images(axes: Axes, images: Sequence[Taken], beside: float) -> None:
+    """The marks stand ``beside`` mm to the robot's left of where the sensor was, so that the floor can be seen."""
+    axes.plot(
+        [item.x for item in images], [item.y for item in images], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
+    )
+    shown = []
+    for item in images:
+        angle = math.radians(item.heading + 90)
+        x, y = item.x + beside * math.cos(angle), item.y + beside * math.sin(angle)
+        axes.plot([item.x, x], [item.y, y], color=FAINT, linewidth=0.5, zorder=3)
+        shown.append((x, y, *_mark(item)))
+    for x, y, marker, _ in shown:
+        _draw_mark(axes, x, y, marker, "white", 5.4, 2.2)
+    for x, y, marker, colour in shown:
+        _draw_mark(axes, x, y, marker, colour, 4.4, 1.2)
+
+
+def _mark(item: Taken) -> tuple[str, str]:
+    """Marker and colour: they tell the same, so that either will do."""
+    if item.right:
+        return "o", SAID
+    return ("x", FAULT) if item.answered else ("s", INK)
+
+
+def _draw_mark(axes: Axes, x: float, y: float, marker: str, colour: str, size: float, width: float) -> None:
+    axes.plot(
+        [x], [y], marker=marker, markersize=size, markerfacecolor="none", markeredgecolor=colour,
+        markeredgewidth=width, linestyle="none", zorder=5,
+    )  # fmt: skip
+
+
+def _draw_along(axes: Axes, images: Sequence[Taken]) -> None:
+    curve = along_the_way(images)
+    axes.set_ylim(-0.04, 1.16)
+    axes.set_yticks([0, 0.5, 1])
+    axes.grid(axis="y", color=RULE, linewidth=0.5)
+    axes.set_axisbelow(True)
+    draw_curve(axes, curve)
+    for x, count in zip(curve.x, curve.n, strict=True):
+        axes.text(x, 1.07, str(count), font=font(6.8), color=FAINT, ha="center", va="bottom", clip_on=False)
+    axes.set_xlabel("way driven, mm", font=font(8), labelpad=1)
+    axes.set_ylabel("share right", font=font(8), labelpad=3)
+    set_tick_type(axes)
+
+
+def _way_driven(recording: Recording) -> list[float]:
+    """How far the middle of the axle has gone at the start and after each tick, mm."""
+    points = [(recording.start.x, recording.start.y), *zip(recording.ticks.x, recording.ticks.y, strict=True)]
+    way = [0.0]
+    for before, after in pairwise(points):
+        step = math.dist(before, after)
+        way.append(way[-1] + (step if math.isfinite(step) else 0.0))
+    return way
+
+
+def _view(images: Sequence[Taken]) -> View:
+    xs, ys = [item.x for item in images], [item.y for item in images]
+    left, right, bottom, top = min(xs) - _MARGIN, max(xs) + _MARGIN, min(ys) - _MARGIN, max(ys) + _MARGIN
+    width, height = right - left, top - bottom
+    if height < 0.22 * width:
+        middle, height = (bottom + top) / 2, 0.22 * width
+        bottom, top = middle - height / 2, middle + height / 2
+    if width < 0.9 * height:
+        middle, width = (left + right) / 2, 0.9 * height
+        left, right = middle - width / 2, middle + width / 2
+    return View(left, bottom, right, top)

@@ -1,0 +1,132 @@
+"""What a reader may see of a grade, decided once: staff, a student, or a gradebook that students look into.
+
+It hides, it never re-marks: what is left keeps the marks and messages it had. Nothing is rendered here, and what
+renders a view asks no more who reads it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from decimal import Decimal
+
+from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
+from service.grading.judging.words import shown_words
+from sim.recording import Verdict
+
+#: What a student sees before anything is published.
+BEFORE_PUBLICATION = frozenset({"visible"})
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A grade as one reader may see it: ``grade`` is what is left of it, ``withheld`` says that it is not all."""
+
+    grade: Grade
+    staff: bool
+    withheld: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GradebookView:
+    """A grade for a gradebook: ``entry`` has every criterion, told as to whoever may see it, and no trials.
+
+    ``shown`` is what the student sees at once.
+    """
+
+    entry: Grade
+    shown: Grade
+
+
+def staff_view(grade: Grade) -> View:
+    """All of it."""
+    return View(grade, staff=True, withheld=False)
+
+
+def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> View:
+    """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
+
+    Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
+    the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
+    then those of the criteria shown.
+    """
+    kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
+    new_index = {old: new for new, old in enumerate(kept)}
+    left = replace(
+        grade,
+        criteria=tuple(
+            replace(_without_hidden_trials(result, new_index), for_staff="", unjudged="")
+            for result in grade.criteria
+            if result.visibility in released
+        ),
+        trials=tuple(grade.trials[index] for index in kept),
+        cost=grade.cost and replace(grade.cost, spent=None),
+    )
+    withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
+    return View(left, staff=False, withheld=withheld)
+
+
+def gradebook_view(grade: Grade) -> GradebookView:
+    """All marks with their visibilities, which the gradebook heeds by itself."""
+    told = tuple(_told(grade, result) for result in grade.criteria)
+    return GradebookView(replace(grade, criteria=told, trials=()), student_view(grade).grade)
+
+
+def is_for_staff(visibility: str) -> bool:
+    """Whether what has this visibility is kept from students before publication."""
+    return visibility not in BEFORE_PUBLICATION
+
+
+def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
+    """Whether a criterion is hidden itself, or shows what was seen in hidden trials."""
+    return is_for_staff(result.visibility) or any(
+        is_for_staff(grade.trials[prediction.trial].visibility)
+        for prediction in result.predictions
+        if 0 <= prediction.trial < len(grade.trials)
+    )
+
+
+def worst_trial(grade: Grade, scenario: str) -> int:
+    """Index, in ``grade.trials``, of the scenario's trial that lost most; the first of equals.
+
+    A trial loses the marks of every criterion it failed; of those equal in that, one that ended in a fault is
+    worse than one that ran out of time, and that is worse than one that finished.
+    """
+    lost = [Decimal(0)] * len(grade.trials)
+    for result in grade.criteria:
+        for evidence in result.evidence:
+            if not evidence.passed and 0 <= evidence.trial < len(lost):
+                lost[evidence.trial] += result.max_marks
+    candidates = [index for index, trial in enumerate(grade.trials) if trial.scenario == scenario]
+    return max(candidates, key=lambda index: (lost[index], _severity(grade.trials[index]), -index))
+
+
+def scenarios(grade: Grade) -> tuple[str, ...]:
+    """The scenarios of the grade's trials, in the order they were run."""
+    return tuple(dict.fromkeys(trial.scenario for trial in grade.trials))
+
+
+def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
+    """The criterion with what is told to whoever sees it."""
+    view = student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
+    return replace(view.grade.criteria[0], evidence=(), predictions=())
+
+
+def _severity(trial: TrialResult) -> int:
+    if trial.verdict is Verdict.FINISHED:
+        return 0
+    return 1 if trial.verdict is Verdict.TIME_LIMIT else 2
+
+
+def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -> CriterionResult:
+    evidence = tuple(replace(item, trial=new_index[item.trial]) for item in result.evidence if item.trial in new_index)
+    predictions = tuple(
+        replace(prediction, trial=new_index[prediction.trial])
+        for prediction in result.predictions
+        if prediction.trial in new_index
+    )
+    kept = replace(result, evidence=evidence, predictions=predictions)
+    if len(evidence) == len(result.evidence):
+        return replace(kept, shown=None)
+    # A grade of before this was kept apart tells nothing.
+    shown = result.shown or Shown(shown_words(""))
+    return replace(kept, message=shown.message, accuracy=shown.accuracy, curves=shown.curves, shown=None)

@@ -1,0 +1,167 @@
+"""What is said of a grade in sentences: each verdict in a student's words, its accuracy, what its trials cost.
+
+It knows no marks and no particular trial; the faults of a recording say where and when.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from service.grading.grade import Grade
+from sim.recording import Verdict
+
+Tone = Literal["good", "notice", "bad"]
+_MEGABYTE = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictWords:
+    """``short`` fits a table cell; the other three are sentences. ``tone`` is how loud a report should be."""
+
+    short: str
+    happened: str
+    whose: str
+    next_step: str
+    tone: Tone
+
+
+_WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
+    {
+        Verdict.FINISHED: VerdictWords(
+            "finished",
+            "Your program ran to its end without an error.",
+            "Nothing stopped it.",
+            "If marks are missing, compare what each criterion asked for with what your robot did.",
+            "good",
+        ),
+        Verdict.PROGRAM_ERROR: VerdictWords(
+            "error in the robot program",
+            "Your robot program stopped with an error before it was done.",
+            "The error is in your robot program.",
+            "Go to the line named below, mend it, and run the program once in the simulator before submitting it.",
+            "bad",
+        ),
+        Verdict.RESPONDER_ERROR: VerdictWords(
+            "error in the responder",
+            "Your responder raised an error, so the robot got no answer to that message.",
+            "The error is in your responder, or in a function that it calls.",
+            "Call the responder yourself with the message shown below and mend the line that is named.",
+            "bad",
+        ),
+        Verdict.PROTOCOL_ERROR: VerdictWords(
+            "answer could not be read",
+            "Your responder answered, but not in a form that the robot can read.",
+            "The answer that your responder returns is at fault.",
+            "Return a string; one that starts with JSON:: must go on with valid JSON, as json.dumps makes it.",
+            "bad",
+        ),
+        Verdict.TIME_LIMIT: VerdictWords(
+            "still running at the end",
+            "Your program was still running when the simulated time was up.",
+            "That is no fault by itself: a line follower, for one, may run for ever.",
+            "If the program was meant to end, check what its loops wait for, and whether that ever happens.",
+            "notice",
+        ),
+        Verdict.CPU_LIMIT: VerdictWords(
+            "computed for too long",
+            "Your code computed for so long without waiting that it was stopped.",
+            "A loop never ends, or never waits, so that the robot's world cannot move; or a calculation is too long.",
+            "Check when the loop in the line below ends. In a robot program, put a sensor reading or a short "
+            "time.sleep inside it; in a responder, make the calculation smaller.",
+            "bad",
+        ),
+        Verdict.MEMORY_LIMIT: VerdictWords(
+            "used too much memory",
+            "Your code asked for more memory than it may use, and was stopped.",
+            "Something in your code keeps growing.",
+            "Look for a list or a string that grows on every turn of a loop and is never emptied.",
+            "bad",
+        ),
+        Verdict.OUTPUT_LIMIT: VerdictWords(
+            "printed too much",
+            "Your code printed more than may be recorded, and was stopped.",
+            "A loop in your code prints on every turn.",
+            "Print only when something changes, or put a short time.sleep inside the loop.",
+            "bad",
+        ),
+        Verdict.STALLED: VerdictWords(
+            "stopped responding",
+            "Your code fell silent: it neither computed nor asked the robot for anything, and was stopped.",
+            "Your code waits for something that never comes.",
+            "Look for a call that waits for a person, a file or another program; none of these exist here.",
+            "bad",
+        ),
+        Verdict.SANDBOX_VIOLATION: VerdictWords(
+            "did something not allowed",
+            "Your code tried something that graded code may not do, and was stopped.",
+            "The attempt came from your code or from a module that it imports.",
+            "Use no network, no other programs, and no files outside your own folder.",
+            "bad",
+        ),
+        Verdict.ASSIGNMENT_ERROR: VerdictWords(
+            "assignment is broken",
+            "The assignment itself has a mistake, so your work could not be marked fairly.",
+            "This is not your fault: the instructor has to mend the assignment.",
+            "You need not do anything but tell your instructor; your work can be graded again.",
+            "notice",
+        ),
+        Verdict.HOST_ERROR: VerdictWords(
+            "grading failed",
+            "The machine that grades your work failed before it was done.",
+            "This is not your fault, and it does not count as an attempt.",
+            "You need not do anything; the grading can be run again.",
+            "notice",
+        ),
+    }
+)
+
+
+def verdict_words(verdict: Verdict) -> VerdictWords:
+    """The words for ``verdict``; every verdict has some."""
+    return _WORDS[verdict]
+
+
+#: Where no robot was run: only functions were called and texts were read.
+_NO_ROBOT = VerdictWords(
+    "code checked",
+    "Your functions were called and your code was read; no robot was run.",
+    "What came of it is told at each criterion.",
+    "If marks are missing, call the function yourself with the values that are named there.",
+    "good",
+)
+
+
+def grade_words(grade: Grade) -> VerdictWords:
+    """The words for a grade's verdict, or that there was nothing to run."""
+    return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+
+
+def accuracy_words(grade: Grade) -> str:
+    """One sentence with value, interval and n; empty without a classification."""
+    accuracy = grade.accuracy
+    if accuracy is None:
+        return ""
+    return (
+        f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
+        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
+    )
+
+
+def cost_words(grade: Grade) -> str:
+    """One sentence with what all trials cost together, or may cost where that is not told; empty if nobody knows."""
+    if grade.cost is None:
+        return ""
+    limits, spent = grade.cost.limits, grade.cost.spent
+    if spent is None:
+        return (
+            f"All trials together may use {limits.cpu_seconds:g} s of CPU, {limits.sleep_seconds:g} s of sleep and "
+            f"{limits.kept_bytes >> 20} MB of output."
+        )
+    return (
+        f"Used {round(spent.cpu_seconds, 1):g} of {limits.cpu_seconds:g} s of CPU, "
+        f"{round(spent.sleep_seconds, 1):g} of {limits.sleep_seconds:g} s of sleep, "
+        f"{round(spent.kept_bytes / _MEGABYTE, 1):g} of {limits.kept_bytes >> 20} MB of output."
+    )

@@ -1,0 +1,94 @@
+"""What every floor is drawn with: its size, colours, and canvases with hard and with smooth edges.
+
+Image coordinates (y down); no floor is drawn here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+#: Size of every floor in mm, and in pixels.
+WIDTH, HEIGHT = 2362, 1143
+
+#: Smooth images are drawn so many times larger and then averaged.
+SCALE = 4
+
+Colour = tuple[int, int, int]
+Canvas = ImageDraw.ImageDraw
+Painter = Callable[[Canvas], None]
+Box = tuple[float, float, float, float]
+Pixels = NDArray[np.uint8]
+Point = tuple[float, float]
+
+WHITE: Colour = (255, 255, 255)
+BLACK: Colour = (0, 0, 0)
+RED: Colour = (255, 0, 0)
+GREEN: Colour = (0, 255, 0)
+BLUE: Colour = (0, 0, 255)
+YELLOW: Colour = (255, 255, 0)
+
+
+def grey(level: int) -> Colour:
+    return (level, level, level)
+
+
+def paint(painter: Painter, paper: Colour = WHITE) -> Pixels:
+    """A floor image, shape (1143, 2362, 3), with ``painter``'s shapes on ``paper``."""
+    image = Image.new("RGB", (WIDTH, HEIGHT), paper)
+    painter(ImageDraw.Draw(image))
+    return np.asarray(image)
+
+
+class SmoothCanvas:
+    """An image that is drawn ``SCALE`` times as large and averaged, so that slanting edges are smooth.
+
+    Coordinates are those of the finished image, in which pixel 0 reaches from 0 to 1.
+    """
+
+    def __init__(self, paper: Colour = WHITE) -> None:
+        self._image = Image.new("RGB", (WIDTH * SCALE, HEIGHT * SCALE), paper)
+        self._canvas: Canvas = ImageDraw.Draw(self._image)
+
+    def line(self, points: Sequence[Point], width: float, colour: Colour = BLACK) -> None:
+        scaled = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
+        self._canvas.line(scaled, colour, width=round(width * SCALE), joint="curve")
+
+    def capsule(self, start: Point, end: Point, radius: float, colour: Colour) -> None:
+        """Everything within ``radius`` of the stretch from ``start`` to ``end``."""
+        self.line((start, end), 2 * radius, colour)
+        for x, y in (start, end):
+            self.disc((x, y), radius, colour)
+
+    def disc(self, centre: Point, radius: float, colour: Colour) -> None:
+        x, y = centre
+        self.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+
+    def ring(self, centre: Point, radius: float, width: float, colour: Colour) -> None:
+        """A circle line whose middle is ``radius`` from ``centre``."""
+        x, y = centre
+        outer = radius + width / 2
+        box = self._inside((x - outer, y - outer, x + outer, y + outer))
+        self._canvas.ellipse(box, outline=colour, width=round(width * SCALE))
+
+    def ellipse(self, box: Box, colour: Colour) -> None:
+        self._canvas.ellipse(self._inside(box), colour)
+
+    def rectangle(self, box: Box, colour: Colour) -> None:
+        self._canvas.rectangle(self._inside(box), colour)
+
+    def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
+        self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
+
+    def pixels(self) -> Pixels:
+        """What was drawn, shape (1143, 2362, 3)."""
+        return np.asarray(self._image.reduce(SCALE))
+
+    @staticmethod
+    def _inside(box: Box) -> Box:
+        """Pillow draws both edges of a box, so the far ones move in by one of the small pixels."""
+        left, top, right, bottom = box
+        return (left * SCALE, top * SCALE, right * SCALE - 1, bottom * SCALE - 1)

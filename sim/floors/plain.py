@@ -1,0 +1,185 @@
+"""The plain floors: bands, gradients, loops and simple outlines, in image coordinates (rectangles with both edges).
+
+Not the shapes, tracks, digit sheets, test card and competition mats, which have modules of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.floors.canvas import (
+    BLACK,
+    BLUE,
+    GREEN,
+    HEIGHT,
+    RED,
+    WHITE,
+    WIDTH,
+    YELLOW,
+    Box,
+    Canvas,
+    Colour,
+    Painter,
+    Pixels,
+    grey,
+    paint,
+)
+from sim.floors.registry import printed
+from sim.recording import Pose
+
+
+def painted(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Callable[[Painter], Painter]:
+    """Registers the floor that a painter leaves on ``paper``."""
+
+    def register(painter: Painter) -> Painter:
+        printed(name, pose, menu=menu)(lambda: paint(painter, paper))
+        return painter
+
+    return register
+
+
+@painted("Empty_Map", Pose(100, 800, 0), menu=1)
+def nothing(canvas: Canvas) -> None:
+    """Leaves the floor as it is."""
+
+
+@painted("Grey_bands", Pose(150, 500, 0), menu=4)
+def grey_bands(canvas: Canvas) -> None:
+    for left, level in ((250, 220), (650, 211), (1050, 128), (1450, 0)):
+        canvas.rectangle((left, 150, left + 200, 900), grey(level))
+    for top, colour in ((250, RED), (450, GREEN), (650, BLUE)):
+        canvas.ellipse((1850, top, 1950, top + 100), colour)
+
+
+@painted("Coloured_bands", Pose(100, 800, 0), menu=8)
+def coloured_bands(canvas: Canvas) -> None:
+    for left, colour in ((250, RED), (650, GREEN), (1050, BLUE), (1450, BLACK)):
+        canvas.rectangle((left, 150, left + 200, 750), colour)
+
+
+@painted("Rainbow_bands", Pose(100, 800, 0), menu=9)
+def rainbow_bands(canvas: Canvas) -> None:
+    colours = (RED, GREEN, BLUE, (0, 255, 255), (255, 0, 255), YELLOW, BLACK)
+    for index, colour in enumerate(colours):
+        left = 200 + 200 * index
+        canvas.rectangle((left, 150, left + 200, 750), colour)
+
+
+@painted("Grey_and_black", Pose(400, 700, 90), menu=10)
+def grey_and_black(canvas: Canvas) -> None:
+    canvas.rectangle((200, 100, 1800, 200), BLACK)
+    for left, level in ((200, 211), (600, 0), (1000, 220), (1400, 128)):
+        canvas.rectangle((left, 600, left + 400, 700), grey(level))
+
+
+@painted("Square", Pose(550, 300, -90), menu=13)
+def square(canvas: Canvas) -> None:
+    canvas.rectangle((600, 400, 1000, 800), grey(128))
+    canvas.rectangle((300, 100, 1300, 1100), outline=grey(128), width=20)
+
+
+@painted("Loop", Pose(500, 500, 90), menu=2)
+def loop(canvas: Canvas) -> None:
+    canvas.rounded_rectangle((200, 200, 1900, 1000), 80, BLACK)
+    canvas.rounded_rectangle((300, 300, 1800, 900), 50, WHITE)
+
+
+@painted("Two_shapes", Pose(200, 500, 90), menu=3)
+def two_shapes(canvas: Canvas) -> None:
+    canvas.rounded_rectangle((200, 400, 700, 900), 80, BLACK)
+    canvas.rounded_rectangle((300, 500, 600, 800), 50, WHITE)
+    canvas.ellipse((1200, 400, 1700, 900), BLACK)
+    canvas.ellipse((1300, 500, 1600, 800), WHITE)
+
+
+def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
+    """An ellipse in ``box`` as a polygon of one corner a degree.
+
+    The original Lollipop was drawn so; Pillow's smoother ellipse shifts what a sensor at its rim reads.
+    """
+    left, top, right, bottom = box
+    corners = [
+        (
+            (left + right + (right - left) * math.cos(math.radians(degree))) / 2,
+            (top + bottom + (bottom - top) * math.sin(math.radians(degree))) / 2,
+        )
+        for degree in range(360)
+    ]
+    canvas.polygon(corners, colour)
+
+
+@painted("Lollipop", Pose(750, 375, -180), menu=11, paper=grey(211))
+def lollipop(canvas: Canvas) -> None:
+    """The line follower's track."""
+    _oval(canvas, (400, 371.5, 900, 771.5), BLACK)
+    _oval(canvas, (420.5, 391, 879.5, 752), grey(211))
+    canvas.rectangle((860, 522.5, 920, 593.5), grey(211))
+    canvas.arc((878, 549.5, 1078, 644.5), 180, 270, BLACK, width=20)
+    canvas.arc((874, 474.5, 1078, 569.5), 90, 180, BLACK, width=20)
+    canvas.rectangle((1680, 371.5, 1720, 771.5), YELLOW)
+    canvas.rectangle((915, 549.5, 1900, 571.5), BLACK)
+    canvas.rectangle((1880, 371.5, 1920, 771.5), RED)
+
+
+@painted("Sensor_Diameter_Test", Pose(550, 450, 90), menu=20)
+def sensor_diameter_test(canvas: Canvas) -> None:
+    for top, lefts, colour in ((200, (200, 240), BLACK), (640, (1000, 1040), RED)):
+        for index in range(5):
+            thickness = 2 * index
+            row = top + 40 * index
+            canvas.rectangle((0, row, WIDTH, row + thickness), colour)
+            for left in lefts:
+                column = left + 78 * index
+                canvas.rectangle((column, 0, column + thickness, HEIGHT), colour)
+    for x in (200, 240):
+        canvas.ellipse((x - 5, 195, x + 5, 205), BLUE)
+
+
+@printed("Linear_grey", Pose(200, 50, 90), menu=5)
+def linear_grey() -> Pixels:
+    """An even slope from white at image row 100 to black at row 1043, 51 black rows, and white beyond."""
+    column = np.full(HEIGHT, 255, dtype=np.uint8)
+    for row in range(100, 1043):
+        column[row] = 255 - int(255 * (row - 100) / 943)
+    column[1043:1094] = 0
+    return np.repeat(column[:, None], WIDTH * 3, axis=1).reshape(HEIGHT, WIDTH, 3)
+
+
+@printed("Radial_grey", Pose(100, 400, 0), menu=6)
+def radial_grey() -> Pixels:
+    """White in the middle, black at the corners."""
+    return _radial(inner=WHITE, outer=BLACK)
+
+
+@printed("Radial_red", Pose(100, 400, 0), menu=7)
+def radial_red() -> Pixels:
+    """Light red in the middle, dark at the corners."""
+    return _radial(inner=(255, 80, 80), outer=(80, 0, 0))
+
+
+def _radial(inner: Colour, outer: Colour) -> Pixels:
+    """From ``inner`` at (1181, 571.5) to ``outer``, by the cube root of distance / (sqrt(2) * 1181).
+
+    The levels fall with the distance, so each is found as the distance at which it ends; a pixel's colour
+    then depends on no vectorised power function, which may differ between processors.
+    """
+    x = 2 * np.arange(WIDTH, dtype=np.int64) - 2362
+    y = 2 * np.arange(HEIGHT, dtype=np.int64) - 1143
+    quarters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, a whole number
+    channels = [_radial_channel(quarters, low, high) for low, high in zip(outer, inner, strict=True)]
+    return np.stack(channels, axis=2)
+
+
+def _radial_channel(quarters: NDArray[np.int64], outer: int, inner: int) -> Pixels:
+    def darkness(quarter: int) -> int:
+        t = (math.sqrt(quarter) / 2 / (math.sqrt(2) * 1181)) ** (1 / 3)
+        return inner - int(outer * t + inner * (1 - t))
+
+    furthest = range(int(quarters.max()) + 1)
+    starts = [bisect_left(furthest, step, key=darkness) for step in range(1, inner - outer + 1)]
+    return (inner - np.searchsorted(starts, quarters, side="right")).astype(np.uint8)

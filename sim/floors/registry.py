@@ -1,0 +1,222 @@
+"""The floors by name: each module that draws one registers it here, with its pose, labels and obstacles.
+
+Nothing is drawn here, and no floor is known by name; what a flag with an unknown name means is decided where flags
+are read.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Protocol
+
+import numpy as np
+from PIL import Image
+
+from sim.errors import UsageError
+from sim.floors.canvas import HEIGHT, WIDTH, Pixels
+from sim.recording import Pose
+
+Obstacle = tuple[float, float, float, float]
+
+#: What the flag ``-o`` offers: x, y, width, height of each obstacle, mm, lower left corner first.
+OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
+    {
+        "None": (),
+        "Central_post": ((900, 500, 200, 200),),
+        "Square_posts": (
+            (500, 200, 100, 100),
+            (500, 700, 100, 100),
+            (1500, 200, 100, 100),
+            (1500, 700, 100, 100),
+        ),
+        "Wall": ((1500, 200, 200, 800),),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FloorLabel:
+    """Where the left light sensor's centre sees a named thing: lower left corner and size, world mm."""
+
+    label: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def holds(self, x: float, y: float) -> bool:
+        return self.x <= x <= self.x + self.width and self.y <= y <= self.y + self.height
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A floor. ``pixels`` is read-only, shape (1143, 2362, 3); its row 0 is at world y = 1143."""
+
+    name: str
+    pixels: Pixels
+    default_pose: Pose
+    labels: tuple[FloorLabel, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    label_patches: bool = True  # whether the image shows the grey patches that tell the answer, where it has any
+    sheet: int = 0  # the seed of the handwritten digits, on a digit sheet, or of the order of the shapes
+
+    def label_at(self, x: float, y: float) -> str | None:
+        """What a left light sensor with its centre at (x, y) mm sees, if that has a name."""
+        return next((label.label for label in self.labels if label.holds(x, y)), None)
+
+
+Drawing = tuple[Pixels, tuple[FloorLabel, ...]]
+_Draw = Callable[[], Pixels]
+
+
+class _DrawAnew(Protocol):
+    """Draws the floor of one seed, with or without the patches that tell the answer."""
+
+    def __call__(self, seed: int, /, *, label_patches: bool) -> Drawing: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    name: str
+    pose: Pose
+    menu: int | None  # the place in the course's menu, counted from 1; None for a floor that is not the course's
+    label_names: tuple[str, ...]
+    obstacles: tuple[Obstacle, ...]
+    seeded: bool
+    draw: _DrawAnew
+
+
+_PLANS: dict[str, _Plan] = {}
+
+
+def printed(
+    name: str,
+    pose: Pose,
+    *,
+    menu: int | None = None,
+    labels: tuple[FloorLabel, ...] = (),
+    obstacles: tuple[Obstacle, ...] = (),
+    unlabelled: _Draw | None = None,
+) -> Callable[[_Draw], _Draw]:
+    """Registers the floor that the function draws; ``unlabelled`` draws it without the patches that tell the answer."""
+
+    def register(draw: _Draw) -> _Draw:
+        def drawing(_seed: int, *, label_patches: bool) -> Drawing:
+            return (draw if label_patches or unlabelled is None else unlabelled)(), labels
+
+        named = tuple(dict.fromkeys(label.label for label in labels))
+        _add(_Plan(name, pose, menu, named, obstacles, False, drawing))
+        return draw
+
+    return register
+
+
+def drawn_anew(
+    name: str, pose: Pose, *, menu: int | None = None, label_names: tuple[str, ...]
+) -> Callable[[_DrawAnew], _DrawAnew]:
+    """Registers the floor that the function draws anew for each seed, with any of ``label_names`` on it."""
+
+    def register(draw: _DrawAnew) -> _DrawAnew:
+        _add(_Plan(name, pose, menu, label_names, (), True, draw))
+        return draw
+
+    return register
+
+
+def _add(plan: _Plan) -> None:
+    if plan.name in _PLANS:
+        raise ValueError(f"there are two floors called {plan.name}")
+    _PLANS[plan.name] = plan
+
+
+def names() -> tuple[str, ...]:
+    """Every floor that ``floor`` knows: the course's in the order of its menu, then the others by name."""
+    return tuple(sorted(_PLANS, key=lambda name: (_PLANS[name].menu is None, _PLANS[name].menu or 0, name)))
+
+
+def seeded_names() -> tuple[str, ...]:
+    """The floors that each seed draws anew."""
+    return tuple(name for name in names() if _PLANS[name].seeded)
+
+
+def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
+    """The floor called ``name``; with ``labels=False`` drawn without the grey patches that tell the answer.
+
+    On a floor that is drawn anew for each ``seed``, what is where changes with it; on the others it changes nothing.
+    Raises UsageError for a name that no floor has, and offers the names nearest to it.
+    """
+    return _seeded(name, labels, seed) if _plan(name).seeded else _printed(name, labels)
+
+
+@functools.lru_cache(maxsize=12)  # an image is 8 MB, and flags can ask for every floor there is
+def _printed(name: str, labels: bool) -> Floor:
+    return _floor(_plan(name), labels, 0)
+
+
+@functools.lru_cache(maxsize=12)  # a worker sees ever new seeds
+def _seeded(name: str, labels: bool, seed: int) -> Floor:
+    return _floor(_plan(name), labels, seed)
+
+
+def _floor(plan: _Plan, labels: bool, seed: int) -> Floor:
+    pixels, found = plan.draw(seed, label_patches=labels)
+    return Floor(plan.name, _read_only(pixels), plan.pose, found, plan.obstacles, labels, seed)
+
+
+def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
+    """The default pose and the obstacles of the floor called ``name``, without drawing it.
+
+    Raises UsageError for a name that no floor has.
+    """
+    plan = _plan(name)
+    return plan.pose, plan.obstacles
+
+
+def label_names(name: str) -> tuple[str, ...]:
+    """Every label that the floor called ``name`` can have, in the course's order; none for an unknown name."""
+    return _PLANS[name].label_names if name in _PLANS else ()
+
+
+def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
+    """A floor of the instructor's own, from the bytes of a PNG or JPEG file of 2362 x 1143 pixels.
+
+    Raises UsageError when the bytes are no such image. See-through parts show white.
+    """
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
+            if image.size != (WIDTH, HEIGHT):
+                raise UsageError(
+                    f"The background image {name!r} is {image.width} x {image.height} pixels; "
+                    f"it must be {WIDTH} x {HEIGHT}, one a millimetre."
+                )
+            paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
+            pixels = np.asarray(Image.alpha_composite(paper, image.convert("RGBA")).convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise UsageError(f"The background image {name!r} cannot be read as PNG or JPEG.") from error
+    return Floor(name, _read_only(pixels), default_pose)
+
+
+def _plan(name: str) -> _Plan:
+    if name not in _PLANS:
+        raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
+    return _PLANS[name]
+
+
+def _suggestion(name: str) -> str:
+    """The end of a sentence that names the floors nearest to ``name``, or all."""
+    by_lower = {known.lower(): known for known in names()}
+    near = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
+    if near:
+        return "did you mean " + " or ".join(by_lower[match] for match in near) + "?"
+    return "there are " + ", ".join(names()) + "."
+
+
+def _read_only(pixels: Pixels) -> Pixels:
+    fixed = np.ascontiguousarray(pixels)
+    fixed.setflags(write=False)
+    return fixed

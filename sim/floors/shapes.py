@@ -1,0 +1,104 @@
+"""The floors with the six shapes: Simple_Shapes as in the course, and Shuffled_Shapes in an order that a seed draws.
+
+What is drawn on them is also where it is labelled; nothing here judges what a robot says of a shape.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+
+from sim.chance import Stream
+from sim.floors.canvas import BLACK, Canvas, Pixels, grey, paint
+from sim.floors.registry import FloorLabel, drawn_anew, printed
+from sim.recording import Pose
+
+#: The six shapes of Simple_Shapes, in the order of the codes 0 to 5 that the course gives them.
+SHAPES = (
+    "square",
+    "right facing triangle",
+    "left facing triangle",
+    "downwards facing triangle",
+    "upwards facing triangle",
+    "diamond",
+)
+
+#: Grey of the label patch beside shape k; the course decodes exactly these values.
+LABEL_GREYS = tuple(k * 255 // 6 for k in range(6))
+
+
+def _outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """The six shapes of side 10 with their upper left anchor at (x, y), in the order of the codes 0 to 5."""
+    s = math.sqrt(3) * 5
+    return (
+        ((x + 2, y + 2), (x + 8, y + 2), (x + 8, y + 8), (x + 2, y + 8)),
+        ((x + 2, y), (x + 2, y + 10), (x + 2 + s, y + 5)),
+        ((x, y + 5), (x + s, y), (x + s, y + 10)),
+        ((x, y + 2), (x + 5, y + 2 + s), (x + 10, y + 2)),
+        ((x, y + 9), (x + 5, y + 9 - s), (x + 10, y + 9)),
+        ((x, y + 5), (x + s / 2, y + 10), (x + s, y + 5), (x + s / 2, y)),
+    )
+
+
+#: The codes of the shapes in the course's upper and lower row, from the left.
+_UPPER_ROW, _LOWER_ROW = (0, 1, 2, 3, 4, 5), (1, 5, 0, 2)
+
+
+def _draw_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> None:
+    """Six shapes at image row 218, and the unlabelled test row at 418.
+
+    With ``label_patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
+    """
+    for column, code in enumerate(upper):
+        _draw_shape(canvas, code, 225 + 80 * column, 218)
+        if label_patches:
+            left = 221 + 80 * column
+            canvas.rectangle((left, 251, left + 18, 275), grey(LABEL_GREYS[code]))
+    for column, code in enumerate(lower):
+        _draw_shape(canvas, code, 225 + 80 * column, 418)
+
+
+def _draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
+    outline = _outlines(x, y)[code]
+    if code == 0:
+        canvas.rectangle((outline[0], outline[2]), BLACK)
+    else:
+        canvas.polygon(outline, BLACK)
+
+
+def _labels(upper: Sequence[int], lower: Sequence[int]) -> tuple[FloorLabel, ...]:
+    """Within 10 mm of where the course stands the left sensor: the shape is then inside the sensor's view."""
+    return tuple(
+        FloorLabel(SHAPES[code], 230.0 + 80 * column - 10, y - 10, 20.0, 20.0)
+        for y, codes in ((920.0, upper), (720.0, lower))
+        for column, code in enumerate(codes)
+    )
+
+
+def _rows(upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> Pixels:
+    return paint(functools.partial(_draw_rows, upper=upper, lower=lower, label_patches=label_patches))
+
+
+def _without_patches() -> Pixels:
+    return _rows(_UPPER_ROW, _LOWER_ROW, label_patches=False)
+
+
+@printed(
+    "Simple_Shapes", Pose(800, 400, 0), menu=21, labels=_labels(_UPPER_ROW, _LOWER_ROW), unlabelled=_without_patches
+)
+def simple_shapes() -> Pixels:
+    """The course's shapes with their patches."""
+    return _rows(_UPPER_ROW, _LOWER_ROW, label_patches=True)
+
+
+@drawn_anew("Shuffled_Shapes", Pose(800, 400, 0), label_names=SHAPES)
+def shuffled_shapes(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+    """Each shape once in the upper row, in an order that the seed draws, and any four in the lower.
+
+    It is not one of the course's: where the robot stands must not tell what it sees.
+    """
+    chance = Stream(seed, "shapes")
+    upper = sorted(_UPPER_ROW, key=chance.integer)
+    lower = [chance.integer(100 + column) % len(SHAPES) for column in range(len(_LOWER_ROW))]
+    return _rows(upper, lower, label_patches=label_patches), _labels(upper, lower)

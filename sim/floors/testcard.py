@@ -1,0 +1,65 @@
+"""The Testcard floor: a television test card of our own, 2215 x 1073, in the upper left of white paper.
+
+Only the image; unlike the original's it has no see-through parts, so no earlier floor shows through.
+"""
+
+from __future__ import annotations
+
+from sim.floors.canvas import BLACK, BLUE, GREEN, RED, WHITE, YELLOW, Colour, Pixels, SmoothCanvas, grey
+from sim.floors.registry import printed
+from sim.recording import Pose
+
+CARD_WIDTH, CARD_HEIGHT = 2215, 1073
+
+_CYAN: Colour = (0, 255, 255)
+_MAGENTA: Colour = (255, 0, 255)
+_CENTRE = (CARD_WIDTH / 2, CARD_HEIGHT / 2)
+
+
+@printed("Testcard", Pose(400, 800, 90), menu=12)
+def testcard() -> Pixels:
+    """White grid on grey, and in it colour bars, a grey staircase, fine stripes and a circle."""
+    canvas = SmoothCanvas()
+    canvas.rectangle((0, 0, CARD_WIDTH, CARD_HEIGHT), grey(128))
+    _grid(canvas)
+    left, right = 407.5, 1807.5
+    _bars(canvas, (WHITE, YELLOW, _CYAN, GREEN, _MAGENTA, RED, BLUE, BLACK), left, right, 136.5, 336.5)
+    _bars(canvas, tuple(grey(255 * step // 10) for step in range(11)), left, right, 336.5, 486.5)
+    canvas.rectangle((left, 486.5, right, 586.5), BLACK)
+    _stripes(canvas, left, right, 586.5, 736.5)
+    _bars(canvas, (RED, BLUE, RED, GREEN, YELLOW, BLUE), left, right, 736.5, 936.5)
+    canvas.ring(_CENTRE, 500, 8, WHITE)
+    canvas.rectangle((_CENTRE[0] - 350, 496.5, _CENTRE[0] + 350, 576.5), BLACK)
+    canvas.line(((_CENTRE[0], 486.5), (_CENTRE[0], 586.5)), 4, WHITE)
+    canvas.line(((left, _CENTRE[1]), (right, _CENTRE[1])), 4, WHITE)
+    return canvas.pixels()
+
+
+def _grid(canvas: SmoothCanvas) -> None:
+    """Lines 4 wide, 100 apart, counted from the middle of the card."""
+    pitch, width = 100, 4
+    for step in range(-11, 12):
+        x = _CENTRE[0] + pitch * step
+        canvas.line(((x, 0), (x, CARD_HEIGHT)), width, WHITE)
+    for step in range(-5, 6):
+        y = _CENTRE[1] + pitch * step
+        canvas.line(((0, y), (CARD_WIDTH, y)), width, WHITE)
+
+
+def _bars(
+    canvas: SmoothCanvas, colours: tuple[Colour, ...], left: float, right: float, top: float, bottom: float
+) -> None:
+    width = (right - left) / len(colours)
+    for index, colour in enumerate(colours):
+        canvas.rectangle((left + width * index, top, left + width * (index + 1), bottom), colour)
+
+
+def _stripes(canvas: SmoothCanvas, left: float, right: float, top: float, bottom: float) -> None:
+    """Black and white stripes, in five groups from 20 wide to 4 wide."""
+    group = (right - left) / 5
+    canvas.rectangle((left, top, right, bottom), WHITE)
+    for index, width in enumerate((20, 16, 12, 8, 4)):
+        start = left + group * index
+        for stripe in range(int(group / width / 2)):
+            near = start + 2 * width * stripe
+            canvas.rectangle((near, top, near + width, bottom), BLACK)

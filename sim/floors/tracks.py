@@ -1,0 +1,138 @@
+"""The floors with tracks to follow: test lines, lines with obstacles, junctions and the Thruxton circuit.
+
+Smooth-edged images, in image coordinates (y down); the lines in world coordinates are ``centrelines.py``'s.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from importlib import resources
+
+from sim.floors.canvas import BLACK, RED, WHITE, Pixels, Point, SmoothCanvas, grey
+from sim.floors.registry import Obstacle, printed
+from sim.recording import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class TrackLine:
+    """A centreline in image pixels, and the width of the line drawn along it."""
+
+    width: float
+    points: tuple[Point, ...]
+
+
+def lines_of(file_name: str) -> tuple[TrackLine, ...]:
+    """The centrelines in a data file of this package."""
+    text = resources.files(__package__).joinpath(file_name).read_text(encoding="utf-8")
+    return tuple(
+        TrackLine(line["width"], tuple((x, y) for x, y in line["points"])) for line in json.loads(text)["lines"]
+    )
+
+
+@printed("Line_Following_Test", Pose(141, 125, 90), menu=18)
+def line_following_test() -> Pixels:
+    """Eleven black lines of all kinds."""
+    canvas = SmoothCanvas()
+    for line in lines_of("line_following_test.json"):
+        canvas.line(line.points, line.width)
+    return canvas.pixels()
+
+
+#: What stands on Obstacles_Test from the start.
+_TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
+    (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
+)
+
+
+@printed("Obstacles_Test", Pose(121, 125, 90), menu=25, obstacles=_TEST_OBSTACLES)
+def obstacles_test() -> Pixels:
+    """Six lines that lead to obstacles, and a broad black band."""
+    canvas = SmoothCanvas()
+    lines = lines_of("obstacles_test.json")
+    for line in lines:
+        canvas.line(line.points, line.width)
+    first, last = 63.0, 1097.0
+    canvas.rectangle((1036, first, 1334, last), BLACK)
+    return canvas.pixels()
+
+
+@printed("Junction_Handling_Test", Pose(698, 130, 90), menu=19)
+def junction_handling_test() -> Pixels:
+    """A street grid with a roundabout; a green marker in the right or left corner of a crossing says where to turn.
+
+    Drawn anew with the original's measures: lines 20 wide, markers 25.
+    """
+    width, marker, green = 20.0, 25.0, (0, 179, 0)
+    columns, rows = (238, 698, 1158, 1618, 2078), (150, 480, 810)
+    start_row, roundabout, radius = 1097, (1618, 480), 120.0
+    canvas = SmoothCanvas()
+    for x in columns:
+        canvas.line(((x, rows[0] - width / 2), (x, start_row)), width)
+    for y in rows:
+        canvas.line(((columns[0], y), (columns[-1], y)), width)
+    canvas.disc(roundabout, radius, WHITE)
+    canvas.ring(roundabout, radius, width, BLACK)
+    sides = {"left": -1, "right": 1}
+    for column, row, side in (
+        (0, 1, "right"), (0, 2, "right"), (1, 0, "left"), (1, 1, "right"), (1, 2, "left"), (2, 0, "right"),
+        (2, 2, "right"), (3, 2, "left"), (4, 1, "left"),
+    ):  # fmt: skip
+        near = columns[column] + sides[side] * width / 2
+        far = near + sides[side] * marker
+        bottom = rows[row] + width / 2  # behind the crossing, for a robot that comes from below
+        canvas.rectangle((min(near, far), bottom, max(near, far), bottom + marker), green)
+    return canvas.pixels()
+
+
+@printed("Thruxton_Circuit", Pose(457, 242, 120), menu=22)
+def thruxton_circuit() -> Pixels:
+    """The closed loop, the grey start bar across it, and flags and chequers beside the bar."""
+    canvas = SmoothCanvas()
+    (track,) = lines_of("thruxton_circuit.json")
+    canvas.line(track.points, track.width)
+    for point in track.points:  # closes the loop, and the specks that Pillow leaves at a line's bends
+        canvas.disc(point, track.width / 2, BLACK)
+    bar = Stand(centre=(423.2, 847.9), turn=27.4)
+    for middle in ((551, 785), (220, 955)):
+        _flag(canvas, middle)
+    canvas.polygon(bar.box(along=(-258 / 2, 258 / 2), across=(-25 / 2, 25 / 2)), grey(192))
+    for start in (-200.0, 185.0):
+        _chequers(canvas, bar, start)
+    return canvas.pixels()
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """A place on the image with its own axes: ``turn`` degrees anticlockwise from the image's."""
+
+    centre: Point
+    turn: float
+
+    def at(self, along: float, across: float) -> Point:
+        cosine, sine = math.cos(math.radians(self.turn)), math.sin(math.radians(self.turn))
+        x, y = self.centre
+        return (x + along * cosine + across * sine, y - along * sine + across * cosine)
+
+    def box(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
+        (near, far), (top, bottom) = along, across
+        return (self.at(near, top), self.at(far, top), self.at(far, bottom), self.at(near, bottom))
+
+
+def _chequers(canvas: SmoothCanvas, bar: Stand, start: float) -> None:
+    """A strip of two rows of squares on the bar's axis, well beside the track."""
+    side, count = 12.5, 5
+    for row in range(2):
+        for column in range(row % 2, count, 2):
+            left, top = start + column * side, (row - 1) * side
+            canvas.polygon(bar.box((left, left + side), (top, top + side)), BLACK)
+
+
+def _flag(canvas: SmoothCanvas, middle: Point) -> None:
+    """A red pennant with its middle at ``middle``, on a pole at its right."""
+    width, height, pole = 24.0, 24.0, 4.0
+    x, y = middle
+    right, top = x + width / 2, y - height / 2
+    canvas.polygon(((x - width / 2, y), (right, top), (right, top + height)), RED)
+    canvas.rectangle((right, top, right + pole, top + 2 * height), BLACK)
