@@ -112,14 +112,14 @@ def execute_notebook(
     with sandboxes.private_folder() as folder:
         process = NotebookProcess(spec, sandboxes, folder, meter)
         try:
-            play = _Execution(process, planner, ground, sandboxes, meter)
-            process.execute(play.perform)
-            play.finish()
+            execution = _Execution(process, planner, ground, sandboxes, meter)
+            process.execute(execution.perform)
+            execution.finish()
         finally:
             process.close()
         log, unread = read_log(folder, meter)
     return ExecutedNotebook(
-        tuple(play.runs),
+        tuple(execution.runs),
         "\n".join(process.output),
         log,
         tuple(process.notes),

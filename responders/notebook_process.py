@@ -58,7 +58,7 @@ class NotebookProcess(ResponderProcess):
         self.stopped: Fault | None = None
 
     def execute(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
-        """Play all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
+        """Execute all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
         assert self._child is not None
         try:
             self._child.send(

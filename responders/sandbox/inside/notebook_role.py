@@ -39,7 +39,7 @@ class NotebookRole(ResponderRole):
         return self._namespace
 
     def run(self) -> None:
-        """Play all cells, then answer until the worker closes the wire."""
+        """Execute all cells, then answer until the worker closes the wire."""
         from nbev3devsim import unseen
 
         self._prepare()
