@@ -7,61 +7,27 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 from responders import messages, wire
-from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, ResponderProcess, ResponderSpec
+from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
+from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.running_child import Child
+from responders.trial_spec import TrialSpec
 from sim.arena import Arena
-from sim.backgrounds import Floor
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Verdict
-from sim.robot import Robot
-from sim.world import Chain, Noise, World
-
-Preamble = Literal["none", "imports", "preloaded"]
+from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Verdict
+from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: How often a program may act without waiting; its own process counts too, and can name the line.
 _FREE_ACTS = 100_100
 _MOST_NOTES = 200
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramSpec:
-    """A robot program and what it may use."""
-
-    code: Code
-    preamble: Preamble
-    limits: ChildLimits
-    output_bytes: int
-
-
-@dataclass(frozen=True, slots=True)
-class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
-
-    program: ProgramSpec
-    responder: ResponderSpec | None
-    collaborative: bool
-    floor: Floor
-    robot: Robot
-    pose: Pose
-    noise: Noise
-    channel: Channel
-    seconds: float
-    seed: int
-    child_seed: int  # of the chance that the children see; the world's is ``seed``
-    pen_down: bool = False
-    physics: Physics = COURSE_PHYSICS
 
 
 class _Cut(Exception):
@@ -86,11 +52,12 @@ class Bridge:
     ) -> None:
         self._spec = spec
         self._child = child
+        self._responder = responder
         self._meter = meter
         self.now = 0
         self.chain = Chain()
         self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
-        self.conversation = Conversation(spec.channel, spec.seed, self.chain, responder, meter)
+        self.conversation = Conversation(spec.channel, spec.seed, self.chain)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
@@ -104,8 +71,6 @@ class Bridge:
         self._encoded: dict[str, bytes] = {}
         self._told_in = -1
         self._told_lines = self._told_images = 0
-        if responder is not None:
-            responder.collected = self.collected
         self._output_left = spec.program.output_bytes
 
     def run(self) -> Fault | None:
@@ -222,11 +187,8 @@ class Bridge:
         self.now = end
 
     def _reply(self, value: Any) -> None:
-        answer: dict[str, Any] = {"t": self.now, "v": value}
-        if self._arrived:
-            answer["m"] = self._arrived
-            self._arrived = []
-        self._child.send(answer)
+        self._child.send({"t": self.now, "v": value}, self._arrived)
+        self._arrived = []
 
     def _read(self, what: str, times: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
@@ -303,9 +265,23 @@ class Bridge:
             return
         self.printed.append(Line(self.now / SECOND, text))
         if self._spec.collaborative and kind == "py":
-            self.conversation.send(text, self.now)
+            self._send(text)
         elif self._spec.collaborative and kind == "image":
             self._send_image()
+
+    def _send(self, text: str) -> int:
+        """Hand ``text`` to the responder and its answer to the conversation. The index of the message."""
+        sent = self.conversation.send(text, self.now)
+        for copy in range(sent.copies):
+            self.conversation.answer(sent, copy, self._answer(text, sent.message))
+        return sent.message
+
+    def _answer(self, text: str, message: int) -> Answer:
+        if self._responder is not None:
+            return self._responder.answer(text, self.now, message, self.collected())
+        answer = f"pingpong {text}"
+        self._meter.keep(len(answer))
+        return Answer(answer)
 
     def _send_image(self) -> None:
         left, right = self.world.images()
@@ -313,7 +289,7 @@ class Bridge:
         where = self.world.left_footprint
         text = messages.image_message(left, right)
         self._meter.keep(len(text) + len(left) + len(right))
-        number = self.conversation.send(text, self.now)
+        message = self._send(text)
         self.images.append(
             Image(
                 self.now / SECOND,
@@ -321,7 +297,7 @@ class Bridge:
                 self.world.pose,
                 left,
                 right,
-                number,
+                message,
                 self._spec.floor.label_at(where.x, where.y),
                 self._spec.robot.left_light.diameter,
             )

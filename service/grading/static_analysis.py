@@ -10,10 +10,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
-from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code
 from service.grading.grade import TrialResult
 from service.grading.judging.function_checks import calls_of
 from service.grading.judging.outcome import fault_words

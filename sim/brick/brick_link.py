@@ -5,7 +5,6 @@ It knows no physics: positions, sensor values and the time come with the answers
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -71,7 +70,7 @@ class Link:
         arrived = answer.get("m")
         if arrived:
             # A new dictionary for new messages: what a program took earlier stays as it was.
-            self.state = {"messages": [*self.state["messages"], *map(json.loads, arrived)]}
+            self.state = {"messages": [*self.state["messages"], *arrived]}
         return answer.get("v")
 
     def read(self, what: str, times: int) -> Any:
