@@ -25,6 +25,8 @@ from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
+#: What a text is answered with where there is no responder.
+_PINGPONG = "pingpong "
 #: How often a program may act without waiting; its own process counts too, and can name the line.
 _FREE_ACTS = 100_100
 _MOST_NOTES = 200
@@ -273,15 +275,13 @@ class Bridge:
         """Hand ``text`` to the responder and its answer to the conversation. The index of the message."""
         sent = self.conversation.send(text, self.now)
         for copy in range(sent.copies):
-            self.conversation.answer(sent, copy, self._answer(text, sent.message))
+            if self._responder is not None:
+                answer = self._responder.answer(text, self.now, sent.message, self.collected())
+            else:
+                self._meter.keep(len(_PINGPONG) + len(text))
+                answer = Answer(_PINGPONG + text)
+            self.conversation.answer(sent, copy, answer)
         return sent.message
-
-    def _answer(self, text: str, message: int) -> Answer:
-        if self._responder is not None:
-            return self._responder.answer(text, self.now, message, self.collected())
-        answer = f"pingpong {text}"
-        self._meter.keep(len(answer))
-        return Answer(answer)
 
     def _send_image(self) -> None:
         left, right = self.world.images()

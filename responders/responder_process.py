@@ -102,11 +102,20 @@ class ResponderProcess:
             self._child = None
 
     def _answer(self, frame: wire.Frame, t: int) -> Answer:
+        """What an answer's frame says; a text with ``JSON::`` brings what joins the robot's queue, if it is JSON."""
         said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
         self._spend(said, "printed and answered")
         match frame["kind"]:
+            case "text" if not said.startswith(messages.JSON):
+                return Answer(said, self._slept)
             case "text":
-                return self._text(frame["text"], t)
+                try:
+                    entry = messages.queue_entry(said)
+                except ValueError as error:
+                    sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
+                    return Answer(said, self._slept, self._protocol_fault(t, sentence), note="malformed")
+                self._meter.keep(len(entry))
+                return Answer(said, self._slept, entry=entry)
             case "error":
                 return Answer(fault=error_fault(frame["error"], t + self._slept, "responder"))
             case "long":
@@ -114,18 +123,6 @@ class ResponderProcess:
             case _:
                 what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
         return Answer(fault=self._protocol_fault(t, f"the responder returned {what}"))
-
-    def _text(self, text: str, t: int) -> Answer:
-        """A text; one that begins with ``JSON::`` brings what joins the robot's queue, unless it is malformed."""
-        if not text.startswith(messages.JSON):
-            return Answer(text, self._slept)
-        try:
-            entry = messages.queue_entry(text)
-        except ValueError as error:
-            fault = self._protocol_fault(t, f"the responder's answer begins with JSON:: but is not JSON: {error}")
-            return Answer(text, self._slept, fault, note="malformed")
-        self._meter.keep(len(entry))
-        return Answer(text, self._slept, entry=entry)
 
     def _protocol_fault(self, t: int, sentence: str) -> Fault:
         return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence)
