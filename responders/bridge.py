@@ -20,7 +20,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, SENSORS, TICK, Fault, Image, Line, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
@@ -93,6 +93,7 @@ class Bridge:
                 "name": spec.program.code.name,
                 "text": spec.program.code.text,
                 "preamble": spec.program.preamble,
+                "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
             }
         )
@@ -117,20 +118,19 @@ class Bridge:
 
     def robot_state(self) -> dict[str, Any]:
         """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
-        world = self.world
+        world, readings = self.world, self.world.readings()
         state: dict[str, Any] = {
             "x": world.pose.x,
             "y": world.pose.y,
             "angle": math.radians(world.pose.heading),
-            "ultrasonic": world.ultrasonic,
-            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
+            "ultrasonic": readings["ultrasonic"],
+            "gyro": readings["gyro"],
             "penDown": self._spec.pen_down,
             "_sensorNoise": self._spec.noise.light,
             "_wheelNoise": self._spec.noise.motor,
         }
-        sums = (world.left_sums, world.right_sums)
         for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
-            rgb = [total / world.pixels[number] for total in sums[number]]
+            rgb = readings[side]
             state[f"sensor{number + 1}dataArray"] = messages.csv(image)
             state[f"{side}_light_raw"] = rgb
             state[f"{side}_light"] = int(rgb[0])
@@ -201,22 +201,11 @@ class Bridge:
             self.now = end
         else:
             self._advance(times * _READ)
-            self._values, self._told_in = self._sensor_values(), self.world.clock
+            self._values, self._told_in = self.world.readings(), self.world.clock
+            self._encoded = {name: repr(value).encode() for name, value in self._values.items()}
         self.chain.add(what, self.now, self._encoded[what])
         if not known:
             self._reply(list(self._values.values()))
-
-    def _sensor_values(self) -> dict[str, Any]:
-        world = self.world
-        left, right = world.pixels
-        values: dict[str, Any] = {
-            "left": [total / left for total in world.left_sums],
-            "right": [total / right for total in world.right_sums],
-            "ultrasonic": world.ultrasonic,
-            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
-        }
-        self._encoded = {what: repr(value).encode() for what, value in values.items()}
-        return values
 
     def _wheel(self, port: str) -> Wheel:
         return self.world.drive.left if port == "outB" else self.world.drive.right

@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from sim.recording import SENSORS
+
 Frame = dict[str, Any]
 
 #: The longest line that is read, bytes.
@@ -117,7 +119,7 @@ ROBOT: Schema = MappingProxyType(
             },
         ),
         "wait": ({"units": _units}, {}),
-        "read": ({"what": _one_of("left", "right", "ultrasonic", "gyro"), "times": _whole(1, 2)}, {}),
+        "read": ({"what": _one_of(*SENSORS), "times": _whole(1, 2)}, {}),
         "motor_state": ({"port": _port}, {}),
         "paid_motor": ({"port": _port}, {}),
         "until": (

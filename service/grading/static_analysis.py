@@ -19,7 +19,7 @@ from service.grading.judging.function_checks import calls_of
 from service.grading.judging.outcome import fault_words
 from service.grading.judging.source_rules import SPEECH, SourceAnswers
 from sim.chance import Stream
-from sim.recording import Pose, Recording
+from sim.recording import Pose
 from submissions.assignment import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.magics import Flags
@@ -138,7 +138,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
         "end": _pose(recording.end),
         "end_t": recording.end_t,
         "verdict": str(recording.verdict),
-        "ticks": _ticks(recording),
+        "ticks": {name: column.tolist() for name, column in recording.ticks.told().items()},
         "printed": [[line.t, line.text] for line in recording.printed],
         "spoken": [[line.t, line.text] for line in recording.spoken],
         "messages": [
@@ -233,20 +233,3 @@ def _check(
 
 def _pose(pose: Pose) -> dict[str, float]:
     return {"x": pose.x, "y": pose.y, "heading": pose.heading}
-
-
-def _ticks(recording: Recording) -> dict[str, Any]:
-    ticks = recording.ticks
-    columns = {
-        "t": ticks.t,
-        "x": ticks.x,
-        "y": ticks.y,
-        "heading": ticks.heading,
-        "left_position": ticks.left_position,
-        "right_position": ticks.right_position,
-        "left_rgb": ticks.left_rgb,
-        "right_rgb": ticks.right_rgb,
-        "ultrasonic": ticks.ultrasonic,
-        "gyro": ticks.gyro,
-    }
-    return {name: column.tolist() for name, column in columns.items()}
