@@ -1,6 +1,6 @@
 """The process of a notebook: its cells are executed in it, and it answers the robots that they start.
 
-It keeps what the cells print and what becomes of them; the robots are ``notebook_play.py``'s.
+It keeps what the cells print and what becomes of them; the robots are ``notebook_executor.py``'s.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One trial of a notebook: it is executed from top to bottom, and the marked run becomes the trial's recording.
 
-What is marked is the assignment's to say; what the magics come to is ``notebook_stage.py``'s.
+What is marked is the assignment's to say; what the magics come to is ``notebook_runs.py``'s.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 from . import cell_source, student_code
-from .answering import ResponderRole
 from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
+from .responder_role import ResponderRole
 from .shell import Shell
 
 _MOST_NOTES = 60
