@@ -5,10 +5,9 @@ from __future__ import annotations
 import time
 
 from benchmarks.measurement import Measurement, cpu_seconds, median_of
-from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.camera import BulletCamera, CachedCamera, LightCamera

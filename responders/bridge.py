@@ -7,61 +7,29 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 from responders import messages, wire
-from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, ResponderProcess, ResponderSpec
+from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
+from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.running_child import Child
+from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.floors import Floor
-from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import MILLISECOND, SECOND, TICK, Fault, Image, Line, Pose, Verdict
-from sim.robot import Robot
-from sim.world import Chain, Noise, World
-
-Preamble = Literal["none", "imports", "preloaded"]
+from sim.recording import MILLISECOND, SECOND, SENSORS, TICK, Fault, Image, Line, Verdict
+from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
+#: What a text is answered with where there is no responder.
+_PINGPONG = "pingpong "
 #: How often a program may act without waiting; its own process counts too, and can name the line.
 _FREE_ACTS = 100_100
 _MOST_NOTES = 200
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramSpec:
-    """A robot program and what it may use."""
-
-    code: Code
-    preamble: Preamble
-    limits: ChildLimits
-    output_bytes: int
-
-
-@dataclass(frozen=True, slots=True)
-class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
-
-    program: ProgramSpec
-    responder: ResponderSpec | None
-    collaborative: bool
-    floor: Floor
-    robot: Robot
-    pose: Pose
-    noise: Noise
-    channel: Channel
-    seconds: float
-    seed: int
-    child_seed: int  # of the chance that the children see; the world's is ``seed``
-    pen_down: bool = False
-    physics: Physics = COURSE_PHYSICS
 
 
 class _Cut(Exception):
@@ -86,11 +54,12 @@ class Bridge:
     ) -> None:
         self._spec = spec
         self._child = child
+        self._responder = responder
         self._meter = meter
         self.now = 0
         self.chain = Chain()
         self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
-        self.conversation = Conversation(spec.channel, spec.seed, self.chain, responder, meter)
+        self.conversation = Conversation(spec.channel, spec.seed, self.chain)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
@@ -104,8 +73,6 @@ class Bridge:
         self._encoded: dict[str, bytes] = {}
         self._told_in = -1
         self._told_lines = self._told_images = 0
-        if responder is not None:
-            responder.collected = self.collected
         self._output_left = spec.program.output_bytes
 
     def run(self) -> Fault | None:
@@ -126,6 +93,7 @@ class Bridge:
                 "name": spec.program.code.name,
                 "text": spec.program.code.text,
                 "preamble": spec.program.preamble,
+                "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
             }
         )
@@ -150,20 +118,19 @@ class Bridge:
 
     def robot_state(self) -> dict[str, Any]:
         """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
-        world = self.world
+        world, readings = self.world, self.world.readings()
         state: dict[str, Any] = {
             "x": world.pose.x,
             "y": world.pose.y,
             "angle": math.radians(world.pose.heading),
-            "ultrasonic": world.ultrasonic,
-            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
+            "ultrasonic": readings["ultrasonic"],
+            "gyro": readings["gyro"],
             "penDown": self._spec.pen_down,
             "_sensorNoise": self._spec.noise.light,
             "_wheelNoise": self._spec.noise.motor,
         }
-        sums = (world.left_sums, world.right_sums)
         for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
-            rgb = [total / world.pixels[number] for total in sums[number]]
+            rgb = readings[side]
             state[f"sensor{number + 1}dataArray"] = messages.csv(image)
             state[f"{side}_light_raw"] = rgb
             state[f"{side}_light"] = int(rgb[0])
@@ -222,11 +189,8 @@ class Bridge:
         self.now = end
 
     def _reply(self, value: Any) -> None:
-        answer: dict[str, Any] = {"t": self.now, "v": value}
-        if self._arrived:
-            answer["m"] = self._arrived
-            self._arrived = []
-        self._child.send(answer)
+        self._child.send({"t": self.now, "v": value}, self._arrived)
+        self._arrived = []
 
     def _read(self, what: str, times: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
@@ -237,22 +201,11 @@ class Bridge:
             self.now = end
         else:
             self._advance(times * _READ)
-            self._values, self._told_in = self._sensor_values(), self.world.clock
+            self._values, self._told_in = self.world.readings(), self.world.clock
+            self._encoded = {name: repr(value).encode() for name, value in self._values.items()}
         self.chain.add(what, self.now, self._encoded[what])
         if not known:
             self._reply(list(self._values.values()))
-
-    def _sensor_values(self) -> dict[str, Any]:
-        world = self.world
-        left, right = world.pixels
-        values: dict[str, Any] = {
-            "left": [total / left for total in world.left_sums],
-            "right": [total / right for total in world.right_sums],
-            "ultrasonic": world.ultrasonic,
-            "gyro": [world.drive.gyro_angle, world.drive.gyro_rate],
-        }
-        self._encoded = {what: repr(value).encode() for what, value in values.items()}
-        return values
 
     def _wheel(self, port: str) -> Wheel:
         return self.world.drive.left if port == "outB" else self.world.drive.right
@@ -303,9 +256,21 @@ class Bridge:
             return
         self.printed.append(Line(self.now / SECOND, text))
         if self._spec.collaborative and kind == "py":
-            self.conversation.send(text, self.now)
+            self._send(text)
         elif self._spec.collaborative and kind == "image":
             self._send_image()
+
+    def _send(self, text: str) -> int:
+        """Hand ``text`` to the responder and its answer to the conversation. The index of the message."""
+        sent = self.conversation.send(text, self.now)
+        for copy in range(sent.copies):
+            if self._responder is not None:
+                answer = self._responder.answer(text, self.now, sent.message, self.collected())
+            else:
+                self._meter.keep(len(_PINGPONG) + len(text))
+                answer = Answer(_PINGPONG + text)
+            self.conversation.answer(sent, copy, answer)
+        return sent.message
 
     def _send_image(self) -> None:
         left, right = self.world.images()
@@ -313,7 +278,7 @@ class Bridge:
         where = self.world.left_footprint
         text = messages.image_message(left, right)
         self._meter.keep(len(text) + len(left) + len(right))
-        number = self.conversation.send(text, self.now)
+        message = self._send(text)
         self.images.append(
             Image(
                 self.now / SECOND,
@@ -321,7 +286,7 @@ class Bridge:
                 self.world.pose,
                 left,
                 right,
-                number,
+                message,
                 self._spec.floor.label_at(where.x, where.y),
                 self._spec.robot.left_light.diameter,
             )

@@ -32,9 +32,14 @@ class ChannelOfTrial:
         self._channel = channel
         self._chance = Stream(seed, "channel")
 
-    def copies(self, number: int) -> int:
-        """How often the responder receives text ``number``: 0 when it is lost, 2 when it is doubled."""
-        return self._copies(number, 0)
+    def copies(self, number: int, index: int = 0) -> int:
+        """How often the responder receives text ``number``: 0 when it is lost, 2 when it is doubled.
+
+        Each way has chances of its own, from ``index`` on.
+        """
+        if self._chance.uniform(number, index) < self._channel.loss:
+            return 0
+        return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 
     def arrivals(self, number: int, copy: int, sent: int, slept: int) -> tuple[int, ...]:
         """When the answer to a copy of text ``number``, sent at ``sent``, joins the queue; empty when it is lost.
@@ -43,13 +48,8 @@ class ChannelOfTrial:
         """
         index = 16 + 16 * copy
         return tuple(
-            sent + slept + self._delay(number, index + 4 * place) for place in range(self._copies(number, index + 8))
+            sent + slept + self._delay(number, index + 4 * place) for place in range(self.copies(number, index + 8))
         )
-
-    def _copies(self, number: int, index: int) -> int:
-        if self._chance.uniform(number, index) < self._channel.loss:
-            return 0
-        return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 
     def _delay(self, number: int, index: int) -> int:
         seconds = self._channel.delay + self._channel.jitter * self._chance.uniform(number, index)

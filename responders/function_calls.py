@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, surprise
+from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code, ResponderSpec
 from sim.recording import Fault, Verdict
 
 #: Tells the child that no function of the module has to be a responder.
@@ -97,8 +98,6 @@ class _Caller(ResponderProcess):
 
     def __init__(self, spec: ResponderSpec, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
         super().__init__(spec, sandboxes, folder, seed, meter)
-        assert self._child is not None
-        self.sandbox = self._child.sandbox
         self._ended: Fault | None = None
 
     def taken(self) -> tuple[str, ...]:
@@ -114,7 +113,7 @@ class _Caller(ResponderProcess):
             self._child.send(
                 {"do": "call", "function": call.function, "arguments": list(call.arguments), "named": dict(call.named)}
             )
-            frame = self._until("returned", -1, [])
+            frame = self._until("returned")
             needed = _NEEDED.get(frame["kind"])
             if needed is not None and needed not in frame:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the process sent a value without its content")

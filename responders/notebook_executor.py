@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
-from responders.bridge import Bridge, TrialSpec
+from responders.bridge import Bridge
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.trial import MOST_NOTES, read_log, recording_of
+from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.motion import Rectangle
@@ -112,14 +113,14 @@ def execute_notebook(
     with sandboxes.private_folder() as folder:
         process = NotebookProcess(spec, sandboxes, folder, meter)
         try:
-            play = _Execution(process, planner, ground, sandboxes, meter)
-            process.execute(play.perform)
-            play.finish()
+            execution = _Execution(process, planner, ground, sandboxes, meter)
+            process.execute(execution.perform)
+            execution.finish()
         finally:
             process.close()
         log, unread = read_log(folder, meter)
     return ExecutedNotebook(
-        tuple(play.runs),
+        tuple(execution.runs),
         "\n".join(process.output),
         log,
         tuple(process.notes),

@@ -1,6 +1,6 @@
 """The process of a notebook: its cells are executed in it, and it answers the robots that they start.
 
-It keeps what the cells print and what becomes of them; the robots are ``notebook_play.py``'s.
+It keeps what the cells print and what becomes of them; the robots are ``notebook_executor.py``'s.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, surprise
+from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code, ResponderSpec
 from sim.chance import Stream
 from sim.recording import Fault, Verdict
 
@@ -58,7 +59,7 @@ class NotebookProcess(ResponderProcess):
         self.stopped: Fault | None = None
 
     def execute(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
-        """Play all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
+        """Execute all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
         assert self._child is not None
         try:
             self._child.send(
@@ -123,9 +124,9 @@ class NotebookProcess(ResponderProcess):
                 if self._child is not None:
                     self._child.send(reply)
             case _:
-                self._take(frame, -1, [])
+                self._take(frame)
 
-    def _take(self, frame: wire.Frame, message: int, slept: list[int]) -> None:
+    def _take(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "refused":
                 self.note(frame["line"], frame["what"][:200])
@@ -134,7 +135,7 @@ class NotebookProcess(ResponderProcess):
                 self._spend("", "sent")
                 self.note(frame["line"], frame["text"][:400])
             case _:
-                super()._take(frame, message, slept)
+                super()._take(frame)
 
     def _print(self, text: str) -> None:
         if self._cell != self._printed_in:

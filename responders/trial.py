@@ -11,11 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from responders import messages
-from responders.bridge import Bridge, TrialSpec
-from responders.conversation import ResponderProcess
+from responders.bridge import Bridge
 from responders.faults import stopped
+from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict

@@ -8,9 +8,11 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
+
+from sim.recording import SENSORS
 
 Frame = dict[str, Any]
 
@@ -117,7 +119,7 @@ ROBOT: Schema = MappingProxyType(
             },
         ),
         "wait": ({"units": _units}, {}),
-        "read": ({"what": _one_of("left", "right", "ultrasonic", "gyro"), "times": _whole(1, 2)}, {}),
+        "read": ({"what": _one_of(*SENSORS), "times": _whole(1, 2)}, {}),
         "motor_state": ({"port": _port}, {}),
         "paid_motor": ({"port": _port}, {}),
         "until": (
@@ -268,6 +270,13 @@ def _encodable(value: Any) -> Any:
     return value
 
 
-def encode(frame: Mapping[str, Any], number: int) -> bytes:
-    """A frame for a child, as one line that begins with its number."""
-    return json.dumps({"n": number, **frame}, separators=(",", ":")).encode("ascii") + b"\n"
+def encode(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
+    """A frame for a child, as one line that begins with its number.
+
+    What has ``arrived`` is JSON already, and goes into the list ``m`` as it is.
+    """
+    line = json.dumps({"n": number, **frame}, separators=(",", ":")).encode("ascii")
+    if arrived:
+        # Halves of characters too: the child's JSON takes them.
+        line = line[:-1] + f',"m":[{",".join(arrived)}]}}'.encode("utf-8", "surrogatepass")
+    return line + b"\n"

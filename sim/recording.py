@@ -5,12 +5,16 @@ A recording is plain data: it knows neither students nor marks, and nothing in i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sim.columns import Panel, column, columns_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,24 +53,70 @@ class Pose:
     heading: float
 
 
+_LIGHT = Panel("Reflected light, red 0–255", height=1.25, limits=(-10, 265), marks=(0, 64, 128, 192, 255))
+_DISTANCE = Panel("Ultrasonic, cm", limits=(-12, 267), marks=(0, 100, 200), per=10)
+_GYRO = Panel("Gyro, degrees clockwise")
+_WHEELS = Panel("Wheel encoders, degrees", height=0.75, rank=1)
+
+
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows."""
+    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows.
 
-    x: Floats
-    y: Floats
-    heading: Floats  # degrees, unwrapped
-    left_position: Floats  # encoder degrees
-    right_position: Floats
-    left_sums: Integers  # (n, 3): R, G, B summed over the sensor's pixels
-    right_sums: Integers
-    ultrasonic: Floats  # mm
-    gyro: Floats  # degrees, clockwise
+    A column that is not given is not known. This is the table of columns: what the chain packs, what a program can
+    read, what the store keeps, what traces and plots show is taken from here.
+    """
+
+    x: Floats = column("mm", "drive.x")
+    y: Floats = column("mm", "drive.y")
+    heading: Floats = column("degrees, unwrapped", "drive.heading_degrees")
+    left_position: Floats = column("encoder degrees", "drive.left.position", panel=_WHEELS, label="left")
+    right_position: Floats = column("encoder degrees", "drive.right.position", panel=_WHEELS, label="right")
+    left_sums: Integers = column(
+        "R, G, B summed over the sensor's pixels",
+        "left_sums",
+        width=3,
+        whole=True,
+        told_as="left_rgb",
+        sensor="left",
+        reading="left_means",
+        panel=_LIGHT,
+        label="left",
+    )
+    right_sums: Integers = column(
+        "R, G, B summed over the sensor's pixels",
+        "right_sums",
+        width=3,
+        whole=True,
+        told_as="right_rgb",
+        sensor="right",
+        reading="right_means",
+        panel=_LIGHT,
+        label="right",
+    )
+    ultrasonic: Floats = column("mm", "ultrasonic", sensor="ultrasonic", panel=_DISTANCE, label="distance")
+    gyro: Floats = column(
+        "degrees, clockwise",
+        "drive.gyro_angle",
+        sensor="gyro",
+        reading="gyro_angle_and_rate",
+        panel=_GYRO,
+        label="angle",
+    )
     left_pixels: int = 305  # how many pixels the sums are over
     right_pixels: int = 305
 
+    def __post_init__(self) -> None:
+        for each in COLUMNS:
+            if getattr(self, each.name) is None:
+                object.__setattr__(self, each.name, each.unknown(len(self.x)))
+
     def __len__(self) -> int:
         return len(self.x)
+
+    def told(self) -> dict[str, Floats]:
+        """What readers of a recording are told of it, seconds first; every array has n rows."""
+        return {"t": self.t, **{each.told_as: getattr(self, each.told_as) for each in COLUMNS}}
 
     @property
     def t(self) -> Floats:
@@ -82,6 +132,12 @@ class Ticks:
     def right_rgb(self) -> Floats:
         """Mean R, G, B of the right light sensor, 0..255, shape (n, 3)."""
         return self.right_sums / self.right_pixels
+
+
+#: In the order of the chain's rows.
+COLUMNS = columns_of(Ticks)
+#: What a program can read: each sensor, and the path from the world to what it gives.
+SENSORS: Mapping[str, str] = MappingProxyType({each.sensor: each.reading for each in COLUMNS if each.sensor})
 
 
 @dataclass(frozen=True, slots=True)

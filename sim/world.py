@@ -9,7 +9,10 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +21,18 @@ from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Drive
 from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import TICK, Pose, Ticks, Touch
+from sim.recording import COLUMNS, SENSORS, TICK, Pose, Ticks, Touch
 from sim.robot import Robot
 from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
 
-_ROW = struct.Struct("<q5d6q2d")
+_chained = [each for each in COLUMNS if each.in_chain]
+_CHAINED = sum(each.width for each in _chained)
+_ROW = struct.Struct("<q" + "".join(f"{each.width}{'q' if each.whole else 'd'}" for each in _chained))
+_sources = ", ".join(f"*world.{each.source}" if each.width > 1 else f"world.{each.source}" for each in COLUMNS)
+# Written out once, as it is called at every tick: to follow the table there would take a twentieth of the whole tick.
+_row_of: Callable[[World], tuple[float, ...]] = eval(f"lambda world: ({_sources},)")
+_readings = attrgetter(*SENSORS.values())
 _RIGHT_ANGLE = math.pi / 2
 
 
@@ -44,13 +53,12 @@ class Chain:
 
     def __init__(self) -> None:
         self._digest = hashlib.sha256()
+        #: A tick's row; called for each tick.
+        self.add_row = self._digest.update
 
     def add(self, kind: str, time: int, data: bytes) -> None:
         """Something that is not a tick: its kind, when (thirds of a microsecond), and its bytes."""
         self._digest.update(f"{kind}:{time}:{len(data)}:".encode() + data)
-
-    def add_row(self, row: bytes) -> None:
-        self._digest.update(row)
 
     def hexdigest(self) -> str:
         return self._digest.hexdigest()
@@ -112,20 +120,26 @@ class World:
         drive.tick(self.clock)
         moved = x != drive.x or y != drive.y or heading != drive.heading
         self._sense(moved, listen=self.clock % 3 == 0)
-        degrees = drive.heading_degrees
-        row = (
-            drive.x,
-            drive.y,
-            degrees,
-            drive.left.position,
-            drive.right.position,
-            *self.left_sums,
-            *self.right_sums,
-            self.ultrasonic,
-            drive.gyro_angle,
-        )
+        row = _row_of(self)
         self._rows.append(row)
-        self._chain.add_row(_ROW.pack(self.clock * TICK, *row))
+        self._chain.add_row(_ROW.pack(self.clock * TICK, *row[:_CHAINED]))
+
+    def readings(self) -> dict[str, Any]:
+        """What each sensor gives a program, as of the last tick."""
+        return dict(zip(SENSORS, _readings(self), strict=True))
+
+    @property
+    def left_means(self) -> list[float]:
+        """Mean R, G, B of the left light sensor."""
+        return [total / self._lights[0].pixels for total in self.left_sums]
+
+    @property
+    def right_means(self) -> list[float]:
+        return [total / self._lights[1].pixels for total in self.right_sums]
+
+    @property
+    def gyro_angle_and_rate(self) -> list[float]:
+        return [self.drive.gyro_angle, self.drive.gyro_rate]
 
     def images(self) -> tuple[bytes, bytes]:
         """RGBA bytes of the left and the right light sensor, as of the last tick."""
@@ -139,25 +153,15 @@ class World:
         """Where the left light sensor looks."""
         return self._footprints[0]
 
-    @property
-    def pixels(self) -> tuple[int, int]:
-        """How many pixels the left and the right sums are over."""
-        return self._lights[0].pixels, self._lights[1].pixels
-
     def ticks(self) -> Ticks:
         """All rows so far."""
-        table = np.array(self._rows, dtype=np.float64).reshape(-1, 13)
-        sums = table[:, 5:11].astype(np.int64)
+        table = np.array(self._rows, dtype=np.float64).reshape(-1, sum(each.width for each in COLUMNS))
+        parts = np.split(table, np.cumsum([each.width for each in COLUMNS])[:-1], axis=1)
         return Ticks(
-            x=table[:, 0].copy(),
-            y=table[:, 1].copy(),
-            heading=table[:, 2].copy(),
-            left_position=table[:, 3].copy(),
-            right_position=table[:, 4].copy(),
-            left_sums=sums[:, :3].copy(),
-            right_sums=sums[:, 3:].copy(),
-            ultrasonic=table[:, 11].copy(),
-            gyro=table[:, 12].copy(),
+            **{
+                each.name: (part if each.width > 1 else part[:, 0]).astype(each.dtype)
+                for each, part in zip(COLUMNS, parts, strict=True)
+            },
             left_pixels=self._lights[0].pixels,
             right_pixels=self._lights[1].pixels,
         )

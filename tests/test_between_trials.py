@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from builders import echo
-from responders.sandbox import traces
+from responders.sandbox import reading_dates
 from responders.sandbox.inside import grants
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.zygote import Isolation
@@ -48,9 +48,9 @@ with Sandboxes() as sandboxes:
 """
 _READ = """
 import sys
-from responders.sandbox import traces
+from responders.sandbox import reading_dates
 from responders.sandbox.inside import grants
-print(traces.read_beforehand([sys.argv[1]]))
+print(reading_dates.read_beforehand([sys.argv[1]]))
 """
 
 
@@ -89,7 +89,7 @@ def test_what_was_read_beforehand_is_not_dated_again(readable: Path) -> None:
     _age(readable)
     if _dates(readable) == dated:
         pytest.skip("nothing is dated on this file system")
-    assert traces.read_beforehand([str(readable)]) is None
+    assert reading_dates.read_beforehand([str(readable)]) is None
     before = _dates(readable)
     time.sleep(0.02)
     _read_all(readable)
@@ -98,9 +98,9 @@ def test_what_was_read_beforehand_is_not_dated_again(readable: Path) -> None:
 
 def test_a_file_from_the_future_is_dated_at_each_reading(readable: Path) -> None:
     os.utime(readable / "file", (time.time(), time.time() + _WEEK))
-    if traces.read_beforehand([str(readable)]) is None:
+    if reading_dates.read_beforehand([str(readable)]) is None:
         pytest.skip("nothing is dated on this file system")
-    assert "dated in the future" in str(traces.read_beforehand([str(readable)]))
+    assert "dated in the future" in str(reading_dates.read_beforehand([str(readable)]))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
@@ -155,7 +155,7 @@ def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
 def test_what_is_read_is_read_again_after_half_a_day(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[float] = []
     clock = [time.time()]
-    monkeypatch.setattr(traces, "read_beforehand", lambda *_: read.append(clock[0]))
+    monkeypatch.setattr(reading_dates, "read_beforehand", lambda *_: read.append(clock[0]))
     monkeypatch.setattr("responders.sandbox.manager.time.time", lambda: clock[0])
     with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
         for hours in (0, 1, 10, 2, 20, -100):

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from responders.conversation import Code
 from responders.function_calls import FunctionCall, call_functions
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.code import judge_source

@@ -20,6 +20,7 @@ from hostile import FIND_WIRE, forged
 from processes import children, until
 from responders.bridge import Bridge
 from responders.conversation import Conversation
+from responders.responder_process import ResponderProcess
 from responders.sandbox.meter import JobLimits, JobMeter
 from running import run_program
 from service.grading.grader import grade
@@ -165,7 +166,7 @@ _STUMBLES = [
     pytest.param(Bridge, "_set_motor", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
     pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
     pytest.param(Bridge, "_print", "print('x')", None, id="a line"),
-    pytest.param(Conversation, "_queue_entry", "print('PY::x')", ECHO, id="an answer"),
+    pytest.param(ResponderProcess, "_answer", "print('PY::x')", ECHO, id="an answer"),
     pytest.param(Conversation, "deliver", "from time import sleep\nprint('PY::x')\nsleep(1)", ECHO, id="a delivery"),
 ]
 

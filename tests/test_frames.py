@@ -21,14 +21,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from responders import wire
-from responders.bridge import Bridge, ProgramSpec, TrialSpec
+from responders.bridge import Bridge
 from responders.channel import Channel
-from responders.conversation import Code, ResponderProcess, ResponderSpec
 from responders.notebook_executor import PlannedRun, execute_notebook
 from responders.notebook_process import NotebookSpec
+from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox import running_child
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
+from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
 from sim.arena import Arena
 from sim.camera import Cameras
 from sim.floors import floor
@@ -195,7 +196,7 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
         spec = ResponderSpec(Code("responder.py", ""), {}, LIMITS, 1 << 40)
         responder = ResponderProcess(spec, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
         faults = [responder.load()]
-        faults += [responder.answer("PY::x", n, n)[2] for n in range(len(frames)) if responder.alive]
+        faults += [responder.answer("PY::x", n, n, Collected()).fault for n in range(len(frames)) if responder.alive]
     assert not any(fault.staff for fault in faults if fault is not None), faults
     assert len(pickle.dumps((responder.output, responder.calls, responder.notes, faults))) < 2 * BUDGET
 

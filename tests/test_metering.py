@@ -12,12 +12,12 @@ import pytest
 import running
 from floods import CALL, ECHO, FLOODS, Flood, long
 from hostile import flood
-from responders.conversation import Code
 from responders.function_calls import FunctionCall
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Fault, Recording, Verdict

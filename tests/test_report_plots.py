@@ -97,7 +97,7 @@ def test_path_tells_units_start_end_and_images() -> None:
 
 def test_sensor_panels_and_events() -> None:
     recording = build.line_follower_grade().trials[1].recording
-    light, distance, _, wheels = panels_of(recording)
+    light, distance, *_, wheels = panels_of(recording)
     assert [curve.label for curve in light.curves] == ["left", "right"]
     assert distance.curves[0].values[0] == recording.ticks.ultrasonic[0] / 10
     assert np.array_equal(wheels.curves[1].values, recording.ticks.right_position)

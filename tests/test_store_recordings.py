@@ -14,7 +14,7 @@ import report_builders
 from service.grading.grade import Grade
 from service.store.recordings import RecordingError, from_bytes, keep, to_bytes
 from service.store.versions import assignment_from_bytes, assignment_to_bytes
-from sim.recording import Line, Message, Recording, Ticks
+from sim.recording import COLUMNS, Line, Message, Recording, Ticks
 from submissions.assignment_file import catalogue, find_assignment
 
 GRADES = {
@@ -65,6 +65,19 @@ def test_odd_values_come_back_as_they_were() -> None:
 def test_a_recording_without_ticks_comes_back() -> None:
     recording = report_builders.line_follower_recording(0)
     _assert_same(recording, from_bytes(to_bytes(recording)))
+
+
+def test_a_recording_that_is_older_than_a_column_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = report_builders.line_follower_recording(40)
+    older = tuple(column for column in COLUMNS if column.name not in ("gyro", "right_sums"))
+    with monkeypatch.context() as then:
+        then.setattr("service.store.recordings.COLUMNS", older)
+        data = to_bytes(recording)
+    ticks = from_bytes(data).ticks
+    assert np.isnan(ticks.gyro).all()
+    assert ticks.gyro.shape == (40,)
+    assert ticks.right_sums.tolist() == [[0, 0, 0]] * 40
+    assert ticks.left_sums.tobytes() == recording.ticks.left_sums.tobytes()
 
 
 def test_a_minute_of_driving_takes_less_than_half_of_its_raw_size() -> None:

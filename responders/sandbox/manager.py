@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
-from responders.sandbox import traces
+from responders.sandbox import reading_dates
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.inside import grants
 from responders.sandbox.meter import JobMeter
@@ -67,17 +67,17 @@ class Sandboxes:
     def remembers(self) -> str | None:
         """Why a trial here could leave something for a later one to find; None for the next hours if it cannot."""
         now = time.time()
-        if not 0 < self._forgets_until - now <= traces.HOLDS_SECONDS:
+        if not 0 < self._forgets_until - now <= reading_dates.HOLDS_SECONDS:
             zygote = self._zygote("robot")
             zygote.try_isolation()
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
                 own = [own_modules(role) for role in ROLES]
-                dated = traces.read_beforehand(grants.readable(own), grants.listable(own))
+                dated = reading_dates.read_beforehand(grants.readable(own), grants.listable(own))
                 if dated is not None:
                     return dated
-            self._forgets_until = now + traces.HOLDS_SECONDS
+            self._forgets_until = now + reading_dates.HOLDS_SECONDS
         return None
 
     def private_folder(self) -> contextlib.AbstractContextManager[Path]:

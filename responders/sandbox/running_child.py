@@ -13,7 +13,7 @@ import select
 import signal
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,9 +98,9 @@ class Child:
         """
         self._meter, self._blamed, self._overran = meter, blamed, overran
 
-    def send(self, frame: dict[str, Any]) -> None:
-        """Send one frame; a child that does not read it shows up at the next ``receive``."""
-        data = memoryview(wire.encode(frame, self._sent))
+    def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
+        """Send one frame, with what has ``arrived`` as JSON; a child that is deaf shows at the next ``receive``."""
+        data = memoryview(wire.encode(frame, self._sent, arrived))
         self._sent += 1
         began = time.monotonic()
         while data:

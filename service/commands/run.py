@@ -10,11 +10,10 @@ from typing import Annotated
 import typer
 
 from models import weights_bytes
-from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
+from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from service.grading.grade import TrialResult

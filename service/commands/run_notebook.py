@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import typer
 
-from responders.bridge import TrialSpec
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from service.reports.readable import readable

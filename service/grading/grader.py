@@ -11,11 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.notebook_trial import Marking, NotebookToRun, run_notebook_trial

@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code
 from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code, ProgramSpec, TrialSpec
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor

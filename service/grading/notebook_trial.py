@@ -1,6 +1,6 @@
 """One trial of a notebook: it is executed from top to bottom, and the marked run becomes the trial's recording.
 
-What is marked is the assignment's to say; what the magics come to is ``notebook_stage.py``'s.
+What is marked is the assignment's to say; what the magics come to is ``notebook_runs.py``'s.
 """
 
 from __future__ import annotations
@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from responders.bridge import TrialSpec
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle

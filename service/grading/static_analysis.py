@@ -10,17 +10,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
-from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, Returned
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import Code
 from service.grading.grade import TrialResult
 from service.grading.judging.case import StaticAnalysis
 from service.grading.judging.code import calls_of
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
 from sim.chance import Stream
-from sim.recording import Pose, Recording
+from sim.recording import Pose
 from submissions.assignment import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.magics import Flags
@@ -128,7 +128,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
         "end": _pose(recording.end),
         "end_t": recording.end_t,
         "verdict": str(recording.verdict),
-        "ticks": _ticks(recording),
+        "ticks": {name: column.tolist() for name, column in recording.ticks.told().items()},
         "printed": [[line.t, line.text] for line in recording.printed],
         "spoken": [[line.t, line.text] for line in recording.spoken],
         "messages": [
@@ -223,20 +223,3 @@ def _check(
 
 def _pose(pose: Pose) -> dict[str, float]:
     return {"x": pose.x, "y": pose.y, "heading": pose.heading}
-
-
-def _ticks(recording: Recording) -> dict[str, Any]:
-    ticks = recording.ticks
-    columns = {
-        "t": ticks.t,
-        "x": ticks.x,
-        "y": ticks.y,
-        "heading": ticks.heading,
-        "left_position": ticks.left_position,
-        "right_position": ticks.right_position,
-        "left_rgb": ticks.left_rgb,
-        "right_rgb": ticks.right_rgb,
-        "ultrasonic": ticks.ultrasonic,
-        "gyro": ticks.gyro,
-    }
-    return {name: column.tolist() for name, column in columns.items()}

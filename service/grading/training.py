@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from responders.conversation import Code
 from responders.sandbox.meter import JobMeter
 from responders.training import Images, Named, TrainingSpec
+from responders.trial_spec import Code
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
 from service.grading.judging.label_patches import grey_image

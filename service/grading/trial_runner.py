@@ -12,8 +12,6 @@ from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
 
-from responders.bridge import TrialSpec
-from responders.conversation import Code
 from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
 from responders.notebook_process import NotebookSpec
@@ -25,6 +23,7 @@ from responders.sandbox.running_child import ChildLimits, KilledFromOutside
 from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
+from responders.trial_spec import Code, TrialSpec
 from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras

@@ -18,20 +18,8 @@ def trace(recording: Recording) -> dict[str, Any]:
     Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees
     clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists.
     """
-    ticks = recording.ticks
     return {
-        "ticks": {
-            "t": _numbers(ticks.t.tolist()),
-            "x": _numbers(ticks.x.tolist()),
-            "y": _numbers(ticks.y.tolist()),
-            "heading": _numbers(ticks.heading.tolist()),
-            "left_position": _numbers(ticks.left_position.tolist()),
-            "right_position": _numbers(ticks.right_position.tolist()),
-            "left_rgb": [_numbers(row) for row in ticks.left_rgb.tolist()],
-            "right_rgb": [_numbers(row) for row in ticks.right_rgb.tolist()],
-            "ultrasonic": _numbers(ticks.ultrasonic.tolist()),
-            "gyro": _numbers(ticks.gyro.tolist()),
-        },
+        "ticks": {name: _numbers(column.tolist()) for name, column in recording.ticks.told().items()},
         "printed": _lines(recording.printed),
         "spoken": _lines(recording.spoken),
         "messages": [
@@ -105,8 +93,8 @@ def _lines(lines: Iterable[Line]) -> list[list[float | str | None]]:
     return [[_finite(line.t), storable(line.text)] for line in lines]
 
 
-def _numbers(values: Iterable[float]) -> list[float | None]:
-    return [_finite(value) for value in values]
+def _numbers(values: Iterable[Any]) -> list[Any]:
+    return [_numbers(value) if isinstance(value, list) else _finite(value) for value in values]
 
 
 def _finite(value: float) -> float | None:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.store.codec import decode, decoded_arguments, encode
-from sim.recording import Image, Recording, Ticks
+from sim.columns import Column
+from sim.recording import COLUMNS, Image, Recording, Ticks
 
 #: What one grade's recordings may take together, compressed; a flood of output must not fill the database.
 GRADE_BYTES = 64_000_000
@@ -23,8 +24,6 @@ GRADE_BYTES = 64_000_000
 SMALLEST_CAP = 256_000
 _TEXT_KEPT = 2000
 
-_FLOATS = ("x", "y", "heading", "left_position", "right_position", "ultrasonic", "gyro")
-_INTEGERS = ("left_sums", "right_sums")
 #: What fields are called in recordings that earlier releases kept.
 _FORMERLY = {"walls": "sandbox", "patches": "label_patches"}
 _Bytes = NDArray[np.uint8]
@@ -81,10 +80,9 @@ def to_bytes(recording: Recording) -> bytes:
         "picture_sizes": np.array([[len(i.left), len(i.right)] for i in recording.images], np.int64),
         "pictures": _bytes_array(b"".join(i.left + i.right for i in recording.images)),
     }
-    for name in _FLOATS:
-        arrays[name] = _shuffled(np.asarray(getattr(ticks, name), np.float64).reshape(-1, 1))
-    for name in _INTEGERS:
-        arrays[name] = _shuffled(np.asarray(getattr(ticks, name), np.int64).reshape(-1, 3))
+    for column in COLUMNS:
+        values = np.asarray(getattr(ticks, column.name), column.dtype)
+        arrays[column.name] = _shuffled(values.reshape(-1, column.width))
     buffer = io.BytesIO()
     np.savez(buffer, **cast(dict[str, Any], arrays))
     return zlib.compress(buffer.getvalue(), 6)
@@ -97,8 +95,8 @@ def from_bytes(data: bytes) -> Recording:
             words = json.loads(bytes(arrays["words"]))
             pixels = bytes(arrays["pictures"])
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
-            columns = {name: _unshuffled(arrays[name], np.float64)[:, 0].copy() for name in _FLOATS}
-            columns |= {name: _unshuffled(arrays[name], np.int64).copy() for name in _INTEGERS}
+            # A recording may be older than a column.
+            columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pixels)
         words = {_FORMERLY.get(name, name): value for name, value in words.items()}
@@ -139,10 +137,9 @@ def _unshuffled(data: _Bytes, kind: type[np.generic]) -> NDArray[Any]:
     return np.ascontiguousarray(np.cumsum(steps, axis=1, dtype=np.uint64).view(kind).T)
 
 
-def _no_ticks() -> Ticks:
-    nothing = np.empty(0)
-    sums = np.empty((0, 3), np.int64)
-    return Ticks(nothing, nothing, nothing, nothing, nothing, sums, sums, nothing, nothing)
+def _column(data: _Bytes, column: Column) -> NDArray[Any]:
+    values = _unshuffled(data, column.dtype)
+    return (values if column.width > 1 else values[:, 0]).copy()
 
 
 def _noted(recording: Recording, what: str) -> Recording:
@@ -177,5 +174,5 @@ def _without_words(recording: Recording) -> Recording:
 
 
 def _without_ticks(recording: Recording) -> Recording:
-    ticks = replace(_no_ticks(), left_pixels=recording.ticks.left_pixels, right_pixels=recording.ticks.right_pixels)
+    ticks = Ticks(np.empty(0), left_pixels=recording.ticks.left_pixels, right_pixels=recording.ticks.right_pixels)
     return _noted(replace(recording, ticks=ticks), "its ticks are left out")

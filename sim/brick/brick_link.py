@@ -5,7 +5,6 @@ It knows no physics: positions, sensor values and the time come with the answers
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -17,7 +16,6 @@ READ = SECOND // 100
 FREE_READS = 100_000
 
 _WAITS = frozenset({"wait", "read", "until", "until_said", "paid_motor"})
-_SENSORS = ("left", "right", "ultrasonic", "gyro")
 
 
 def _unconnected(frame: Frame) -> NoReturn:
@@ -35,6 +33,7 @@ class Link:
         self._receive: Callable[[], Frame] | None = None
         self._stuck: Callable[[], None] | None = None
         self._free = 0
+        self._sensors: list[str] = []
         self._seen: Frame = {}  # what the sensors read in tick number _seen_in
         self._seen_in = -1
 
@@ -44,8 +43,13 @@ class Link:
         send_later: Callable[[Frame], None],
         receive: Callable[[], Frame],
         stuck: Callable[[], None],
+        sensors: list[str],
     ) -> None:
-        """``send_later`` may hold a frame back until the next one; ``stuck`` ends a program that never waits."""
+        """``send_later`` may hold a frame back until the next one; ``stuck`` ends a program that never waits.
+
+        Each time one of ``sensors`` is read, the world tells what they all give, in this order.
+        """
+        self._sensors = sensors
         self._send, self._send_later, self._receive, self._stuck = send, send_later, receive, stuck
 
     def tell(self, frame: Frame) -> None:
@@ -71,7 +75,7 @@ class Link:
         arrived = answer.get("m")
         if arrived:
             # A new dictionary for new messages: what a program took earlier stays as it was.
-            self.state = {"messages": [*self.state["messages"], *map(json.loads, arrived)]}
+            self.state = {"messages": [*self.state["messages"], *arrived]}
         return answer.get("v")
 
     def read(self, what: str, times: int) -> Any:
@@ -88,7 +92,7 @@ class Link:
             self._send_later(frame)
             return self._seen[what]
         values = self.ask(frame)
-        self._seen = dict(zip(_SENSORS, values, strict=True))
+        self._seen = dict(zip(self._sensors, values, strict=True))
         self._seen_in = self.units // TICK
         return self._seen[what]
 

@@ -53,10 +53,11 @@ class Wire:
             line, newline, rest = self._pending.partition(b"\n")
             if newline:
                 self._pending = rest
+                number = self._received
+                self._received += 1  # even if a program that calls itself too deeply cannot read it
                 frame: Frame = json.loads(line)
-                if frame.pop("n") != self._received:
+                if frame.pop("n") != number:
                     os._exit(0)
-                self._received += 1
                 return frame
             data = os.read(self._fd, MOST)
             if not data:

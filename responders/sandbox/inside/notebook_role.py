@@ -14,9 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 from . import cell_source, student_code
-from .answering import ResponderRole
 from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
+from .responder_role import ResponderRole
 from .shell import Shell
 
 _MOST_NOTES = 60
@@ -39,7 +39,7 @@ class NotebookRole(ResponderRole):
         return self._namespace
 
     def run(self) -> None:
-        """Play all cells, then answer until the worker closes the wire."""
+        """Execute all cells, then answer until the worker closes the wire."""
         from nbev3devsim import unseen
 
         self._prepare()

@@ -1,70 +1,198 @@
-"""The responder's part: what is imported before any fork, and whether a module or a notebook is to be run.
+"""A responder at work: the student's module is run once, then answers one message after the other.
 
-What runs then is in ``answering.py`` and ``notebook_role.py``.
+Which texts reach it and what becomes of the answers is the bridge's business, on the other side of the wire.
 """
 
 from __future__ import annotations
 
-import contextlib
-import importlib
+import functools
+import os
+import signal
+import sys
+import types
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
 
-from . import model_files, source_reader  # noqa: F401
-from .answering import ResponderRole
-from .frames import Wire
+from . import determinism, function_calls, model_files, refusals, student_code
+from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
-from .notebook_role import NotebookRole
 
-#: What answering takes.
-NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
-_PRELOADED = (
-    "joblib",
-    "numpy",
-    "numpy.random",
-    "pandas",
-    "PIL.Image",
-    "sklearn.ensemble",
-    "sklearn.linear_model",
-    "sklearn.metrics",
-    "sklearn.model_selection",
-    "sklearn.neighbors",
-    "sklearn.neural_network",
-    "sklearn.pipeline",
-    "sklearn.preprocessing",
-    "sklearn.svm",
-    "sklearn.tree",
-    "json",
-    "math",
-    "re",
-    "statistics",
-    "nn_tools.network_views",
-    "nn_tools.sensor_data",
-    "nn_tools.weights",
-)
+_NOTED = ("parser", "agent", "logger")
 
 
-def preload(without: list[str]) -> None:
-    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
-    missing = (ImportError,) if without else ()
-    for name in _PRELOADED:
-        with contextlib.suppress(*missing):
-            importlib.import_module(name)
-    model_files.preload_onnx()
-    with contextlib.suppress(*missing):
-        model_files.explain_joblib()
-        _ask_the_machine()
+class ResponderRole:
+    """The student's module, and the calls inside it that the sequence diagram shows."""
+
+    def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
+        self._wire = wire
+        self._grants = grants
+        self._spec = spec
+        self._name: str = spec["name"]
+        self._function: str | None = spec["function"]
+        self._units = 0
+        self._namespace: dict[str, Any] = {}
+        self._defines_msg = False
+        self._stack: list[str] = []
+        self._calls = 0
+
+    def run(self) -> None:
+        """Load the module, then answer until the worker closes the wire."""
+        self._prepare()
+        self._wire.send({"do": "ready", "error": self._load(self._spec["text"])})
+        self._serve()
+
+    def _prepare(self) -> None:
+        """Everything that stands before student code runs: output, clock, chance, and an empty module."""
+        from nbev3devsim.load_nbev3devwidget import eds, roboSim
+
+        signal.signal(signal.SIGXCPU, self._busy)
+        student_code.install_output(self._emit)
+        determinism.install_clock(lambda: self._units, self._sleep)
+        determinism.install_chance(self._spec["seed"])
+        refusals.install(self._grants, self._name, self._refused)
+        model_files.install_version_notes(self._name, self._refused)
+        # Last, so that no file of the student's stands in for a library's.
+        sys.path.append(os.getcwd())
+        module = types.ModuleType("__main__")
+        sys.modules["__main__"] = module
+        self._namespace = module.__dict__
+        self._namespace.update(roboSim=roboSim, eds=eds)
+
+    def _serve(self) -> None:
+        while True:
+            message = self._wire.receive()
+            if message["do"] == "call":
+                self._wire.send(function_calls.returned(self._namespace, self._name, message))
+            else:
+                self._hear(message, 0)
+
+    def _hear(self, message: Frame, began: int) -> None:
+        """Answer one message of a run that began at ``began``; what the robot has logged by then comes with it."""
+        from nbev3devsim.load_nbev3devwidget import roboSim
+
+        self._units = max(self._units, began + message["t"])
+        roboSim.collect(message.get("data", []), message.get("images", []))
+        self._wire.send(self._answer(message["text"]))
+
+    def _load(self, text: str) -> Frame | None:
+        """Run the module; the error that stopped it, or that there is no responder in it."""
+        try:
+            exec(student_code.compile_source(text, self._name), self._namespace)
+            if self._function != function_calls.NO_RESPONDER:
+                self._find()
+        except BaseException as error:
+            return student_code.describe(error, self._name)
+        self._defines_msg = "msg" in self._namespace
+        return None
+
+    def _find(self) -> Callable[[str], Any]:
+        """The function asked for; else ``roboSim.pyresponder``, ``responder``, or the only ``*_responder``."""
+        from nbev3devsim.load_nbev3devwidget import roboSim
+
+        if self._function is not None:
+            if not callable(self._namespace.get(self._function)):
+                raise LookupError(f"there is no function called {self._function}")
+            return self._namespace[self._function]  # type: ignore[no-any-return]
+        if callable(roboSim.pyresponder):
+            return roboSim.pyresponder
+        if callable(self._namespace.get("responder")):
+            return self._namespace["responder"]  # type: ignore[no-any-return]
+        found = {
+            name: value
+            for name, value in self._namespace.items()
+            if name.endswith("_responder") and isinstance(value, types.FunctionType)
+        }
+        if len(found) == 1:
+            return next(iter(found.values()))
+        if found:
+            raise LookupError(
+                f"which of {', '.join(found)} is the responder? assign one of them to roboSim.pyresponder"
+            )
+        raise LookupError(
+            "there is no responder: define a function called responder, or assign one to roboSim.pyresponder"
+        )
+
+    def _answer(self, text: str) -> Frame:
+        if not self._defines_msg:
+            self._namespace["msg"] = text
+        self._note_calls()
+        self._stack, self._calls = ["responder"], 0
+        try:
+            answer = self._find()(text)
+        except BaseException as error:
+            return {"do": "answer", "kind": "error", "error": student_code.describe(error, self._name)}
+        if not isinstance(answer, str):
+            return {"do": "answer", "kind": "other", "type": type(answer).__name__}
+        if not fits(answer):
+            return {"do": "answer", "kind": "long", "length": len(answer)}
+        return {"do": "answer", "kind": "text", "text": str(answer)}
+
+    def _note_calls(self) -> None:
+        """Wrap what parser, agent and logger are bound to now, and the predict of every bound network."""
+        for name, value in list(self._namespace.items()):
+            if name in _NOTED:
+                if callable(value) and not hasattr(value, "_robomark_noted"):
+                    self._namespace[name] = self._noted(name, value)
+                continue
+            predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
+            if callable(predict) and not hasattr(predict, "_robomark_noted"):
+                try:
+                    value.predict = self._noted(name, predict)
+                except Exception:
+                    continue
+
+    def _noted(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            caller, depth = self._stack[-1] if self._stack else "responder", len(self._stack)
+            self._stack.append(name)
+            result: Any = None
+            try:
+                result = function(*args, **kwargs)
+            finally:
+                if self._stack:
+                    self._stack.pop()
+                self._report(depth, caller, name, args, result)
+            return result
+
+        call._robomark_noted = True  # type: ignore[attr-defined]
+        return call
+
+    def _report(self, depth: int, caller: str, callee: str, args: tuple[Any, ...], result: Any) -> None:
+        self._calls += 1
+        if self._calls <= 50:
+            self._wire.send(
+                {
+                    "do": "call",
+                    "depth": depth,
+                    "caller": caller,
+                    "callee": clip(callee, 60),
+                    "argument": _shown(args[0]) if args else "",
+                    "result": _shown(result),
+                }
+            )
+
+    def _sleep(self, units: int) -> None:
+        self._units += units
+        self._wire.send({"do": "sleep", "units": min(units, 10**15)})
+
+    def _emit(self, text: str) -> None:
+        self._wire.send({"do": "print", "text": fitted(text)})
+
+    def _refused(self, what: str, line: int | None) -> None:
+        self._wire.send({"do": "refused", "what": what, "line": line})
+
+    def _busy(self, _: int, frame: FrameType | None) -> None:
+        try:
+            self._wire.send({"do": "busy", "line": student_code.line_of(frame, self._name)})
+        finally:
+            os._exit(0)
 
 
-def _ask_the_machine() -> None:
-    """What scikit-learn asks once about libraries and processors, where it may still open files: neighbours need it."""
-    import joblib
-    from sklearn.utils.parallel import _get_threadpool_controller
-
-    _get_threadpool_controller()
-    joblib.cpu_count(only_physical_cores=True)
-
-
-def run(wire: Wire, grants: Grants) -> None:
-    """Receive a module or a notebook, run it, and answer."""
-    spec = wire.receive()
-    requester = NotebookRole if "cells" in spec else ResponderRole
-    requester(wire, grants, spec).run()
+def _shown(value: Any) -> str:
+    """A short text for a value; whatever its repr does, this does not fail."""
+    try:
+        return clip(repr(value), 80)
+    except Exception:
+        return f"<{type(value).__name__}>"

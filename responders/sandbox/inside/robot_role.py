@@ -49,7 +49,7 @@ def run(wire: Wire, grants: Grants) -> None:
         link.ask({"do": "wait", "units": units})
 
     signal.signal(signal.SIGXCPU, busy)
-    link.connect(wire.send, wire.send_later, wire.receive, stuck)
+    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"])
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(spec["seed"])

@@ -40,7 +40,7 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     if role_name == "robot":
         from . import robot_role as role
     else:
-        from . import responder_role as role  # type: ignore[no-redef]
+        from . import responder_zygote as role  # type: ignore[no-redef]
     for name in role.NEEDED:
         importlib.import_module(name)
     closed = withheld.keep_out(tuple(without))

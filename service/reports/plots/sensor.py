@@ -31,8 +31,9 @@ from service.reports.plots.style import (
     set_tick_type,
     write,
 )  # fmt: skip
+from sim.columns import Panel
 from sim.recorded import seconds_at
-from sim.recording import Recording
+from sim.recording import COLUMNS, Recording
 
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's own title
@@ -50,13 +51,10 @@ class ReadingCurve:
 
 @dataclass(frozen=True, slots=True)
 class ReadingPanel:
-    """Curves that share a unit. ``limits`` None fits them."""
+    """Curves that share a unit."""
 
-    title: str
-    height: float
+    panel: Panel
     curves: tuple[ReadingCurve, ...]
-    limits: tuple[float, float] | None = None
-    ticks: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     recording = trial.recording
     panels, strips = panels_of(recording), strips_of(recording)
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
-    body = sum(panel.height + _GAP for panel in panels)
+    body = sum(each.panel.height + _GAP for each in panels)
     figure = new_figure(HEAD + strip_height + body + 0.36, title, _subtitle(trial))
     end = max(recording.end_t, seconds_at(len(recording.ticks)), 0.1)
     top = float(figure.get_size_inches()[1]) - HEAD
@@ -82,13 +80,14 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     if strips:
         top -= strip_height
         _draw_strips(axes_at(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
-    for number, panel in enumerate(panels):
-        top -= panel.height + _GAP
-        axes = axes_at(figure, _LEFT_EDGE, top, width, panel.height)
-        write(figure, _LEFT_EDGE, top + panel.height + 0.045, panel.title, size=8, bold=True)
-        _draw_panel(axes, panel, recording.ticks.t, end)
-        if len(panel.curves) > 1:
-            _name_curves(figure, panel, top + panel.height + 0.045)
+    for number, each in enumerate(panels):
+        height = each.panel.height
+        top -= height + _GAP
+        axes = axes_at(figure, _LEFT_EDGE, top, width, height)
+        write(figure, _LEFT_EDGE, top + height + 0.045, each.panel.title, size=8, bold=True)
+        _draw_panel(axes, each, recording.ticks.t, end)
+        if len(each.curves) > 1:
+            _name_curves(figure, each, top + height + 0.045)
         if number < len(panels) - 1:
             axes.tick_params(labelbottom=False)
         else:
@@ -98,25 +97,15 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
 
 def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
     """The panels that ``draw_sensors`` shows, top to bottom."""
-    ticks = recording.ticks
-    return (
-        ReadingPanel(
-            "Reflected light, red 0–255",
-            1.25,
-            (ReadingCurve("left", ticks.left_rgb[:, 0]), ReadingCurve("right", ticks.right_rgb[:, 0])),
-            (-10, 265),
-            (0, 64, 128, 192, 255),
-        ),
-        ReadingPanel(
-            "Ultrasonic, cm", 0.62, (ReadingCurve("distance", ticks.ultrasonic / 10),), (-12, 267), (0, 100, 200)
-        ),
-        ReadingPanel("Gyro, degrees clockwise", 0.62, (ReadingCurve("angle", ticks.gyro),)),
-        ReadingPanel(
-            "Wheel encoders, degrees",
-            0.75,
-            (ReadingCurve("left", ticks.left_position), ReadingCurve("right", ticks.right_position)),
-        ),
-    )
+    told = recording.ticks.told()
+    curves: dict[Panel, list[ReadingCurve]] = {}
+    for column in COLUMNS:
+        if column.panel is not None:
+            values = told[column.told_as]
+            shown = values if values.ndim == 1 else values[:, 0]
+            curves.setdefault(column.panel, []).append(ReadingCurve(column.label, shown / column.panel.per))
+    ordered = sorted(curves, key=lambda panel: panel.rank)
+    return tuple(ReadingPanel(panel, tuple(curves[panel])) for panel in ordered)
 
 
 def strips_of(recording: Recording) -> tuple[Strip, ...]:
@@ -161,10 +150,10 @@ def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end
     axes.set_xlim(0, end)
     for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
         axes.plot(times, curve.values, color=colour, linewidth=width, dashes=dashes or (None, None))
-    limits = panel.limits or _fitted(panel)
+    limits = panel.panel.limits or _fitted(panel)
     axes.set_ylim(*limits)
-    if panel.ticks:
-        axes.set_yticks(panel.ticks)
+    if panel.panel.marks:
+        axes.set_yticks(panel.panel.marks)
     else:
         axes.locator_params(axis="y", nbins=4)
     axes.grid(axis="both", color=RULE, linewidth=0.5, alpha=0.7)

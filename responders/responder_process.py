@@ -1,0 +1,169 @@
+"""The process of a responder during one trial: it is sent a text, and gives an answer or a fault.
+
+It knows no channel and no other message; which texts reach it and when its answers arrive is ``conversation.py``'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from responders import messages, wire
+from responders.conversation import Answer
+from responders.faults import error_fault, refusal, stopped, surprise
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.running_child import Child
+from responders.trial_spec import ResponderSpec
+from sim.chance import Stream
+from sim.recording import SECOND, Call, Fault, Verdict
+
+_MOST_NOTES = 200
+#: Of the calls that are shown, and of the characters of each of their parts.
+_MOST_CALLS, _MOST_SHOWN = 10_000, 200
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """What a robot has logged: name, value, the program's time or None, and the time; and images as the kit keeps them.
+
+    Images are texts ``left 245,226,... 30``: side, RGBA numbers, tick.
+    """
+
+    data: tuple[tuple[str, float, float | None, float], ...] = ()
+    images: tuple[str, ...] = ()
+
+
+class ResponderProcess:
+    """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
+
+    _schema = wire.RESPONDER
+
+    def __init__(self, spec: ResponderSpec, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
+        self._spec = spec
+        self._folder = folder
+        self._meter = meter
+        self.output: list[str] = []
+        self._output_left = spec.output_bytes
+        self.calls: list[Call] = []
+        self.notes: list[str] = []
+        self._message = -1  # the index of the one that is being answered
+        self._slept = 0  # since it was asked for that answer
+        for name, data in spec.files.items():
+            (folder / name).write_bytes(data)
+        self._child: Child | None = sandboxes.spawn("responder", spec.limits, folder, meter)
+        self.sandbox = self._child.sandbox
+        self._seed = seed
+
+    def load(self) -> Fault | None:
+        """Run the module. The fault that kept it from answering, if any."""
+        assert self._child is not None
+        try:
+            self._child.send(
+                {
+                    "name": self._spec.code.name,
+                    "text": self._spec.code.text,
+                    "seed": Stream(self._seed, "responder").integer(0),
+                    "function": self._spec.function,
+                }
+            )
+            frame = self._until("ready")
+        except ChildStopped as stop:
+            return self._stopped(stop, 0)
+        except Exception as error:
+            return self._stopped(surprise(error), 0)
+        if frame["error"] is not None:
+            self.close()
+            return error_fault(frame["error"], 0, "responder")
+        return None
+
+    @property
+    def alive(self) -> bool:
+        return self._child is not None
+
+    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
+        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one."""
+        if self._child is None:
+            return Answer()
+        self._message, self._slept = message, 0
+        try:
+            self._child.send(
+                {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
+            )
+            return self._answer(self._until("answer"), t)
+        except ChildStopped as stop:
+            return Answer(fault=self._stopped(stop, t))
+        except Exception as error:
+            return Answer(fault=self._stopped(surprise(error), t))
+
+    def close(self) -> None:
+        if self._child is not None:
+            self._child.close()
+            self._child = None
+
+    def _answer(self, frame: wire.Frame, t: int) -> Answer:
+        """What an answer's frame says; a text with ``JSON::`` brings what joins the robot's queue, if it is JSON."""
+        said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
+        self._spend(said, "printed and answered")
+        match frame["kind"]:
+            case "text" if not said.startswith(messages.JSON):
+                return Answer(said, self._slept)
+            case "text":
+                try:
+                    entry = messages.queue_entry(said)
+                except ValueError as error:
+                    sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
+                    return Answer(said, self._slept, self._protocol_fault(t, sentence), note="malformed")
+                self._meter.keep(len(entry))
+                return Answer(said, self._slept, entry=entry)
+            case "error":
+                return Answer(fault=error_fault(frame["error"], t + self._slept, "responder"))
+            case "long":
+                what = f"an answer of {frame['length']} characters; the most is about 60000"
+            case _:
+                what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
+        return Answer(fault=self._protocol_fault(t, f"the responder returned {what}"))
+
+    def _protocol_fault(self, t: int, sentence: str) -> Fault:
+        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence)
+
+    def _until(self, last: str) -> wire.Frame:
+        assert self._child is not None
+        while True:
+            frame = self._child.receive(self._schema)
+            if frame["do"] == last:
+                return frame
+            self._take(frame)
+
+    def _take(self, frame: wire.Frame) -> None:
+        """A frame that waits for nothing. Raises ChildStopped for one that no honest child sends now."""
+        match frame["do"]:
+            case "print":
+                self._print(frame["text"])
+            case "refused":
+                self._note(refusal("responder", frame))
+            case "sleep":
+                self._slept += frame["units"]
+            case "call":
+                if len(self.calls) < _MOST_CALLS:
+                    words = (frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result"))
+                    self.calls.append(Call(self._message, frame["depth"], *words))
+            case kind:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
+
+    def _note(self, sentence: str) -> None:
+        if len(self.notes) < _MOST_NOTES and sentence not in self.notes:
+            self.notes.append(sentence)
+
+    def _print(self, text: str) -> None:
+        self._spend(text, "printed")
+        self.output.append(text)
+
+    def _spend(self, text: str, did: str) -> None:
+        self._output_left -= len(text.encode("utf-8", "replace")) + 1
+        if self._output_left < 0:
+            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the responder {did} more than {self._spec.output_bytes} bytes")
+
+    def _stopped(self, stop: ChildStopped, t: int) -> Fault:
+        self.close()
+        return stopped(stop, "responder", t)

@@ -1,0 +1,70 @@
+"""The responders' zygote: what is imported before any fork, and whether a module or a notebook is to be run.
+
+What runs then is in ``responder_role.py`` and ``notebook_role.py``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+
+from . import model_files, source_reader  # noqa: F401
+from .frames import Wire
+from .lockdown import Grants
+from .notebook_role import NotebookRole
+from .responder_role import ResponderRole
+
+#: What answering takes.
+NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
+_PRELOADED = (
+    "joblib",
+    "numpy",
+    "numpy.random",
+    "pandas",
+    "PIL.Image",
+    "sklearn.ensemble",
+    "sklearn.linear_model",
+    "sklearn.metrics",
+    "sklearn.model_selection",
+    "sklearn.neighbors",
+    "sklearn.neural_network",
+    "sklearn.pipeline",
+    "sklearn.preprocessing",
+    "sklearn.svm",
+    "sklearn.tree",
+    "json",
+    "math",
+    "re",
+    "statistics",
+    "nn_tools.network_views",
+    "nn_tools.sensor_data",
+    "nn_tools.weights",
+)
+
+
+def preload(without: list[str]) -> None:
+    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
+    missing = (ImportError,) if without else ()
+    for name in _PRELOADED:
+        with contextlib.suppress(*missing):
+            importlib.import_module(name)
+    model_files.preload_onnx()
+    with contextlib.suppress(*missing):
+        model_files.explain_joblib()
+        _ask_the_machine()
+
+
+def _ask_the_machine() -> None:
+    """What scikit-learn asks once about libraries and processors, where it may still open files: neighbours need it."""
+    import joblib
+    from sklearn.utils.parallel import _get_threadpool_controller
+
+    _get_threadpool_controller()
+    joblib.cpu_count(only_physical_cores=True)
+
+
+def run(wire: Wire, grants: Grants) -> None:
+    """Receive a module or a notebook, run it, and answer."""
+    spec = wire.receive()
+    requester = NotebookRole if "cells" in spec else ResponderRole
+    requester(wire, grants, spec).run()

@@ -1,0 +1,85 @@
+"""A conversation in simulated time: what arrives when, without any process."""
+
+from __future__ import annotations
+
+import pytest
+
+from responders.channel import Channel
+from responders.conversation import Answer, Conversation
+from sim.recording import SECOND, TICK, Fault, Verdict
+from sim.world import Chain
+
+DELAY = SECOND // 10
+
+
+def conversation(**channel: float) -> Conversation:
+    return Conversation(Channel(**channel), 5, Chain())
+
+
+def exchange(talk: Conversation, answer: Answer, now: int = 0) -> None:
+    sent = talk.send("PY::x", now)
+    for copy in range(sent.copies):
+        talk.answer(sent, copy, answer)
+
+
+def test_an_answer_arrives_after_the_delay_and_what_the_responder_slept() -> None:
+    talk = conversation()
+    exchange(talk, Answer("JSON::1", slept=SECOND, entry="1"))
+    assert talk.deliver(SECOND + DELAY - 1) == []
+    assert talk.deliver(SECOND + DELAY) == ["1"]
+    assert talk.deliver(SECOND + DELAY + TICK) == []
+    asked, answered = talk.messages
+    assert (asked.t, asked.delivered) == (0, 0)
+    assert (answered.t, answered.delivered, answered.reply_to, answered.note) == (1.0, pytest.approx(1.1), 0, "")
+
+
+def test_a_quick_answer_overtakes_a_slow_one() -> None:
+    talk = conversation()
+    exchange(talk, Answer("JSON::1", slept=SECOND, entry="1"))
+    exchange(talk, Answer("JSON::2", entry="2"), now=TICK)
+    assert talk.deliver(2 * SECOND) == ["2", "1"]
+
+
+def test_a_plain_text_is_delivered_and_joins_no_queue() -> None:
+    talk = conversation()
+    exchange(talk, Answer("hello"))
+    assert talk.deliver(SECOND) == []
+    assert talk.messages[1].delivered == 1.0
+
+
+def test_what_is_late_is_undelivered_and_stays_so() -> None:
+    talk = conversation()
+    exchange(talk, Answer("JSON::1", entry="1"))
+    talk.finish()
+    assert talk.messages[1].note == "undelivered"
+    assert talk.deliver(SECOND) == []
+
+
+def test_a_fault_is_kept_beside_the_answer_it_is_about() -> None:
+    fault = Fault(0.0, Verdict.PROTOCOL_ERROR, "responder", "no JSON")
+    talk = conversation()
+    exchange(talk, Answer("JSON::{", fault=fault, note="malformed"))
+    exchange(talk, Answer(fault=fault))
+    assert talk.faults == [fault, fault]
+    assert [message.note for message in talk.messages] == ["", "malformed", ""]
+
+
+def test_copies_and_losses_are_the_channels() -> None:
+    talk = conversation(duplication=1.0)
+    exchange(talk, Answer("JSON::1", entry="1"))
+    assert talk.deliver(SECOND) == ["1"] * 4
+    assert [message.note for message in talk.messages] == ["duplicated", "", "duplicated", "", "duplicated"]
+    lost = conversation(loss=1.0)
+    exchange(lost, Answer("JSON::1", entry="1"))
+    assert [(message.sender, message.note, message.delivered) for message in lost.messages] == [("robot", "lost", None)]
+
+
+def test_the_chain_tells_deliveries_apart() -> None:
+    hashes = set()
+    for until in (0, SECOND):
+        chain = Chain()
+        talk = Conversation(Channel(), 5, chain)
+        exchange(talk, Answer("JSON::1", entry="1"))
+        talk.deliver(until)
+        hashes.add(chain.hexdigest())
+    assert len(hashes) == 2
