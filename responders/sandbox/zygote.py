@@ -186,7 +186,7 @@ class Zygote:
             data, received = self._ask(
                 {
                     "do": "spawn",
-                    "play": play,
+                    "work": play,
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "without": limits.without,
