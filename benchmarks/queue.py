@@ -26,7 +26,7 @@ from service.store.engine import Store, open_store
 from service.store.metrics import quantile
 from service.store.models import Job, JobState, Lane
 from service.supervisor import Supervisor
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 from submissions.submission import Source, Submission
 
 _BATCH = 200

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from sim.errors import UsageError
-from submissions.assignment import Parts
+from submissions.assignment.definition import Parts
 from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name

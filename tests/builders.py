@@ -15,8 +15,8 @@ from service.store.engine import Store, open_store
 from service.store.intake import Accepted, GradingRequest, accept
 from service.store.models import Lane
 from sim.recording import Recording
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.reader import find_assignment
 from submissions.submission import Source, Submission
 
 PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.errors import UsageError
-from submissions.assignment import Parts
+from submissions.assignment.definition import Parts
 from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
 from submissions.names import shown_name
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip

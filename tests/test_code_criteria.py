@@ -22,8 +22,9 @@ from service.grading.trial_runner import TrialRunner
 from service.reports.audience import student_view
 from service.reports.text import plain_text
 from sim.recording import Verdict
-from submissions.assignment import Assignment, Limits, Parts, WorldSpec
-from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.assignment.definition import Assignment, Limits, Parts, WorldSpec
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.magics import split_program
 from submissions.plain_cells import python_of

@@ -10,7 +10,7 @@ import pytest
 
 from command import robomark
 from service.cli import main
-from submissions.assignment_file import assignment_folder
+from submissions.assignment.folder import assignment_folder
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from submissions.assignment_tables import read_table
+from submissions.assignment.schema import read_table
 from submissions.criteria import SCHEMAS
 
 AREA = {"rectangle": [0, 0, 10, 10]}

@@ -16,8 +16,9 @@ from service.reports.plots import draw_all
 from service.store.recordings import from_bytes, to_bytes
 from sim.backgrounds import floor, label_names
 from sim.recording import SENSOR_SIDE, Image
-from submissions.assignment import Assignment
-from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
 from submissions.submission import Source, Submission
 

@@ -19,8 +19,9 @@ from notebook_builder import MESSAGING
 from service.settings import Settings
 from sim.backgrounds import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
-from submissions.assignment_file import find_assignment
-from submissions.assignment_tables import (
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.assignment.schema import (
     ChannelTable,
     HeadTable,
     LimitsTable,
@@ -31,7 +32,6 @@ from submissions.assignment_tables import (
 )
 from submissions.criteria import SCHEMAS
 from submissions.criteria.common import CriterionBase
-from submissions.example_folder import examples
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = examples("shape-recognition") / "reference"

@@ -27,7 +27,7 @@ from service.grading.slots import Slots
 from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled, HostError
 from sim.recording import Verdict
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 from submissions.submission import Source, Submission
 
 HONEST = 'from time import sleep\nprint("PY::a")\nsleep(1)\ntank_drive.on_for_seconds(20, 20, 1)\n'

@@ -16,7 +16,7 @@ from service.grading.grade import CriterionResult
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Datum, Image, Line, Message, Pose, Recording
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 from submissions.submission import Source, Submission
 from test_judging import criterion, judged, recorded
 

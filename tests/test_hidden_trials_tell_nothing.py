@@ -24,8 +24,8 @@ from service.reports.json_output import json_text
 from service.reports.plots import draw_all
 from service.reports.text import plain_text
 from sim.recording import Pose
-from submissions.assignment import Assignment, Limits, Parts, Scenario, Training, WorldSpec
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.reader import find_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Source, Submission
 from submissions.sweep import Sweep

@@ -26,8 +26,8 @@ from service.store.engine import open_store
 from service.store.installation import secret_of
 from service.store.models import Installation, Job
 from sim.errors import HostError, UsageError
-from submissions.assignment_file import find_assignment
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.seeds import Secret
 from submissions.submission import Source, Submission
 

@@ -27,8 +27,8 @@ from service.grading.trial_runner import TrialRunner
 from service.reports.sequence import MOST_CALL_STEPS, Gap, conversation
 from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Line, Message, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
-from submissions.assignment_file import read_assignment
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS
 from submissions.criteria.expressions import found_in, usable
 from submissions.submission import Source, Submission

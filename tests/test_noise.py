@@ -16,7 +16,7 @@ from sim.recording import Pose
 from sim.robot import LightSensor
 from sim.sensors import Footprint, LightReader
 from sim.world import Noise
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 from submissions.submission import Source, Submission
 
 TICKS = 200

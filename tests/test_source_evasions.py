@@ -22,7 +22,7 @@ from service.reports.html import staff_report, student_report
 from service.reports.json_output import json_text
 from service.reports.text import plain_text
 from sim.recording import Pose, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission

@@ -18,11 +18,11 @@ from service.grading.judging.sweeps import area, part_above, range_above
 from service.grading.trial_runner import TrialRunner
 from service.store.codec import decode, encode
 from sim.recording import Pose
-from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
-from submissions.assignment_file import find_assignment, read_assignment
+from submissions.assignment.definition import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.bundle import read_submission
 from submissions.criteria.classification import Robustness
-from submissions.example_folder import examples
 from submissions.submission import Source, Submission
 from submissions.sweep import CONDITIONS, Sweep
 

@@ -21,9 +21,9 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.label_patches import grey_image
 from service.grading.trial_runner import TrialRunner
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
-from submissions.example_folder import examples
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.seeds import PUBLIC, Secret
 from submissions.submission import Source, Submission
 

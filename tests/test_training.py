@@ -15,10 +15,10 @@ from service.grading.judging.collecting import pairs
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
-from submissions.example_folder import examples
 from submissions.submission import Cell, Notebook, Source, Submission
 
 NEAREST = """

@@ -30,7 +30,7 @@ from sim.motion import Physics
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
-from submissions.assignment import Assignment, ChannelSpec, Trial, WorldSpec
+from submissions.assignment.definition import Assignment, ChannelSpec, Trial, WorldSpec
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of

@@ -20,7 +20,7 @@ from service.grading.judging.outcome import fault_words
 from service.grading.judging.source_rules import SPEECH, SourceAnswers
 from sim.chance import Stream
 from sim.recording import Pose, Recording
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.magics import Flags
 from submissions.submission import Cell, Source

@@ -23,7 +23,7 @@ from service.grading.static_analysis import responder_limits
 from service.grading.trial_runner import TrialRunner
 from sim.chance import Stream
 from sim.recording import Fault, Image, Message, Recording, Verdict
-from submissions.assignment import Assignment, Training
+from submissions.assignment.definition import Assignment, Training
 from submissions.submission import Source
 
 _HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from service.grading.grade import Grade
 from service.store.artifacts import File
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 
 PREFIX = "plot-"
 

@@ -22,7 +22,7 @@ from service.grading.judging.samples import Sample
 from service.grading.judging.tally import Reply, ReplyStatus, reply_to
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
 from sim.recording import Image, Line, Recording
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria.classification import Recognition
 
 #: An image taken so near to an earlier one, mm, shows the same again.

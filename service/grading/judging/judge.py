@@ -42,7 +42,7 @@ from service.grading.judging.trial_words import early_end, place_words, shown_wo
 from service.grading.static_analysis import StaticAnalysis
 from sim.errors import HostError
 from sim.recording import Verdict
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria import (
     Circuits,
     Classification,

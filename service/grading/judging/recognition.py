@@ -15,7 +15,7 @@ from service.grading.judging.marks import earned, share_of_accuracy, share_of_st
 from service.grading.judging.samples import Sample
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, range_above, share_of_robustness
 from service.grading.judging.trial_words import early_end, place_words, shown_words
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria.classification import Classification, Recognition, Robustness
 from submissions.sweep import CONDITIONS
 

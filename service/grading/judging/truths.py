@@ -13,7 +13,7 @@ from service.grading.judging.label_patches import decoded
 from service.grading.judging.places import part_at
 from sim.backgrounds import label_names
 from sim.recording import Pose, Recording
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria.classification import LabelledPlace, Recognition
 
 #: Stands for the truth of an image that was never sent, where the assignment does not tell it.

@@ -1,6 +1,6 @@
 """An assignment: the world, the scenarios, what is marked and by how much; and the trials it asks for.
 
-Plain data. Reading one from its folder, with every mistake named by file and line, is ``assignment_file.py``.
+Plain data. Reading one from its folder, with every mistake named by file and line, is ``reader.py``.
 """
 
 from __future__ import annotations

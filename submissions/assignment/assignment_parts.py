@@ -1,6 +1,6 @@
 """From the tables of an assignment file and the files beside it to an ``Assignment``: what has to fit together.
 
-What a single table may hold is ``assignment_tables.py``; reading the folder is ``assignment_file.py``.
+What a single table may hold is ``schema.py``; reading the folder is ``reader.py``.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_imag
 from sim.errors import UsageError
 from sim.recording import Pose
 from sim.robot import usual_robot
-from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, WorldSpec
-from submissions.assignment_tables import (
+from submissions.assignment.code_parts import check_code, check_given, check_ranks, check_sources, runs_no_robot
+from submissions.assignment.definition import Assignment, ChannelSpec, Limits, Parts, Scenario, WorldSpec
+from submissions.assignment.problems import Problems
+from submissions.assignment.recognition_parts import check_recognition, check_reports, checked_training, completed
+from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
     PartsTable,
@@ -32,13 +35,10 @@ from submissions.assignment_tables import (
     listed,
     read_table,
 )
-from submissions.code_parts import check_code, check_given, check_ranks, check_sources, runs_no_robot
+from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria import SCHEMAS, Criterion, Messages, Recognition, Replies, Reports
-from submissions.problems import Problems
-from submissions.recognition_parts import check_recognition, check_reports, checked_training, completed
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep
-from submissions.toml_lines import Path as Place
 
 T = TypeVar("T", bound=BaseModel)
 

@@ -1,6 +1,6 @@
 """What a recognition criterion and a training table need from the rest of an assignment: labels, places, sweeps.
 
-What such a table may hold by itself is in ``criteria/classification.py`` and ``assignment_tables.py``.
+What such a table may hold by itself is in ``criteria/classification.py`` and ``schema.py``.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 
 from sim.backgrounds import Floor, label_names
 from sim.errors import UsageError
-from submissions.assignment import Scenario, Training
-from submissions.assignment_tables import TrainingTable, did_you_mean
+from submissions.assignment.definition import Scenario, Training
+from submissions.assignment.problems import Problems
+from submissions.assignment.schema import TrainingTable, did_you_mean
+from submissions.assignment.toml_lines import Path as Place
+from submissions.assignment.truth_file import read_places
 from submissions.criteria.classification import Recognition, Robustness
 from submissions.criteria.reporting import Reports
-from submissions.problems import Problems
-from submissions.toml_lines import Path as Place
-from submissions.truth_file import read_places
 
 _NOISES = ("light_noise", "motor_noise")
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from sim.errors import UsageError
-from submissions.assignment_tables import PartsTable
+from submissions.assignment.problems import Problems
+from submissions.assignment.schema import PartsTable
+from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria import Criterion
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.criteria.timing import Ranking
-from submissions.problems import Problems
 from submissions.source_text import decode_source
-from submissions.toml_lines import Path as Place
 
 
 def runs_no_robot(document: Mapping[str, object]) -> bool:
