@@ -7,7 +7,8 @@ import time
 from benchmarks.measurement import Measurement, cpu_seconds, median_of
 from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
+from responders.code import Code
+from responders.conversation import ResponderSpec
 from responders.sandbox.running_child import ChildLimits
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena

@@ -12,7 +12,8 @@ from typing import Any, Literal, NoReturn
 
 from responders import messages, wire
 from responders.channel import Channel
-from responders.conversation import Code, Collected, Conversation, ResponderProcess, ResponderSpec
+from responders.code import Code
+from responders.conversation import Collected, Conversation, ResponderProcess, ResponderSpec
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits

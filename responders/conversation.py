@@ -12,6 +12,7 @@ from pathlib import Path
 
 from responders import messages, wire
 from responders.channel import Channel, ChannelOfTrial
+from responders.code import Code
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -23,14 +24,6 @@ from sim.world import Chain
 _MOST_NOTES = 200
 #: Of the calls that are shown, and of the characters of each of their parts.
 _MOST_CALLS, _MOST_SHOWN = 10_000, 200
-
-
-@dataclass(frozen=True, slots=True)
-class Code:
-    """A Python file: its name, which its tracebacks show, and its text."""
-
-    name: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)

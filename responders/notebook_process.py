@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.conversation import Code, ResponderProcess, ResponderSpec
+from responders.code import Code
+from responders.conversation import ResponderProcess, ResponderSpec
 from responders.faults import error_fault, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter

@@ -15,7 +15,7 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from responders.conversation import Code
+from responders.code import Code
 from responders.function_calls import Called, FunctionCall, Returned, call_functions
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from responders.bridge import Preamble, ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
+from responders.code import Code
+from responders.conversation import ResponderSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.grading.trial_runner import TrialRunner

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from notebook_builder import notebook
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -20,7 +21,7 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 ASSIGNMENT = """
 id = "digits"
@@ -42,7 +43,7 @@ marks = 1
 check = "classification"
 truth = "label"
 """
-LOOK = Submission("ada", Source("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
+LOOK = Submission("ada", Code("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
 
 
 def assignment(folder: Path, sheet: str, labels: str = "false") -> Assignment:

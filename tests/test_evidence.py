@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from driving import along, driven, rest, spin, straight
+from responders.code import Code
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Datum, Image, Line, Message, Pose, Recording
 from submissions.assignment.reader import find_assignment
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 from test_judging import criterion, judged, recorded
 
 _BEGIN = "%%sim_magic_preloaded\nimport time\n"
@@ -104,7 +105,7 @@ def test_what_does_not_do_what_was_asked_gets_little(
     name: str, robot: str, responder: str, most: str, before: str, runner: TrialRunner
 ) -> None:
     submission = Submission(
-        "x", Source("robot.py", _BEGIN + robot), Source("responder.py", responder) if responder else None
+        "x", Code("robot.py", _BEGIN + robot), Code("responder.py", responder) if responder else None
     )
     graded = grade(submission, find_assignment(name), runner=runner)
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]

@@ -23,7 +23,8 @@ from hypothesis import strategies as st
 from responders import wire
 from responders.bridge import Bridge, ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderProcess, ResponderSpec
+from responders.code import Code
+from responders.conversation import ResponderProcess, ResponderSpec
 from responders.notebook_executor import PlannedRun, execute_notebook
 from responders.notebook_process import NotebookSpec
 from responders.sandbox import running_child

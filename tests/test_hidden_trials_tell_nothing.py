@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -27,7 +28,7 @@ from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.reader import find_assignment
 from submissions.criteria import SCHEMAS, Criterion
-from submissions.submission import Cell, Notebook, Source, Submission
+from submissions.submission import Cell, Notebook, Submission
 from submissions.sweep import Sweep
 
 POSES = tuple(Pose(200.0 + 80 * place, 900.0, 0.0) for place in range(6))
@@ -165,22 +166,22 @@ RESPONDERS = {
 
 @pytest.mark.parametrize("channel", PROGRAMS)
 def test_what_a_program_does_in_hidden_trials_is_not_told(runner: TrialRunner, asked: Assignment, channel: str) -> None:
-    program = Source("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
-    told_apart(runner, Submission("s", program, Source("responder.py", ANSWERS)), asked)
+    program = Code("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
+    told_apart(runner, Submission("s", program, Code("responder.py", ANSWERS)), asked)
 
 
 @pytest.mark.parametrize("channel", RESPONDERS)
 def test_what_a_responder_does_in_hidden_trials_is_not_told(
     runner: TrialRunner, asked: Assignment, channel: str
 ) -> None:
-    responder = Source("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
-    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), asked)
+    responder = Code("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
+    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), asked)
 
 
 def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, asked: Assignment) -> None:
     few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
-    responder = Source("responder.py", LOOKS + RESPONDERS["which answers are given"])
-    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), few, draw=True)
+    responder = Code("responder.py", LOOKS + RESPONDERS["which answers are given"])
+    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), few, draw=True)
 
 
 CELLS = (
@@ -233,5 +234,5 @@ def training() -> Assignment:
 def test_what_a_model_does_with_hidden_images_is_not_told(
     runner: TrialRunner, training: Assignment, channel: str
 ) -> None:
-    model = Source("responder.py", MODEL.replace("{}", MODELS[channel]))
+    model = Code("responder.py", MODEL.replace("{}", MODELS[channel]))
     told_apart(runner, Submission("s", None, model), training)

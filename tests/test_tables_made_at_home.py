@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.label_patches import grey_image
@@ -25,7 +26,7 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.seeds import PUBLIC, Secret
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 MARKING = Secret("of the installation where marks are given")
 HOMES = (PUBLIC, Secret("of the home of a student"))
@@ -95,7 +96,7 @@ def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: 
     own = TELLTALE.replace("import numpy\n", "").replace('"numpy": float(numpy.random.random()), ', "")
     responder = RESPONDER.replace("{telltale}", TELLTALE).replace("{table!r}", repr(packed))
     return Submission(
-        name, Source("robot.py", program.replace("{telltale}", own)), Source("responder.py", f"# {name}\n{responder}")
+        name, Code("robot.py", program.replace("{telltale}", own)), Code("responder.py", f"# {name}\n{responder}")
     )
 
 
@@ -198,7 +199,7 @@ def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
 
 def _model(table: Mapping[str, str]) -> Submission:
     packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
-    return Submission("s", None, Source("responder.py", TRAINS.replace("{table!r}", repr(packed))))
+    return Submission("s", None, Code("responder.py", TRAINS.replace("{table!r}", repr(packed))))
 
 
 # What a child may know
@@ -232,7 +233,7 @@ def noisy() -> Assignment:
 
 
 def submission(comment: str) -> Submission:
-    return Submission("s", Source("robot.py", f"# {comment}{SHOWS}"), Source("responder.py", ECHO))
+    return Submission("s", Code("robot.py", f"# {comment}{SHOWS}"), Code("responder.py", ECHO))
 
 
 def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignment) -> None:
@@ -251,7 +252,7 @@ def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignme
 def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRunner, noisy: Assignment) -> None:
     asked = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
     quiet = Submission(
-        "s", Source("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), Source("responder.py", ECHO)
+        "s", Code("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), Code("responder.py", ECHO)
     )
     chains = [
         [
@@ -268,7 +269,7 @@ def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(runner
     asked = find_assignment("black-or-grey")
     shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
     program = (examples("black-or-grey") / "reference" / "robot.py").read_text()
-    reference = Submission("s", Source("robot.py", program))
+    reference = Submission("s", Code("robot.py", program))
     orders = set()
     for secret in (PUBLIC, MARKING, *HOMES[1:]):
         graded = grade(reference, shuffled, secret=secret, runner=runner)

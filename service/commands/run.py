@@ -12,7 +12,8 @@ import typer
 from models import weights_bytes
 from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code, ResponderSpec
+from responders.code import Code
+from responders.conversation import ResponderSpec
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from service.commands.grade import warn_of_no_sandbox

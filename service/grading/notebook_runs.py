@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from responders.bridge import ProgramSpec, TrialSpec
 from responders.channel import Channel
-from responders.conversation import Code
+from responders.code import Code
 from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
 from sim.backgrounds import floor

@@ -16,12 +16,13 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
+from responders.channel import Channel
 from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, names
 from sim.errors import UsageError
 from sim.recording import Pose
 from sim.robot import usual_robot
 from submissions.assignment.code_parts import check_code, check_given, check_ranks, check_sources, runs_no_robot
-from submissions.assignment.definition import Assignment, ChannelSpec, Limits, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, WorldSpec
 from submissions.assignment.problems import Problems
 from submissions.assignment.recognition_parts import check_recognition, check_reports, checked_training, completed
 from submissions.assignment.schema import (
@@ -209,7 +210,7 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         seconds=table.seconds,
         light_noise=table.light_noise,
         motor_noise=table.motor_noise,
-        channel=ChannelSpec(**table.channel.model_dump()),
+        channel=Channel(**table.channel.model_dump()),
         visibility=table.visibility,
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
