@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
+from responders import library
 from responders.channel import Channel
 from sim.backgrounds import HEIGHT, SEEDED, WIDTH, Floor, floor, floor_from_image, names
 from sim.errors import UsageError
@@ -91,7 +92,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         description=head.description,
         given=MappingProxyType(given),
         given_parts=MappingProxyType(given_parts),
-        version=_version(files, given),
+        version=_version(files, given, {name: text for name, text in given_parts.items() if name not in files}),
         training=training,
         secret=head.secret,
     )
@@ -101,10 +102,11 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     return assignment
 
 
-def _version(files: Files, given: Mapping[str, bytes]) -> str:
-    """SHA-256 over names and bytes, in the order of the names; packaged networks count like files."""
+def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
+    """SHA-256 over names and bytes, in the order of the names; packaged networks and responders count like files."""
     digest = hashlib.sha256()
-    for kind, group in (("file", files), ("given", given)):
+    responders = {name: text.encode() for name, text in packaged.items()}
+    for kind, group in (("file", files), ("given", given), ("responder", responders)):
         for name in sorted(group):
             digest.update(f"{kind}:{len(name.encode())}:{name}:{len(group[name])}:".encode() + group[name])
     return digest.hexdigest()
@@ -284,8 +286,11 @@ def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Pro
         name = getattr(parts, part)
         if name in ("student", "none"):
             continue
+        if part == "responder" and name not in files and name in library.names():
+            sources[name] = library.source(name)
+            continue
         if name not in files or not name.endswith(".py"):
-            none = "" if part == "program" else ', "none"'
+            none = "" if part == "program" else f', "none", {", ".join(library.names())}'
             problems.add(
                 ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
             )
