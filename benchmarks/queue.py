@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from responders.code import Code
+
 # The server is the one of the tests.
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -26,8 +28,8 @@ from service.store import batches, intake
 from service.store.engine import Store, open_store
 from service.store.metrics import quantile
 from service.store.models import Job, JobState, Lane
-from submissions.assignment_file import find_assignment
-from submissions.submission import Source, Submission
+from submissions.assignment.reader import find_assignment
+from submissions.submission import Submission
 
 _BATCH = 200
 _DEEP = 1000
@@ -143,6 +145,6 @@ def _seconds(values: Sequence[float]) -> str:
 
 def _request(student: str) -> intake.GradingRequest:
     # A text of its own, or it would be a copy of the one before, which is not run again.
-    program = Source("robot.py", f"# {student}\n{_PROGRAM}")
-    submission = Submission(student, program, Source("responder.py", _RESPONDER))
+    program = Code("robot.py", f"# {student}\n{_PROGRAM}")
+    submission = Submission(student, program, Code("responder.py", _RESPONDER))
     return intake.GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")

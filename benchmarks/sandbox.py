@@ -42,7 +42,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
 sandboxes = Sandboxes()
 child = sandboxes.spawn("robot", ChildLimits(60, 64 << 20))
-child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none"})
+child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": []})
 print(child._pid, flush=True)
 input()
 """
@@ -141,7 +141,7 @@ def _echo(sandboxes: Sandboxes) -> Child:
 
 
 def _start(child: Child, role: Role, text: str) -> None:
-    own = {"preamble": "none"} if role == "robot" else {"function": None}
+    own = {"preamble": "none", "sensors": []} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 

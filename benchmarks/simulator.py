@@ -6,8 +6,9 @@ import time
 
 from benchmarks.measurement import Measurement, cpu_seconds, median_of
 from responders.channel import Channel
+from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.camera import BulletCamera, CachedCamera, LightCamera

@@ -15,9 +15,9 @@ from service.settings import load_settings
 from service.store import intake
 from service.store.engine import Store, open_store
 from service.store.models import Job, JobState, Lane, PlotState
-from submissions.assignment_file import find_assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
-from submissions.example_folder import examples
 
 _ASSIGNMENT = "json-queue"
 _TIMES = 7

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
+from responders.code import Code
 from responders.faults import error_fault, surprise
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code, ResponderSpec
+from responders.trial_spec import ResponderSpec
 from sim.chance import Stream
 from sim.recording import Fault, Verdict
 

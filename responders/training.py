@@ -15,11 +15,11 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
+from responders.code import Code
 from responders.function_calls import Called, FunctionCall, Returned, call_functions
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code
 from sim.recording import Fault, Verdict
 
 #: Images are sent in frames; one with more than this many pixels takes no other.

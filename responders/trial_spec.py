@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from responders.channel import Channel
+from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
@@ -18,14 +19,6 @@ from sim.robot import Robot
 from sim.world import Noise
 
 Preamble = Literal["none", "imports", "preloaded"]
-
-
-@dataclass(frozen=True, slots=True)
-class Code:
-    """A Python file: its name, which its tracebacks show, and its text."""
-
-    name: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ Keeps nothing and knows no queue; what is drawn is kept by ``store.plots``.
 from __future__ import annotations
 
 from service.grading.grade import Grade
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 
 
 def draw(grade: Grade, assignment: Assignment) -> dict[str, bytes]:

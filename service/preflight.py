@@ -19,8 +19,9 @@ from pathlib import Path, PurePosixPath
 from service.roster import RosterRow, file_inside, read_roster
 from service.store.intake import GradingRequest
 from sim.errors import UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import catalogue, find_assignment, find_in_catalogue, read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import catalogue
+from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
 from submissions.bundle import fit_parts, named_by, read_submission
 from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
 from submissions.raw_files import shown

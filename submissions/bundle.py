@@ -17,15 +17,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
+from responders.code import Code
 from sim.errors import UsageError
-from submissions.assignment import Parts
+from submissions.assignment.definition import Parts
 from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
 from submissions.source_text import decode_source
-from submissions.submission import Notebook, Source, Submission
+from submissions.submission import Notebook, Submission
 
 Part = Literal["program", "responder"]
 
@@ -97,7 +98,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     if submission.notebook is not None:
         return _fit_notebook(submission, submission.notebook, asked, where)
     notes = list(submission.notes)
-    parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
+    parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     wanted = [part for part, who in givers.items() if who == "student"]
     submitted = [part for part, source in parts.items() if source is not None]
@@ -123,7 +124,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
 
 def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
     """The notebook if it is needed, else the files beside it."""
-    parts: dict[Part, Source | None] = {"program": submission.program, "responder": submission.responder}
+    parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     if all(parts[part] is not None for part, who in givers.items() if who == "student"):
         note = f"{shown(notebook.name)} was left out: the files beside it are what is asked for."
@@ -181,11 +182,11 @@ def unpack_submission(data: bytes) -> Submission:
     """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
     files = unzip(data, "the kept submission").files
     meta = _read_meta(files.pop(_META, b""), "the kept submission")
-    sources: dict[Part, Source | None] = {}
+    sources: dict[Part, Code | None] = {}
     for part, canonical in _CANONICAL.items():
         name = meta.get(part)
         text = files.pop(canonical, None) if isinstance(name, str) else None
-        sources[part] = None if text is None else Source(str(name), text.decode("utf-8", "surrogatepass"))
+        sources[part] = None if text is None else Code(str(name), text.decode("utf-8", "surrogatepass"))
     notebook = None
     if isinstance(meta.get("notebook"), str) and _PACKED_NOTEBOOK in files:
         packed = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
@@ -214,10 +215,10 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         raise UsageError(f"{where}: has no files in it, expected robot.py and responder.py.")
     notebook = _find_notebook(files, where, notes)
     parts = _find_parts(files, where, notes, alone=notebook is None)
-    sources: dict[Part, Source] = {}
+    sources: dict[Part, Code] = {}
     for part, file_name in parts.items():
         decoded = decode_source(files.pop(file_name), shown(file_name))
-        sources[part] = Source(file_name, decoded.text)
+        sources[part] = Code(file_name, decoded.text)
         if decoded.note:
             notes.append(decoded.note)
     assignment = _text_of(meta, "assignment", where)

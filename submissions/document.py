@@ -10,9 +10,9 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from submissions.assignment_tables import read_table
-from submissions.problems import Problems
-from submissions.toml_lines import Path as Place
+from submissions.assignment.problems import Problems
+from submissions.assignment.schema import read_table
+from submissions.assignment.toml_lines import Path as Place
 
 T = TypeVar("T", bound=BaseModel)
 

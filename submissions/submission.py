@@ -10,13 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """A Python file of the student's: the name it was submitted under, and its text."""
-
-    name: str
-    text: str
+from responders.code import Code
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +35,8 @@ class Submission:
     """One submission. ``files`` are what lies beside the sources, by flat name; a notebook stands for both sources."""
 
     student: str
-    program: Source | None = None
-    responder: Source | None = None
+    program: Code | None = None
+    responder: Code | None = None
     files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))
     assignment: str | None = None  # named by the submission's submission.toml or its parent folder
     notes: tuple[str, ...] = ()  # what was ignored, stepped into or renamed while reading

@@ -323,7 +323,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
     child = sandboxes.spawn(role, LIMITS, folder)
     try:
         job = {"name": f"{role}.py", "text": text, "seed": 1}
-        child.send(job | ({"preamble": "none"} if role == "robot" else {"function": None}))
+        child.send(job | ({"preamble": "none", "sensors": []} if role == "robot" else {"function": None}))
         yield child
     finally:
         child.close()

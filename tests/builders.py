@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.settings import Settings
 from service.store import recordings
@@ -15,9 +16,9 @@ from service.store.engine import Store, open_store
 from service.store.intake import Accepted, GradingRequest, accept
 from service.store.models import Lane
 from sim.recording import Recording
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
-from submissions.submission import Source, Submission
+from submissions.assignment.definition import Assignment
+from submissions.assignment.reader import find_assignment
+from submissions.submission import Submission
 
 PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
@@ -42,8 +43,8 @@ def grading_request(
     student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None
 ) -> GradingRequest:
     """A small submission for the echo assignment."""
-    responder = Source("responder.py", "def responder(msg):\n    return msg\n")
-    submission = Submission(student, Source("robot.py", program), responder)
+    responder = Code("responder.py", "def responder(msg):\n    return msg\n")
+    submission = Submission(student, Code("robot.py", program), responder)
     return GradingRequest(submission, assignment or echo(), f"{student}.zip")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.judge import judge
 from sim.recording import Pose, Recording, Ticks, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion
 
 START = Pose(100, 800, 0)

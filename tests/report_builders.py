@@ -13,6 +13,7 @@ from decimal import Decimal
 
 import numpy as np
 
+from responders.code import Code
 from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
@@ -40,7 +41,7 @@ from sim.recording import (
     Touch,
     Verdict,
 )
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 SHAPES = (
     "square",
@@ -211,8 +212,8 @@ def faulty_grade() -> Grade:
 def faulty_submission() -> Submission:
     return Submission(
         "s1234567",
-        program=Source("robot.py", "import time\nfor i in range(3):\n    print(1 / (i - i))\n    time.sleep(1)\n"),
-        responder=Source("responder.py", "def echo_responder(msg_object):\n    return pasrer(msg_object)\n"),
+        program=Code("robot.py", "import time\nfor i in range(3):\n    print(1 / (i - i))\n    time.sleep(1)\n"),
+        responder=Code("responder.py", "def echo_responder(msg_object):\n    return pasrer(msg_object)\n"),
     )
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from responders.channel import Channel
+from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code, Preamble, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle

@@ -11,9 +11,11 @@ from command import robomark
 from service.grading.example_check import Figure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment_file import AssignmentProblems, catalogue, find_assignment, read_assignment
-from submissions.assignment_folder import export_for_students, export_whole, write_new
-from submissions.example_folder import OriginalFigure, expected
+from submissions.assignment.examples import OriginalFigure, expected
+from submissions.assignment.export import export_for_students, export_whole, write_new
+from submissions.assignment.folder import catalogue
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import find_assignment, read_assignment
 
 
 def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, runner: TrialRunner) -> None:

@@ -15,18 +15,13 @@ from hypothesis import strategies as st
 from sim.errors import AssignmentError, UsageError
 from sim.floors import HEIGHT, WIDTH
 from sim.recording import Pose
-from submissions.assignment_file import (
-    AssignmentProblems,
-    assignment_folder,
-    catalogue,
-    find_assignment,
-    read_assignment,
-)
-from submissions.assignment_parts import build_assignment
+from submissions.assignment.assignment_parts import build_assignment
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.problems import AssignmentProblems, Problems
+from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.assignment.toml_lines import find_lines, line_of
 from submissions.criteria.classification import Classification
 from submissions.criteria.ending import Finishes
-from submissions.problems import Problems
-from submissions.toml_lines import find_lines, line_of
 
 HEAD = 'id = "a"\ntitle = "A"\n'
 SCENARIO = '[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'

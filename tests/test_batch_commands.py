@@ -21,7 +21,7 @@ from sqlalchemy import func, select
 from service.settings import Settings
 from service.store.engine import open_store
 from service.store.models import Job, JobState
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 
 @dataclass(frozen=True)

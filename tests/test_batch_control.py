@@ -25,7 +25,7 @@ from service.store import batch_control
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.models import CriterionResultRow, Job, JobState, Lane, TrialRow
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 from test_batch_commands import Ended, robomark
 
 SPIN = "while True:\n    pass\n"

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from builders import echo
+from responders.code import Code
 from responders.sandbox import reading_dates
 from responders.sandbox.inside import grants
 from responders.sandbox.manager import Sandboxes
@@ -24,9 +25,9 @@ from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from sim.errors import HostError
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
-_SUBMISSION = Submission("ada", Source("robot.py", "pass"), Source("responder.py", "def responder(m): return m"))
+_SUBMISSION = Submission("ada", Code("robot.py", "pass"), Code("responder.py", "def responder(m): return m"))
 _WEEK = 7 * 86400
 
 #: Refuses filters whose questions somebody answers, as where a container has such a filter of its own; then goes on.

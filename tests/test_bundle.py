@@ -14,12 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from responders.code import Code
 from sim.errors import UsageError
-from submissions.assignment import Parts
+from submissions.assignment.definition import Parts
 from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
 from submissions.names import shown_name
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 PROGRAM = 'say("hello")\n'
 RESPONDER = "def responder(text):\n    return text\n"
@@ -64,7 +65,7 @@ def test_folder_and_zip_with_or_without_top_folder_are_the_same_submission(tmp_p
     read = [read_submission(form) for form in forms]
     assert len({submission.sha256 for submission in read}) == 1
     assert [submission.student for submission in read] == ["a", "b", "c", "d", "e"]
-    assert read[0].program == Source("robot.py", PROGRAM)
+    assert read[0].program == Code("robot.py", PROGRAM)
     assert dict(read[0].files) == {"net.joblib": b"\x80weights"}
     assert read[1].notes == ("The files were read from the folder week 5 in it.",)
 
@@ -107,15 +108,15 @@ def test_lone_file_without_assignment_goes_by_name_then_by_text(
 def test_lone_file_is_the_part_that_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "alice.py").write_text(PROGRAM)
     submission = read_submission(tmp_path / "alice.py", asked=Parts("robot.py", "student"))
-    assert submission.responder == Source("alice.py", PROGRAM)
+    assert submission.responder == Code("alice.py", PROGRAM)
     assert submission.program is None
     assert submission.notes == ("alice.py was taken for a responder.",)
 
 
 def test_two_files_of_any_name_are_told_apart(tmp_path: Path) -> None:
     submission = read_submission(folder(tmp_path / "x", {"mine.py": RESPONDER, "drive.py": PROGRAM}))
-    assert submission.program == Source("drive.py", PROGRAM)
-    assert submission.responder == Source("mine.py", RESPONDER)
+    assert submission.program == Code("drive.py", PROGRAM)
+    assert submission.responder == Code("mine.py", RESPONDER)
 
 
 def test_missing_part_is_named(tmp_path: Path) -> None:
@@ -127,7 +128,7 @@ def test_missing_part_is_named(tmp_path: Path) -> None:
 
 
 def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
-    submitted = Submission("a", Source("robot.py", PROGRAM), Source("responder.py", RESPONDER))
+    submitted = Submission("a", Code("robot.py", PROGRAM), Code("responder.py", RESPONDER))
     fitted = fit_parts(submitted, Parts("robot.py", "student"))
     assert fitted.program is None
     assert fitted.notes == ("robot.py was left out: a robot program is not asked for.",)
@@ -354,7 +355,7 @@ def test_no_broken_zip_raises_anything_but_a_sentence(data: st.DataObject) -> No
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=60)
 names = st.from_regex(r"[a-z]{1,8}\.(joblib|txt|csv)", fullmatch=True)
-sources = st.none() | st.builds(Source, names.map(lambda name: name + ".py"), texts)
+sources = st.none() | st.builds(Code, names.map(lambda name: name + ".py"), texts)
 
 
 @given(
@@ -378,10 +379,10 @@ def test_packing_is_exact_and_always_the_same(submission: Submission) -> None:
 
 def test_packed_submission_can_be_submitted(tmp_path: Path) -> None:
     (tmp_path / "kept.zip").write_bytes(
-        pack_submission(Submission("Zoë", Source("z.py", PROGRAM), Source("responder.py", RESPONDER), assignment="x"))
+        pack_submission(Submission("Zoë", Code("z.py", PROGRAM), Code("responder.py", RESPONDER), assignment="x"))
     )
     again = read_submission(tmp_path / "kept.zip")
-    assert (again.student, again.assignment, again.program) == ("kept", "x", Source("robot.py", PROGRAM))
+    assert (again.student, again.assignment, again.program) == ("kept", "x", Code("robot.py", PROGRAM))
 
 
 def test_bytes_that_were_not_packed_here_are_refused() -> None:

@@ -9,26 +9,28 @@ from typing import Any
 
 import pytest
 
+from responders.code import Code
 from responders.function_calls import FunctionCall, call_functions
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.code import judge_source
 from service.grading.judging.outcome import Outcome
 from service.grading.judging.source_answers import SourceAnswers
-from service.grading.static_analysis import SubmittedParts, analyse
+from service.grading.run_plan import plan_run
+from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
 from service.reports.formats.text import plain_text
 from service.reports.view import staff_view, student_view
 from sim.recording import Verdict
-from submissions.assignment import Assignment, Limits, Parts, WorldSpec
-from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.assignment.definition import Assignment, Limits, Parts, WorldSpec
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.magics import split_program
 from submissions.plain_cells import python_of
-from submissions.submission import Cell, Notebook, Source, Submission
+from submissions.submission import Cell, Notebook, Submission
 
 LIMITS = ChildLimits(1.0, 256 << 20)
 
@@ -43,8 +45,9 @@ def without_robot(*criteria: Criterion) -> Assignment:
 
 
 def answers(text: str, runner: TrialRunner, **rules: Any) -> SourceAnswers:
-    asked = without_robot(criterion("source", **rules))
-    return analyse(SubmittedParts(program=Source("robot.py", text)), asked, (), runner, JobMeter()).answers["c"]
+    asked = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (), (criterion("source", **rules),))
+    plan = plan_run(Submission("ada", program=Code("robot.py", text)), asked)
+    return analyse(plan, (), runner, JobMeter()).answers["c"]
 
 
 def judged(text: str, runner: TrialRunner, **rules: Any) -> Outcome:
@@ -53,7 +56,7 @@ def judged(text: str, runner: TrialRunner, **rules: Any) -> Outcome:
 
 
 def graded(text: str, runner: TrialRunner, *criteria: Criterion) -> Grade:
-    submission = Submission("ada", responder=Source("responder.py", text))
+    submission = Submission("ada", responder=Code("responder.py", text))
     return grade(submission, without_robot(*criteria), runner=runner)
 
 
@@ -194,7 +197,7 @@ def test_files_beside_the_responder_are_read_too(helper: str, words: str, runner
     rules = criterion("source", part="responder", avoids=["import sklearn"])
     submission = Submission(
         "ada",
-        responder=Source("responder.py", "import helper\ndef responder(text): return text"),
+        responder=Code("responder.py", "import helper\ndef responder(text): return text"),
         files={"helper.py": helper.encode(), "notes.txt": b"import sklearn"},
     )
     result = grade(submission, without_robot(rules), runner=runner).criteria[0]
@@ -277,7 +280,7 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
 def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, runner: TrialRunner) -> None:
     asked = criterion("functions", function="f", calls=[keys])
     result = grade(
-        Submission("ada", responder=Source("responder.py", text)),
+        Submission("ada", responder=Code("responder.py", text)),
         Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (asked,), limits=Limits(responder_cpu=0.5)),
         runner=runner,
     )
@@ -346,7 +349,7 @@ def checked(folder: Path, check: str, runner: TrialRunner) -> Grade:
     folder.mkdir(exist_ok=True)
     (folder / "assignment.toml").write_text(HEAD)
     (folder / "check.py").write_text(check)
-    program = Source("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
+    program = Code("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
     return grade(Submission("ada", program), read_assignment(folder), runner=runner)
 
 
@@ -374,7 +377,7 @@ def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Pa
         "    numbers = [number for _, _, *both in trial['datalog'] for number in both if number is not None]\n"
         "    return {'passed': not numbers, 'score': sum(numbers) - sum(numbers), 'measures': {'sum': sum(numbers)}}\n"
     )
-    program = Source("robot.py", f"print('Light_left: {value}')\n" * 3)
+    program = Code("robot.py", f"print('Light_left: {value}')\n" * 3)
     assert grade(Submission("ada", program), read_assignment(tmp_path), runner=runner).marks == 4
 
 
@@ -449,7 +452,7 @@ def trusting(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
 def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     text: str, trusting: Assignment, runner: TrialRunner
 ) -> None:
-    result = grade(Submission("ada", Source("robot.py", f"print({text!r})")), trusting, runner=runner)
+    result = grade(Submission("ada", Code("robot.py", f"print({text!r})")), trusting, runner=runner)
     asked, ended = result.criteria
     assert asked.marks == 0
     assert asked.unjudged
@@ -466,7 +469,7 @@ def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
     trusting: Assignment, runner: TrialRunner
 ) -> None:
     few = replace(trusting, limits=replace(trusting.limits, all_cpu=0.5))
-    program = Source("robot.py", "print('json [1]')\nwhile True: pass")
+    program = Code("robot.py", "print('json [1]')\nwhile True: pass")
     asked, ended = grade(Submission("ada", program), few, runner=runner).criteria
     assert ended.marks == 0
     assert not asked.unjudged

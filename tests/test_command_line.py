@@ -11,7 +11,7 @@ import pytest
 from command import robomark
 from service.cli import main
 from service.reports.formats import FORMATS
-from submissions.assignment_file import assignment_folder
+from submissions.assignment.folder import assignment_folder
 
 
 @pytest.mark.parametrize(

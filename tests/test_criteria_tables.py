@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from service.grading.judging.judge import JUDGES
-from submissions.assignment_tables import read_table
+from submissions.assignment.schema import read_table
 from submissions.criteria import SCHEMAS
 
 AREA = {"rectangle": [0, 0, 10, 10]}

@@ -19,6 +19,7 @@ from sqlalchemy import func, select
 from builders import PROGRAM, echo, settings_in
 from floods import FLOODS, Flood
 from memory_group import MemoryGroup, memory_group
+from responders.code import Code
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.queue.broker import EmbeddedBroker
@@ -30,7 +31,7 @@ from service.store.engine import Store, open_store
 from service.store.intake import GradingRequest, accept_batch
 from service.store.models import UNFINISHED, Enrolment, Job, JobState, Lane
 from sim.recording import Verdict
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 MEMORY = 1_500_000_000
 HONEST = """
@@ -53,7 +54,7 @@ OTHERS = [
 
 
 def _submission(student: str, program: str, responder: str | None) -> GradingRequest:
-    parts = Source("robot.py", program), Source("responder.py", responder or ECHO)
+    parts = Code("robot.py", program), Code("responder.py", responder or ECHO)
     return GradingRequest(Submission(student, *parts), echo(), student)
 
 

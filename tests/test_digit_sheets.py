@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from notebook_builder import notebook
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -16,10 +17,11 @@ from service.reports.plots.drawn import draw_all
 from service.store.recordings import from_bytes, to_bytes
 from sim.floors import floor, label_names
 from sim.recording import SENSOR_SIDE, Image
-from submissions.assignment import Assignment
-from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 ASSIGNMENT = """
 id = "digits"
@@ -41,7 +43,7 @@ marks = 1
 check = "classification"
 truth = "label"
 """
-LOOK = Submission("ada", Source("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
+LOOK = Submission("ada", Code("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
 
 
 def assignment(folder: Path, sheet: str, labels: str = "false") -> Assignment:

@@ -20,8 +20,9 @@ from service.reports.formats import FORMATS
 from service.settings import Settings
 from sim.floors import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
-from submissions.assignment_file import find_assignment
-from submissions.assignment_tables import (
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.assignment.schema import (
     ChannelTable,
     HeadTable,
     LimitsTable,
@@ -31,7 +32,6 @@ from submissions.assignment_tables import (
     read_table,
 )
 from submissions.criteria import SCHEMAS, Criterion
-from submissions.example_folder import examples
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = examples("shape-recognition") / "reference"

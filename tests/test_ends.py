@@ -19,6 +19,7 @@ import pytest
 from hostile import FIND_WIRE, forged
 from processes import children, until
 from responders.bridge import Bridge
+from responders.code import Code
 from responders.conversation import Conversation
 from responders.responder_process import ResponderProcess
 from responders.sandbox.meter import JobLimits, JobMeter
@@ -28,8 +29,8 @@ from service.grading.slots import Slots
 from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled, HostError
 from sim.recording import Verdict
-from submissions.assignment_file import find_assignment
-from submissions.submission import Source, Submission
+from submissions.assignment.reader import find_assignment
+from submissions.submission import Submission
 
 HONEST = 'from time import sleep\nprint("PY::a")\nsleep(1)\ntank_drive.on_for_seconds(20, 20, 1)\n'
 BUSY = f"sum(range(10**7))\n{HONEST}"
@@ -257,8 +258,8 @@ def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner:
 
 def test_a_grade_has_what_its_trials_cost_and_is_compared_without(runner: TrialRunner) -> None:
     asked = find_assignment("echo-responder")
-    program = Source("robot.py", f"{NAP}print('PY::x')\n")
-    submission = Submission("ada", program, Source("responder.py", ECHO))
+    program = Code("robot.py", f"{NAP}print('PY::x')\n")
+    submission = Submission("ada", program, Code("responder.py", ECHO))
     first, second = (grade(submission, asked, runner=runner) for _ in range(2))
     cost = first.cost
     assert cost is not None

@@ -14,9 +14,10 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment_file import catalogue, find_assignment
+from submissions.assignment.examples import REFERENCE, Expectation, examples
+from submissions.assignment.folder import catalogue
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
-from submissions.example_folder import REFERENCE, Expectation, examples
 
 TESTS = Path(__file__).parent
 FAILING = TESTS / "failing_submissions"

@@ -23,13 +23,14 @@ from hypothesis import strategies as st
 from responders import wire
 from responders.bridge import Bridge
 from responders.channel import Channel
+from responders.code import Code
 from responders.notebook_executor import PlannedRun, execute_notebook
 from responders.notebook_process import NotebookSpec
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox import running_child
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
-from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from sim.arena import Arena
 from sim.camera import Cameras
 from sim.floors import floor
@@ -138,7 +139,7 @@ def _status(process: subprocess.Popen[bytes]) -> int:
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 0.1)
+    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 0.3)
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
 
 

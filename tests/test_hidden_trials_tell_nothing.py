@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -24,10 +25,10 @@ from service.reports.html import report
 from service.reports.plots.drawn import draw_all
 from service.reports.view import gradebook_view, student_view
 from sim.recording import Pose
-from submissions.assignment import Assignment, Limits, Parts, Scenario, Training, WorldSpec
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.reader import find_assignment
 from submissions.criteria import SCHEMAS, Criterion
-from submissions.submission import Cell, Notebook, Source, Submission
+from submissions.submission import Cell, Notebook, Submission
 from submissions.sweep import Sweep
 
 POSES = tuple(Pose(200.0 + 80 * place, 900.0, 0.0) for place in range(6))
@@ -61,7 +62,7 @@ def asked() -> Assignment:
     hidden = replace(shown, id="hidden", visibility="hidden", poses=POSES[2:4])
     criteria = tuple(criterion(check, keys) for check, keys in CRITERIA)
     world = WorldSpec("Shuffled_Shapes", labels=False, sheet=None)
-    return Assignment("a", "A", world, Parts(), (shown, hidden), criteria, Limits(0.5, 2.0), version="1")
+    return Assignment("a", "A", world, Parts(), (shown, hidden), criteria, Limits(2.0, 2.0), version="1")
 
 
 def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) -> dict[str, str]:
@@ -162,38 +163,25 @@ RESPONDERS = {
     "what its agent is called with": "    return agent(seen)\nagent = str",
 }  # fmt: skip
 
-#: One of each kind: counts, texts, times, lines, places, images' answers. The others are tried when there is time.
-QUICK = {
-    "the number of images", "the text of a message", "the line of an error", "the moment of the end",
-    "the way that it ends", "running on", "what it touches", "logged readings",
-    "which answers are given", "answers that cannot be read", "answers that come late", "an error",
-    "what the responder writes down",
-}  # fmt: skip
 
-
-def channels(known: Mapping[str, str]) -> list[Any]:
-    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in known]
-
-
-@pytest.mark.parametrize("channel", channels(PROGRAMS))
+@pytest.mark.parametrize("channel", PROGRAMS)
 def test_what_a_program_does_in_hidden_trials_is_not_told(runner: TrialRunner, asked: Assignment, channel: str) -> None:
-    program = Source("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
-    told_apart(runner, Submission("s", program, Source("responder.py", ANSWERS)), asked)
+    program = Code("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
+    told_apart(runner, Submission("s", program, Code("responder.py", ANSWERS)), asked)
 
 
-@pytest.mark.parametrize("channel", channels(RESPONDERS))
+@pytest.mark.parametrize("channel", RESPONDERS)
 def test_what_a_responder_does_in_hidden_trials_is_not_told(
     runner: TrialRunner, asked: Assignment, channel: str
 ) -> None:
-    responder = Source("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
-    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), asked)
+    responder = Code("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
+    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), asked)
 
 
-@pytest.mark.long
 def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, asked: Assignment) -> None:
     few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
-    responder = Source("responder.py", LOOKS + RESPONDERS["which answers are given"])
-    told_apart(runner, Submission("s", Source("robot.py", SENDS), responder), few, draw=True)
+    responder = Code("responder.py", LOOKS + RESPONDERS["which answers are given"])
+    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), few, draw=True)
 
 
 CELLS = (
@@ -238,7 +226,7 @@ def training() -> Assignment:
     criteria = tuple(each.model_copy(update={"marks": Decimal(0)}) for each in found.criteria)
     pooled = criteria[0].model_copy(update={"id": "all", "scenarios": ("practice", "unseen")})
     assert isinstance(found.training, Training)
-    limits = replace(found.limits, responder_cpu=0.5)
+    limits = replace(found.limits, responder_cpu=1.0)
     return replace(found, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
 
 
@@ -246,5 +234,5 @@ def training() -> Assignment:
 def test_what_a_model_does_with_hidden_images_is_not_told(
     runner: TrialRunner, training: Assignment, channel: str
 ) -> None:
-    model = Source("responder.py", MODEL.replace("{}", MODELS[channel]))
+    model = Code("responder.py", MODEL.replace("{}", MODELS[channel]))
     told_apart(runner, Submission("s", None, model), training)

@@ -21,7 +21,7 @@ from service.home import open_home
 from service.queue.processes import end_processes, start_process
 from service.store.engine import open_store
 from sim.errors import UsageError
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 ANOTHER = 12345
 AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")

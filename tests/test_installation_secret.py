@@ -17,6 +17,7 @@ from sqlalchemy import update
 from battery import scrambled
 from command import robomark
 from first_release import lay_first_release
+from responders.code import Code
 from service import home_secret
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -26,10 +27,10 @@ from service.store.engine import open_store
 from service.store.installation import secret_of
 from service.store.models import Installation, Job
 from sim.errors import HostError, UsageError
-from submissions.assignment_file import find_assignment
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.seeds import Secret
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 SECRET = "a-secret-of-32-characters-9c41e7"
 ECHO = examples("echo-responder") / "reference"
@@ -149,8 +150,8 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
     asked = type(asked)("a", "A", asked.world, asked.parts, asked.scenarios[:1], asked.criteria[:1])
     (seed,) = (trial.seed for trial in asked.trials(Secret(SECRET)))
     search = SEARCH.format(database=tmp_path / "robomark.db", codes=scrambled(SECRET, str(seed)))
-    program = Source("robot.py", f"{search}\nprint('PY::', told())\n")
-    responder = Source("responder.py", f"{search}\ndef responder(text): return str(told())\n")
+    program = Code("robot.py", f"{search}\nprint('PY::', told())\n")
+    responder = Code("responder.py", f"{search}\ndef responder(text): return str(told())\n")
     with TrialRunner() as runner:
         (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), runner=runner).trials
     assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]

@@ -21,7 +21,7 @@ from service.grading.judging.outcome import Outcome
 from service.grading.judging.truths import NO_IMAGE
 from sim.errors import HostError
 from sim.recording import Fault, Image, Line, Message, Pose, Recording, Ticks, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion
 
 START = Pose(100, 800, 0)

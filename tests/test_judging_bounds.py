@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from responders.code import Code
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade
 from service.grading.judging import bounded
@@ -27,11 +28,11 @@ from service.grading.trial_runner import TrialRunner
 from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, conversation
 from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Line, Message, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
-from submissions.assignment_file import read_assignment
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS
 from submissions.criteria.expressions import found_in, usable
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 from test_judging import START, criterion, recorded
 
 # Texts that students choose
@@ -178,7 +179,7 @@ def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunn
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text[4:]\n")
     asked = read_assignment(tmp_path)
-    program = Source("robot.py", _STORY.format(lines=_PROGRAMS[name]))
+    program = Code("robot.py", _STORY.format(lines=_PROGRAMS[name]))
     begin = time.process_time()
     graded = grade(Submission("ada", program, None), asked, runner=runner)
     assert time.process_time() - begin < 30
@@ -415,7 +416,7 @@ def test_a_grade_says_that_staff_have_to_look(
     _spoil(monkeypatch, {"number": _raises})
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text\n")
-    program = Source("robot.py", _STORY.format(lines="print('1 2 3!')"))
+    program = Code("robot.py", _STORY.format(lines="print('1 2 3!')"))
     graded = grade(Submission("ada", program, None), read_assignment(tmp_path), runner=runner)
     assert graded.notes == ("1 of 6 criteria could not be judged; staff will look at it",)
     assert {result.id: result.marks for result in graded.criteria} | {"number": 0} == {

@@ -16,7 +16,7 @@ from service.grading.judging.judge import judge
 from service.grading.judging.words import tokens_of, words_of
 from sim.floors import floor
 from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion
 
 START = Pose(100, 800, 0)

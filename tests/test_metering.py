@@ -12,12 +12,13 @@ import pytest
 import running
 from floods import CALL, ECHO, FLOODS, Flood, long
 from hostile import flood
+from responders.code import Code
 from responders.function_calls import FunctionCall
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code
+from responders.trial_spec import ResponderSpec
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Fault, Recording, Verdict
@@ -67,7 +68,8 @@ def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, runner: TrialRunne
 def test_a_flood_while_functions_are_called_ends_at_the_budget(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     code = Code("responder.py", f"def f(): return {'x' * 50_000!r}")
-    called = runner.call(code, {}, [FunctionCall("f")] * 200, running.RESPONDER_LIMITS, 1 << 30, 1, meter)
+    module = ResponderSpec(code, {}, running.RESPONDER_LIMITS, 1 << 30)
+    called = runner.call(module, [FunctionCall("f")] * 200, 1, meter)
     faults = [returned.fault for returned in called.returned if returned.fault is not None]
     assert faults[0].verdict is Verdict.OUTPUT_LIMIT
     assert _held(called.returned) < 2 * BUDGET

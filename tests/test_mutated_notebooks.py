@@ -15,8 +15,8 @@ from notebook_builder import MESSAGING, document
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
 
 ASSIGNMENT = """

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from responders.code import Code
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -16,8 +17,8 @@ from sim.recording import Pose
 from sim.robot import LightSensor
 from sim.sensors import Footprint, LightReader
 from sim.world import Noise
-from submissions.assignment_file import find_assignment
-from submissions.submission import Source, Submission
+from submissions.assignment.reader import find_assignment
+from submissions.submission import Submission
 
 TICKS = 200
 AHEAD = "tank_drive.on_for_seconds(50, 50, 20)"
@@ -163,7 +164,7 @@ def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(ru
 
 @pytest.mark.parametrize("name", ["dead-reckoning-with-noise", "lollipop-with-noise"])
 def test_in_the_catalogue_backwards_is_noisy(runner: TrialRunner, name: str) -> None:
-    backwards = Submission("eve", Source("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
+    backwards = Submission("eve", Code("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
     trials = grade(backwards, find_assignment(name), runner=runner).trials
     noisy = [trial.recording.end for trial in trials if trial.motor_noise]
     assert len(set(noisy)) == len(noisy)

@@ -20,8 +20,9 @@ from service.grading.trial_runner import TrialRunner
 from service.reports.faults import fault_groups
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
-from submissions.assignment import Assignment, Parts
-from submissions.assignment_file import AssignmentProblems, find_assignment, read_assignment
+from submissions.assignment.definition import Assignment, Parts
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
 
 TOML = """

@@ -11,7 +11,7 @@ import pytest
 from service.commands.grade import read_with_assignment
 from service.preflight import preflight
 from sim.errors import UsageError
-from submissions.assignment_file import assignment_folder
+from submissions.assignment.folder import assignment_folder
 
 PROGRAM = "print('hello')\n"
 RESPONDER = "def responder(msg):\n    return msg\n"

@@ -31,7 +31,7 @@ from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import GradingRequest, accept_batch, load_grading_request
 from service.store.models import CriterionResultRow, Job, JobState, Lane, PlotState, TrialRow
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
 SPIN = "print('begun')\nwhile True:\n    pass\n"

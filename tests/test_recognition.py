@@ -23,8 +23,9 @@ from service.reports.recognition_table import recognition_tables
 from service.reports.view import student_view
 from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
-from submissions.assignment_file import AssignmentProblems, read_assignment
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.sweep import Sweep
 

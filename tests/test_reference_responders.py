@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from models import weights_bytes
 from responders import library
+from responders.code import Code
 from running import run_program
+from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.floors import SHAPES
 from sim.recording import Pose, Recording, Verdict
 from sim.world import Noise
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
+from submissions.submission import Submission
 
 NETWORK = {
     "mlp_shapes_14x14.joblib": weights_bytes("shapes"),
@@ -30,7 +36,12 @@ for text in {texts!r}:
 
 def converse(runner: TrialRunner, name: str, texts: list[str], **options: Any) -> Recording:
     recording = run_program(
-        runner, SAY.format(texts=texts), responder=library.source(name), files=NETWORK, preamble="none", **options
+        runner,
+        SAY.format(texts=texts),
+        responder=library.source(f"{name}.py"),
+        files=NETWORK,
+        preamble="none",
+        **options,
     )
     assert recording.verdict is Verdict.FINISHED, recording.faults
     return recording
@@ -114,7 +125,7 @@ def test_an_empty_floor_is_no_shape(runner: TrialRunner) -> None:
 
 
 def test_the_library_gives_only_its_own_files() -> None:
-    assert all(library.source(name).startswith('"""') for name in library.NAMES)
+    assert all(library.source(name).startswith('"""') for name in library.names())
     with pytest.raises(KeyError):
         library.source("../kit/nn_tools/sensor_data")
 
@@ -127,7 +138,7 @@ def test_digits_of_a_sheet_are_named(runner: TrialRunner, name: str) -> None:
             runner,
             SAY.format(texts=["IMG_DATA"]),
             Pose(100 + 100 * column, 1050, 90),
-            responder=library.source(name),
+            responder=library.source(f"{name}.py"),
             files=NETWORK,
             background="MNIST_Digits",
             preamble="none",
@@ -145,3 +156,42 @@ def test_the_digit_responder_says_how_sure_it_is_and_sees_paper_as_paper(runner:
         {"report": "Agent says: I see no digit"}
     ]
     assert answers(converse(runner, "digit_responder", ["PY::hello"])) == [{"report": "Agent says: I heard hello"}]
+
+
+GIVES = """
+id = "given"
+title = "Given"
+[parts]
+responder = "{name}"
+[[scenario]]
+id = "s"
+seconds = 2
+[[criterion]]
+title = "Ends"
+marks = 1
+check = "finishes"
+"""
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_an_assignment_gives_one_by_its_name(tmp_path: Path, name: str) -> None:
+    (tmp_path / "assignment.toml").write_text(GIVES.format(name=name))
+    packaged = read_assignment(tmp_path)
+    (tmp_path / name).write_text("def responder(message): return 'mine'")
+    own = read_assignment(tmp_path)
+    assert packaged.given_parts == {name: library.source(name)}
+    assert own.given_parts == {name: "def responder(message): return 'mine'"}
+    assert packaged.version != own.version
+
+
+def test_a_given_one_answers_the_students_program(tmp_path: Path, runner: TrialRunner) -> None:
+    (tmp_path / "assignment.toml").write_text(GIVES.format(name="echo_responder.py"))
+    program = Code("robot.py", "import time\nprint('PY::[1, 2]')\ntime.sleep(1)")
+    result = grade(Submission("ada", program), read_assignment(tmp_path), runner=runner)
+    assert answers(result.trials[0].recording) == ["Python saw >> [1, 2] << that..."]
+
+
+def test_the_sentence_on_another_name_lists_them(tmp_path: Path) -> None:
+    (tmp_path / "assignment.toml").write_text(GIVES.format(name="eco_responder.py"))
+    with pytest.raises(AssignmentProblems, match=r'responder is "eco_responder.py", expected .*echo_responder\.py'):
+        read_assignment(tmp_path)

@@ -15,7 +15,7 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
 from sim.world import Noise
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 FOLLOWER = """
 while True:

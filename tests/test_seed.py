@@ -8,7 +8,7 @@ from models import weights_bytes
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Recording, Verdict
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 from submissions.magics import setup, split_program
 
 NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}

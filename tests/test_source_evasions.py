@@ -22,7 +22,7 @@ from service.reports.formats.text import plain_text
 from service.reports.html import report
 from service.reports.view import staff_view, student_view
 from sim.recording import Pose, Verdict
-from submissions.assignment import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission

@@ -15,7 +15,8 @@ from service.grading.grade import Grade
 from service.store.recordings import RecordingError, from_bytes, keep, to_bytes
 from service.store.versions import assignment_from_bytes, assignment_to_bytes
 from sim.recording import COLUMNS, Line, Message, Recording, Ticks
-from submissions.assignment_file import catalogue, find_assignment
+from submissions.assignment.folder import catalogue
+from submissions.assignment.reader import find_assignment
 
 GRADES = {
     "line-follower": report_builders.line_follower_grade,

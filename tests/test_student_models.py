@@ -29,7 +29,7 @@ from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
 EXPECTED: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())

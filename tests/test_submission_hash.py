@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from submissions.submission import Cell, Notebook, Source, Submission
+from responders.code import Code
+from submissions.submission import Cell, Notebook, Submission
 
 #: Pairs that are told apart; each had one hash when names and lengths were not told before what they belong to.
 APART = {
@@ -35,8 +36,8 @@ APART = {
         Submission("a", notebook=Notebook("eve.ipynb", (Cell(1, "x"),))),
     ),
     "programs of other names, which errors have": (
-        Submission("a", Source("ada.py", "1/0")),
-        Submission("a", Source("eve.py", "1/0")),
+        Submission("a", Code("ada.py", "1/0")),
+        Submission("a", Code("eve.py", "1/0")),
     ),
 }
 
@@ -74,7 +75,7 @@ def _read_back(data: bytes) -> list[list[bytes]]:
 TEXTS = st.text(st.characters(), max_size=12) | st.sampled_from(
     ["", "2 bytes\nab", "3 fields\n", "program", "file", "a:b", "\ud800", "\n", "1"]
 )
-SOURCES = st.none() | st.builds(Source, TEXTS, TEXTS)
+SOURCES = st.none() | st.builds(Code, TEXTS, TEXTS)
 CELLS = st.builds(Cell, st.integers(1, 12), TEXTS, st.lists(TEXTS, max_size=3).map(tuple))
 SUBMISSIONS = st.builds(
     Submission,
@@ -95,9 +96,9 @@ def test_all_of_a_submission_but_its_student_can_be_read_back_from_what_is_hashe
         texts = [field.decode("utf-8", "surrogatepass") if kind != b"file" else "" for field in fields]
         match kind:
             case b"program":
-                program = Source(*texts)
+                program = Code(*texts)
             case b"responder":
-                responder = Source(*texts)
+                responder = Code(*texts)
             case b"notebook":
                 notebook = Notebook(texts[0], ())
             case b"cell":

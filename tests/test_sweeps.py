@@ -12,18 +12,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from responders.channel import Channel
+from responders.code import Code
 from service.grading.grade import Level
 from service.grading.grader import grade
 from service.grading.judging.sweeps import area, part_above, range_above
 from service.grading.trial_runner import TrialRunner
 from service.store.codec import decode, encode
 from sim.recording import Pose
-from submissions.assignment import Assignment, ChannelSpec, Parts, Scenario, WorldSpec
-from submissions.assignment_file import find_assignment, read_assignment
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.bundle import read_submission
 from submissions.criteria.robustness import Robustness
-from submissions.example_folder import examples
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 from submissions.sweep import CONDITIONS, Sweep
 
 POSES = (Pose(200, 900, 0), Pose(280, 900, 0), Pose(360, 900, 0))
@@ -51,7 +53,7 @@ def levels(*shares: tuple[float, int, int]) -> tuple[Level, ...]:
 
 
 def test_a_sweep_varies_one_condition_at_a_time() -> None:
-    channel = ChannelSpec(delay=0.1, jitter=0.3)
+    channel = Channel(delay=0.1, jitter=0.3)
     sweep = Sweep(offset_x=(-2, 0), heading=(5,), light_noise=(64,), loss=(0.5,), delay=(2,))
     trials = list(assignment(Scenario("s", POSES[:1], channel=channel, sweep=sweep, trials=2)).trials())
     assert [trial.index for trial in trials] == list(range(12))
@@ -183,7 +185,7 @@ def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
         )
     )
     asked = assignment(Scenario("s", POSES[:1], sweep=sweep, seconds=5), *wanted)
-    submission = Submission("s", Source("robot.py", SENDS_TWO), Source("responder.py", SAYS_SQUARE))
+    submission = Submission("s", Code("robot.py", SENDS_TWO), Code("responder.py", SAYS_SQUARE))
     result = grade(submission, asked, runner=runner)
     curves = {
         found.id: [(level.at, level.right, level.n) for level in found.curves[0].levels] for found in result.criteria

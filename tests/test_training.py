@@ -9,17 +9,18 @@ from typing import Any
 
 import pytest
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.collecting import pairs
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
-from submissions.example_folder import examples
-from submissions.submission import Cell, Notebook, Source, Submission
+from submissions.submission import Cell, Notebook, Submission
 
 NEAREST = """
 from sklearn.neighbors import KNeighborsClassifier
@@ -51,7 +52,7 @@ def training() -> Assignment:
 
 
 def trained(runner: TrialRunner, asked: Assignment, text: str) -> Grade:
-    return grade(Submission("s", None, Source("responder.py", text)), asked, runner=runner)
+    return grade(Submission("s", None, Code("responder.py", text)), asked, runner=runner)
 
 
 def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: TrialRunner, training: Assignment) -> None:

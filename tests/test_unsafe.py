@@ -13,7 +13,7 @@ from command import robomark
 from processes import robomark as robomark_meanwhile
 from processes import until
 from service.queue.worker import worker_lives
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 _STAMP = "process limits only"
 _FLAG = "--unsafe-no-sandbox"

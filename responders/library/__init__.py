@@ -1,23 +1,25 @@
-"""Reference responders as text: submissions that work, and files that an assignment may give.
+"""Reference responders as text: submissions that work, and files that an assignment gives by their names.
 
-They are written as students write them and run inside the sandbox; nothing here imports one.
+Each file of this folder is one, written as students write them, and run inside the sandbox; nothing here imports one.
 """
 
 from importlib import resources
+from importlib.resources.abc import Traversable
 
-NAMES = (
-    "echo_responder",
-    "json_responder",
-    "image_parser",
-    "shape_responder",
-    "rule_responder",
-    "digit_responder",
-    "plain_digit_responder",
-)
+
+def names() -> tuple[str, ...]:
+    """The names of the files, sorted."""
+    return tuple(sorted(_files()))
 
 
 def source(name: str) -> str:
-    """The text of a reference responder. Raises KeyError for a name that is not in ``NAMES``."""
-    if name not in NAMES:
-        raise KeyError(name)
-    return (resources.files(__package__) / f"{name}.py").read_text(encoding="utf-8")
+    """The text of a reference responder. Raises KeyError for a name that is not in ``names()``."""
+    return _files()[name].read_text(encoding="utf-8")
+
+
+def _files() -> dict[str, Traversable]:
+    return {
+        file.name: file
+        for file in resources.files(__package__).iterdir()
+        if file.name.endswith(".py") and not file.name.startswith("_")
+    }

@@ -19,10 +19,11 @@ from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
 from service.reports.readable import one_line, readable
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import FILE_NAME, catalogue, find_assignment
-from submissions.assignment_folder import export_for_students, export_whole, write_new
-from submissions.example_folder import EXAMPLES, REFERENCE
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import EXAMPLES, REFERENCE
+from submissions.assignment.export import export_for_students, export_whole, write_new
+from submissions.assignment.folder import FILE_NAME, catalogue
+from submissions.assignment.reader import find_assignment
 
 assignments_app = typer.Typer(help="List, show, check, make and export assignments.", no_args_is_help=True)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from service.commands.batch.app import submit_and_wait
-from submissions.example_folder import examples
+from submissions.assignment.examples import examples
 
 _ASSIGNMENT = "shape-recognition"
 

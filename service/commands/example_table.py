@@ -12,7 +12,7 @@ from rich.text import Text
 
 from service.grading.example_check import CheckedAssignment, ExampleResult, Figure
 from service.reports.readable import number, one_line
-from submissions.example_folder import REFERENCE
+from submissions.assignment.examples import REFERENCE
 
 
 def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:

@@ -21,8 +21,8 @@ from service.reports.formats import FORMATS, Format
 from service.reports.written import prepare_folder, write_report
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment, find_in_catalogue
+from submissions.assignment.definition import Assignment
+from submissions.assignment.reader import find_assignment, find_in_catalogue
 from submissions.bundle import fit_parts, named_by, read_submission
 from submissions.names import alike, cannot_be_told
 from submissions.raw_files import shown

@@ -11,9 +11,10 @@ import typer
 
 from models import weights_bytes
 from responders.channel import Channel
+from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
-from responders.trial_spec import Code, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from service.grading.grade import TrialResult

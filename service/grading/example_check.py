@@ -15,10 +15,10 @@ from service.grading.grader import grade
 from service.grading.judging.words import fault_words
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import find_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import REFERENCE, Expectation, OriginalFigure, examples, expected
+from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
-from submissions.example_folder import REFERENCE, Expectation, OriginalFigure, examples, expected
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from responders.channel import Channel
+from responders.code import Code
 from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Code, ProgramSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, TrialSpec
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor

@@ -5,61 +5,49 @@ What is marked is the assignment's to say; what the magics come to is ``notebook
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
+from service.grading.grade import TrialResult
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
 from submissions.magics import Flags, Setup
-from submissions.marked_cell import LAST, Site, marked_site
-from submissions.submission import Notebook
+from submissions.marked_cell import LAST, Site
 
 
 @dataclass(frozen=True, slots=True)
-class NotebookToRun:
-    """A notebook as a trial executes it, with the files in its folder and its limits."""
+class NotebookTrial:
+    """How each trial executes the notebook, and which run in it is marked.
 
-    notebook: Notebook
-    files: Mapping[str, bytes]
-    limits: ChildLimits
-    output_bytes: int
-
-
-@dataclass(frozen=True, slots=True)
-class Marking:
-    """The run that is marked: ``spec`` has all but the program, unless the assignment brings that itself.
-
-    ``which`` is the assignment's word for the cell; None when the program is the assignment's. With ``as_read`` the
-    text in ``spec`` is what is run: its rules were held against that, and a notebook can hand over another.
+    ``which`` is the assignment's word for the cell at ``site``; both are None when the program is the assignment's.
+    With ``as_read`` the text of the trial's spec is what is run: its rules were held against that, and a notebook can
+    hand over another. The seed in ``notebook`` is set for each trial.
     """
 
-    spec: TrialSpec
-    obstacles: tuple[Rectangle, ...]
+    notebook: NotebookSpec
+    site: Site | None
     which: str | None
     as_read: bool = False
 
+    def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
+        """The recording of the marked run, with what the whole notebook told.
 
-def run_notebook_trial(
-    grading_request: NotebookToRun, marking: Marking, runner: TrialRunner, meter: JobMeter
-) -> Recording:
-    """The recording of the marked run, with what the whole notebook told.
-
-    Where the last robot program is marked and was never come to, the last that did run is marked instead.
-    Raises HostError when the machine fails, and whatever the meter's heartbeat raises.
-    """
-    site = None if marking.which is None else marked_site(grading_request.notebook, marking.which)
-    executed, planner = runner.undisturbed(lambda: _execute(grading_request, marking, site, runner, meter), meter)
-    if executed.marked is None and marking.which == LAST and planner.started:
-        last = site = planner.started[-1]
-        executed, planner = runner.undisturbed(lambda: _execute(grading_request, marking, last, runner, meter), meter)
-    if executed.marked is not None:
+        Where the last robot program is marked and was never come to, the last that did run is marked instead.
+        Raises HostError when the machine fails, and whatever the meter's heartbeat raises.
+        """
+        site = self.site
+        executed, started = self._execute(spec, obstacles, site, runner, meter)
+        if executed.marked is None and self.which == LAST and started:
+            site = started[-1]
+            executed, _ = self._execute(spec, obstacles, site, runner, meter)
+        if executed.marked is None:
+            return executed.told(runner.never_ran(spec, obstacles, _why_not(executed, site), executed.sandbox))
         recording = executed.marked.recording
         faults = recording.faults
         if executed.stopped is not None and not any(fault.who == "responder" for fault in faults):
@@ -67,44 +55,46 @@ def run_notebook_trial(
             faults = (*faults, replace(executed.stopped, t=recording.end_t))
         verdict = faults[0].verdict if faults else Verdict.FINISHED
         return executed.told(replace(recording, faults=faults, verdict=verdict))
-    return executed.told(runner.never_ran(marking.spec, marking.obstacles, _why_not(executed, site), executed.sandbox))
 
+    def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
+        """What the cells could not do is much the same in every trial, and told once.
 
-def _execute(
-    grading_request: NotebookToRun, marking: Marking, site: Site | None, runner: TrialRunner, meter: JobMeter
-) -> tuple[ExecutedNotebook, NotebookRuns]:
-    spec = marking.spec
-    planned = PlannedRun(spec, marking.obstacles, None, True, True)
+        Never that of a hidden trial: a cell can put into the words of an error where its robot stood.
+        """
+        return next((result.recording.notes for result in results if result.visibility == "visible"), ())
 
-    def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
-        if marking.as_read:
-            program = replace(program, text=spec.program.code.text)
-        run = replace(
-            spec,
-            program=program_spec(program, spec.program.limits, spec.program.output_bytes),
-            pen_down="p" in flags.switches or "p" in program.flags.switches,
-        )
-        return replace(planned, spec=run)
+    def _execute(
+        self,
+        spec: TrialSpec,
+        obstacles: tuple[Rectangle, ...],
+        site: Site | None,
+        runner: TrialRunner,
+        meter: JobMeter,
+    ) -> tuple[ExecutedNotebook, list[Site]]:
+        """What came of the notebook with the run at ``site`` marked, and where robots were started."""
+        planned = PlannedRun(spec, obstacles, None, True, True)
 
-    # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
-    sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
-    # Their noise would tell the trial again, were it of the world's seed.
-    unmarked = UnmarkedRuns(spec.program.limits, spec.program.output_bytes, spec.seconds, spec.child_seed, sheet)
-    planner = NotebookRuns(site, marked_run, unmarked, planned if marking.which is None else PlannedRun())
-    notebook = grading_request.notebook
-    executed = runner.execute_notebook(
-        NotebookSpec(
-            notebook.name,
-            tuple(cell.source for cell in notebook.cells),
-            grading_request.files,
-            grading_request.limits,
-            grading_request.output_bytes,
-            spec.child_seed,
-        ),
-        planner,
-        meter,
-    )
-    return executed, planner
+        def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
+            if self.as_read:
+                program = replace(program, text=spec.program.code.text)
+            run = replace(
+                spec,
+                program=program_spec(program, spec.program.limits, spec.program.output_bytes),
+                pen_down="p" in flags.switches or "p" in program.flags.switches,
+            )
+            return replace(planned, spec=run)
+
+        # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
+        sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
+        # Their noise would tell the trial again, were it of the world's seed.
+        unmarked = UnmarkedRuns(spec.program.limits, spec.program.output_bytes, spec.seconds, spec.child_seed, sheet)
+        notebook = replace(self.notebook, seed=spec.child_seed)
+
+        def execute() -> tuple[ExecutedNotebook, list[Site]]:
+            planner = NotebookRuns(site, marked_run, unmarked, planned if self.which is None else PlannedRun())
+            return runner.execute_notebook(notebook, planner, meter), planner.started
+
+        return runner.undisturbed(execute, meter)
 
 
 def _why_not(executed: ExecutedNotebook, site: Site | None) -> Fault:

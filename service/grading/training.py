@@ -8,43 +8,37 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from responders.sandbox.meter import JobMeter
 from responders.training import Images, Named, TrainingSpec
-from responders.trial_spec import Code
 from service.grading.grade import TrialResult
 from service.grading.judging.collecting import Pair, pairs
 from service.grading.judging.label_patches import grey_image
-from service.grading.static_analysis import responder_limits
+from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.chance import Stream
 from sim.recording import Fault, Image, Message, Recording, Verdict
-from submissions.assignment import Assignment, Training
-from submissions.submission import Source
+from submissions.assignment.definition import Training
 
 _HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
 _SIDE = {"focus": 14, "whole": 20}
 
 
 def with_models_answers(
-    results: Sequence[TrialResult],
-    assignment: Assignment,
-    training: Training,
-    grading_request: Source,
-    files: Mapping[str, bytes],
-    child_seed: int,
-    runner: TrialRunner,
-    meter: JobMeter,
+    results: Sequence[TrialResult], plan: RunPlan, runner: TrialRunner, meter: JobMeter
 ) -> list[TrialResult]:
-    """The trials, those that are tested on with the answers of the submission's model to their images.
+    """The trials; where the assignment trains, those that are tested on with the model's answers to their images.
 
     What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
     machine fails, and whatever the meter's heartbeat raises.
     """
+    training, trainer = plan.assignment.training, plan.functions
+    if training is None or trainer is None:
+        return list(results)
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
     asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
@@ -53,12 +47,12 @@ def with_models_answers(
     groups = [group for group in (visible, [index for index in asked if index not in visible]) if group]
     unseen = [[pair for index in group for pair in _collected(results[index])] for group in groups]
     # Not in the order of the track: neighbours on it mostly show the same.
-    chance = Stream(child_seed, "order of images")
+    chance = Stream(plan.child_seed, "order of images")
     orders = [sorted(range(len(images)), key=chance.integer) for images in unseen]
     named = runner.train(
         TrainingSpec(
-            Code(grading_request.name, grading_request.text),
-            files,
+            trainer.code,
+            trainer.files,
             training.function,
             _arrays([pair for pair, _ in known], training),
             [truth for _, truth in known],
@@ -66,9 +60,9 @@ def with_models_answers(
                 _arrays([images[place] for place in order], training)
                 for images, order in zip(unseen, orders, strict=True)
             ],
-            responder_limits(assignment),
-            assignment.limits.output_bytes,
-            child_seed,
+            trainer.limits,
+            trainer.output_bytes,
+            plan.child_seed,
         ),
         meter,
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
@@ -19,11 +19,11 @@ from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
-from responders.sandbox.running_child import ChildLimits, KilledFromOutside
+from responders.sandbox.running_child import KilledFromOutside
 from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
-from responders.trial_spec import Code, TrialSpec
+from responders.trial_spec import ResponderSpec, TrialSpec
 from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
@@ -86,19 +86,15 @@ class TrialRunner:
         return self.undisturbed(lambda: train_and_name(spec, self._sandboxes, meter), meter)
 
     def call(
-        self,
-        code: Code,
-        files: Mapping[str, bytes],
-        calls: Sequence[FunctionCall],
-        limits: ChildLimits,
-        output_bytes: int,
-        seed: int,
-        meter: JobMeter | None = None,
+        self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter | None = None
     ) -> Called:
         """Functions of a module, called in a fresh child without a robot. Raises as ``run`` does."""
         meter = meter or JobMeter()
         return self.undisturbed(
-            lambda: call_functions(code, files, calls, limits, output_bytes, self._sandboxes, seed, meter), meter
+            lambda: call_functions(
+                module.code, module.files, calls, module.limits, module.output_bytes, self._sandboxes, seed, meter
+            ),
+            meter,
         )
 
     def check_sandbox(self) -> str:

@@ -24,8 +24,8 @@ from service.grading.trial_runner import TrialRunner
 from service.store import self_tests
 from service.store.engine import Store
 from sim.recording import Verdict
-from submissions.assignment import Assignment
-from submissions.assignment_file import read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
 from submissions.submission import Submission
 

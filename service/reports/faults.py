@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
 from sim.recording import Fault, Verdict
-from submissions.submission import Source, Submission
+from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {
@@ -71,16 +72,16 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
     return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), often, excerpt)
 
 
-def _source(fault: Fault, submission: Submission | None) -> Source | None:
+def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if submission is None:
         return None
     if submission.notebook is not None and fault.cell is not None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
-        return Source(submission.notebook.name, cells.get(fault.cell, ""))
+        return Code(submission.notebook.name, cells.get(fault.cell, ""))
     return {"program": submission.program, "responder": submission.responder}.get(fault.who)
 
 
-def _excerpt(source: Source, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()

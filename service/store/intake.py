@@ -33,7 +33,7 @@ from service.store.students import Students
 from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.bundle import pack_submission, unpack_submission
 from submissions.submission import Submission
 

@@ -30,7 +30,7 @@ from service.store.models import (
 )
 from service.store.versions import freeze, keep
 from sim.errors import UsageError
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Assignments as they are kept: frozen by their content, once each, with all that a worker elsewhere needs.
 
-Reading one from its folder is ``submissions.assignment_file``'s.
+Reading one from its folder is ``submissions.assignment.reader``'s.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 from service.store import models
 from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 
 #: What keys are called in assignments that earlier releases kept.
 _FORMERLY = {"picture": "image", "pictures": "images"}

@@ -17,7 +17,7 @@ from sim.floors import Floor
 from submissions.strict_table import StrictTable
 
 if TYPE_CHECKING:
-    from submissions.assignment import Scenario
+    from submissions.assignment.definition import Scenario
 
 
 def one_or_many(value: object) -> object:

@@ -11,8 +11,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from sim.errors import UsageError
+from submissions.assignment.truth_file import LabelledPlace, read_places
 from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Criterion, Misfit, Surroundings, TextOrTexts
-from submissions.truth_file import LabelledPlace, read_places
 
 
 class Recognition(Criterion):

@@ -22,7 +22,7 @@ from service.store.engine import Store, open_store
 from service.store.models import JobState, Lane
 from service.store.regrades import Regraded
 from sim.errors import HostError
-from submissions.assignment_file import find_assignment
+from submissions.assignment.reader import find_assignment
 
 
 def regrade(

@@ -26,7 +26,7 @@ from service.grading.judging.case import Case, StaticAnalysis
 from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
 from sim.errors import HostError, RobomarkError
 from sim.recording import Image
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 
 #: Characters that programs and responders wrote in all trials; to fork a worker costs as much as judging so many.

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from responders.function_calls import Called, Returned
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.source_answers import SourceAnswers
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 from submissions.magics import Flags
 

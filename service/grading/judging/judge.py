@@ -14,7 +14,7 @@ from service.grading.judging.case import Case, StaticAnalysis
 from service.grading.judging.judges import Judge
 from sim.errors import HostError
 from sim.recording import Verdict
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria import SCHEMAS, Criterion
 
 _NOTHING_FOUND = StaticAnalysis()

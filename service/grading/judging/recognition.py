@@ -34,7 +34,7 @@ from service.grading.judging.patterns import Sample, by_pattern
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
 from service.grading.judging.words import LabelFinder, early_end, place_words, quoted, shown_words
 from sim.recording import Image, Line, Message, Recording, Verdict
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
 from submissions.criteria.recognition import Recognition
 
 ReplyStatus = Literal["answered", "late", "malformed", "unanswered"]

@@ -14,9 +14,9 @@ from service.grading.judging.geometry import part_at
 from service.grading.judging.label_patches import decoded
 from sim.floors import label_names
 from sim.recording import Pose, Recording
-from submissions.assignment import Assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.truth_file import LabelledPlace
 from submissions.criteria.recognition import Recognition
-from submissions.truth_file import LabelledPlace
 
 #: Stands for the truth of an image that was never sent, where the assignment does not tell it.
 NO_IMAGE = "(no image)"

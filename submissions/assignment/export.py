@@ -1,6 +1,6 @@
 """Makes folders of assignments: a new one to change, a copy of one, and what students may see of one.
 
-Nothing here grades or judges; what a folder must hold is ``assignment_file.py``'s.
+Nothing here grades or judges; what a folder must hold is ``reader.py``'s.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_file import FILE_NAME, assignment_folder, read_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import FILE_NAME, assignment_folder
+from submissions.assignment.reader import read_assignment
 
 _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
 _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")

@@ -8,7 +8,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from submissions.toml_lines import Path, line_of
+from sim.errors import AssignmentError
+from submissions.assignment.toml_lines import Path, line_of
+
+
+class AssignmentProblems(AssignmentError):
+    """Everything that is wrong with an assignment; ``problems`` has one ``file:line: sentence`` each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+    def __reduce__(self) -> tuple[type[AssignmentProblems], tuple[tuple[str, ...]]]:
+        return type(self), (self.problems,)
 
 
 @dataclass(slots=True)

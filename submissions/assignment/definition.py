@@ -1,6 +1,6 @@
 """An assignment: the world, the scenarios, what is marked and by how much; and the trials it asks for.
 
-Plain data. Reading one from its folder, with every mistake named by file and line, is ``assignment_file.py``.
+Plain data. Reading one from its folder, with every mistake named by file and line, is ``reader.py``.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Literal
 
+from responders.channel import Channel
 from sim.chance import Stream
 from sim.recording import Pose
 from submissions.criteria import AnyCriterion
 from submissions.seeds import PUBLIC, Secret, world_seed
 from submissions.sweep import NO_SWEEP, Coordinates, Sweep
+
+_USUAL_CHANNEL = Channel()
 
 Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
@@ -45,17 +48,6 @@ class Parts:
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelSpec:
-    """How messages travel: seconds, and chances between 0 and 1."""
-
-    delay: float = 0.1
-    jitter: float = 0.0
-    loss: float = 0.0
-    duplication: float = 0.0
-    reordering: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class Scenario:
     """Poses x swept levels x noise levels x seeds.
 
@@ -72,7 +64,7 @@ class Scenario:
     seconds: float = 60.0
     light_noise: tuple[float, ...] = (0.0,)
     motor_noise: tuple[float, ...] = (0.0,)
-    channel: ChannelSpec = ChannelSpec()
+    channel: Channel = _USUAL_CHANNEL
     visibility: Visibility = "visible"
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
@@ -127,7 +119,7 @@ class Trial:
     motor_noise: float
     seed: int
     place: int  # which of the scenario's poses it starts from
-    channel: ChannelSpec
+    channel: Channel
     sweep: Coordinates = ()
 
 

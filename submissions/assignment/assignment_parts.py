@@ -1,6 +1,6 @@
 """From the tables of an assignment file and the files beside it to an ``Assignment``: what has to fit together.
 
-What a single table may hold is ``assignment_tables.py``; reading the folder is ``assignment_file.py``.
+What a single table may hold is ``schema.py``; reading the folder is ``reader.py``.
 """
 
 from __future__ import annotations
@@ -13,12 +13,16 @@ from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
+from responders import library
+from responders.channel import Channel
 from sim.errors import UsageError
 from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
 from sim.recording import Pose
 from sim.robot import usual_robot
-from submissions.assignment import Assignment, ChannelSpec, Limits, Parts, Scenario, Training, WorldSpec
-from submissions.assignment_tables import (
+from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
+from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.problems import Problems
+from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
     PartsTable,
@@ -28,13 +32,11 @@ from submissions.assignment_tables import (
     did_you_mean,
     listed,
 )
+from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria.common import Surroundings
-from submissions.criterion_parts import check_given, read_criteria, sources_of
 from submissions.document import checked_table, no_double, tables_of, texts_in
-from submissions.problems import Problems
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep
-from submissions.toml_lines import Path as Place
 
 _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
@@ -88,7 +90,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         description=head.description,
         given=MappingProxyType(given),
         given_parts=MappingProxyType(given_parts),
-        version=_version(files, given),
+        version=_version(files, given, {name: text for name, text in given_parts.items() if name not in files}),
         training=training,
         secret=head.secret,
     )
@@ -98,10 +100,11 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     return assignment
 
 
-def _version(files: Files, given: Mapping[str, bytes]) -> str:
-    """SHA-256 over names and bytes, in the order of the names; packaged networks count like files."""
+def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
+    """SHA-256 over names and bytes, in the order of the names; packaged networks and responders count like files."""
     digest = hashlib.sha256()
-    for kind, group in (("file", files), ("given", given)):
+    responders = {name: text.encode() for name, text in packaged.items()}
+    for kind, group in (("file", files), ("given", given), ("responder", responders)):
         for name in sorted(group):
             digest.update(f"{kind}:{len(name.encode())}:{name}:{len(group[name])}:".encode() + group[name])
     return digest.hexdigest()
@@ -199,7 +202,7 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         seconds=table.seconds,
         light_noise=table.light_noise,
         motor_noise=table.motor_noise,
-        channel=ChannelSpec(**table.channel.model_dump()),
+        channel=Channel(**table.channel.model_dump()),
         visibility=table.visibility,
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
@@ -216,8 +219,11 @@ def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Pro
         name = getattr(parts, part)
         if name in ("student", "none"):
             continue
+        if part == "responder" and name not in files and name in library.names():
+            sources[name] = library.source(name)
+            continue
         if name not in files or not name.endswith(".py"):
-            none = "" if part == "program" else ', "none"'
+            none = "" if part == "program" else f', "none", {", ".join(library.names())}'
             problems.add(
                 ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
             )

@@ -13,11 +13,12 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment_file import AssignmentProblems, assignment_folder, parse
-from submissions.assignment_tables import problem_of
-from submissions.problems import Problems
+from submissions.assignment.folder import assignment_folder
+from submissions.assignment.problems import AssignmentProblems, Problems
+from submissions.assignment.reader import parse
+from submissions.assignment.schema import problem_of
+from submissions.assignment.toml_lines import find_lines
 from submissions.strict_table import StrictTable
-from submissions.toml_lines import find_lines
 
 EXAMPLES = "examples"
 EXPECTED = "expected.toml"

@@ -1,4 +1,4 @@
-"""From an assignment's folder (``assignment.toml`` and the files it gives) to an ``Assignment``, and the catalogue.
+"""From an assignment's folder (``assignment.toml`` and the files it gives) to an ``Assignment``.
 
 All mistakes are found in one go, each with file, line and what was expected; nothing of the folder is run.
 """
@@ -9,18 +9,17 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
-from sim.errors import AssignmentError, UsageError
-from submissions.assignment import Assignment
-from submissions.assignment_parts import build_assignment
-from submissions.assignment_tables import did_you_mean
-from submissions.problems import Problems
-from submissions.toml_lines import find_lines
+from sim.errors import UsageError
+from submissions.assignment.assignment_parts import build_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
+from submissions.assignment.problems import AssignmentProblems, Problems
+from submissions.assignment.schema import did_you_mean
+from submissions.assignment.toml_lines import find_lines
 
-FILE_NAME = "assignment.toml"
 #: What lies in an assignment's folder beside what it is marked by: it may change without changing a mark.
 _ASIDE = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
@@ -37,22 +36,6 @@ _PLAINER = MappingProxyType(
         "expected newline": "; is there a quote or a comma too many?",
     }
 )
-
-
-class AssignmentProblems(AssignmentError):
-    """Everything that is wrong with an assignment; ``problems`` has one ``file:line: sentence`` each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
-
-    def __reduce__(self) -> tuple[type[AssignmentProblems], tuple[tuple[str, ...]]]:
-        return type(self), (self.problems,)
-
-
-def catalogue() -> tuple[str, ...]:
-    """The ids of the assignments that come with Robomark, sorted."""
-    return tuple(sorted(folder.name for folder in _catalogue_folder().iterdir() if (folder / FILE_NAME).is_file()))
 
 
 def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
@@ -75,26 +58,6 @@ def find_in_catalogue(name: str) -> Assignment:
     return find_assignment(name)
 
 
-def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
-    """The folder of the assignment with this id in the catalogue, or this folder itself.
-
-    Raises UsageError if there is neither.
-    """
-    name = os.fspath(name_or_path)
-    ids = catalogue()
-    if name in ids:
-        return _catalogue_folder() / name
-    path = Path(name)
-    if path.name == FILE_NAME and path.is_file():
-        path = path.parent
-    if path.is_dir():
-        return path
-    if path.is_file():
-        raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
-    hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
-    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
-
-
 def read_assignment(folder: Path) -> Assignment:
     """The assignment in ``folder``. Raises AssignmentProblems, with all mistakes, if it cannot be used."""
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - resolve() would change the name that is shown
@@ -110,10 +73,6 @@ def read_assignment(folder: Path) -> Assignment:
     if assignment is None or problems.found:
         raise AssignmentProblems(problems.sorted())
     return assignment
-
-
-def _catalogue_folder() -> Path:
-    return Path(str(resources.files("submissions"))) / "catalogue"
 
 
 def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:

@@ -1,6 +1,6 @@
 """What may stand in an assignment file: one schema a table, and what is wrong with a table in words.
 
-A table by itself; what has to fit between tables, and the files beside them, is ``assignment_file.py``.
+A table by itself; what has to fit between tables, and the files beside them, is ``reader.py``.
 """
 
 from __future__ import annotations

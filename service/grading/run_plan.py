@@ -1,0 +1,252 @@
+"""What of a submission is run, called, trained and read, resolved once for all trials of an assignment.
+
+Nothing is run here, and after it nobody asks again in what form the submission came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Literal
+
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from responders.code import Code
+from responders.notebook_process import NotebookSpec
+from responders.sandbox.meter import JobMeter
+from responders.sandbox.running_child import ChildLimits
+from service.grading.grade import TrialResult
+from service.grading.notebook_trial import NotebookTrial
+from service.grading.trial_runner import TrialRunner
+from sim.errors import UsageError
+from sim.motion import Rectangle
+from sim.recording import Recording
+from submissions.assignment.definition import Assignment
+from submissions.criteria.code import SourceRules
+from submissions.magics import Flags, setup, split_program, without_magic
+from submissions.marked_cell import marked_site, program_of
+from submissions.plain_cells import python_of
+from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
+from submissions.submission import Notebook, Submission
+
+Part = Literal["program", "responder"]
+
+_MEGABYTE = 1 << 20
+_IGNORED = "the program's magic line is ignored"
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramTrial:
+    """A trial of a robot program by itself; ``cell`` is the cell of a notebook that it was taken from."""
+
+    cell: int | None = None
+
+    def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
+        """Raises as ``TrialRunner.run`` does."""
+        recording = runner.run(spec, obstacles, meter)
+        if self.cell is None:
+            return recording
+        faults = (
+            replace(fault, cell=self.cell) if fault.who == "program" and fault.line is not None else fault
+            for fault in recording.faults
+        )
+        return replace(recording, faults=tuple(faults))
+
+    def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
+        """What is told once of all trials; nothing, for each recording tells its own."""
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class RunPlan:
+    """Who takes part in every trial, and what of the submission is looked at beside them.
+
+    ``program`` is None where no robot is run. ``answers`` is what answers it, unless ``trial`` sees to that;
+    ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the source reader takes them.
+    """
+
+    assignment: Assignment
+    trial: ProgramTrial | NotebookTrial
+    program: ProgramSpec | None = None
+    answers: ResponderSpec | None = None
+    functions: ResponderSpec | None = None
+    collaborative: bool = False
+    flags: Flags = field(default_factory=Flags)
+    read_as: Mapping[Part, Mapping[str, Any]] = field(default_factory=lambda: MappingProxyType({}))
+    own_files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))  # those submitted
+    notes: tuple[str, ...] = ()
+    submission: str = ""  # content hash
+    child_seed: int = 0  # of the chance that is the submission's own, and no trial's
+
+
+def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
+    """The plan for grading ``submission`` in the installation that has this secret.
+
+    Raises UsageError when a part is missing that the assignment asks for.
+    """
+    notebook = submission.notebook
+    if notebook is not None and assignment.training is not None:
+        function = assignment.training.function
+        raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
+    if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
+        plan = _of_notebook(submission, notebook, assignment)
+    else:
+        plan = _of_files(submission, assignment)
+    seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
+
+
+def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
+    asked = assignment.parts
+    code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
+    responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
+    flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
+    if submission.responder is not None and responder is not submission.responder:
+        notes += ("your responder is not used: this assignment brings its own, or none",)
+    program = _program(Code(code.name, text), flags, assignment) if code is not None else None
+    beside = _responder(responder, _files(submission, assignment), assignment)
+    return _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+
+
+def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
+    """A notebook that has to answer the robot is executed; of any other only the marked robot program is taken."""
+    asked = assignment.parts
+    if asked.program == "none":
+        return _executed(submission, notebook, assignment, None, Flags(), ())
+    if asked.program != "student":
+        flags, text, notes = _flags(assignment.given_parts[asked.program], assignment)
+        return _executed(submission, notebook, assignment, Code(asked.program, text), flags, notes)
+    site = marked_site(notebook, asked.cell)
+    cell = program_of(notebook, site)
+    flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
+    if asked.responder == "student":
+        # A line that cannot be read is told by its execution, which may come to another cell.
+        notes = tuple(note for note in notes if not note.startswith(_IGNORED))
+        if cell is not None:
+            again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
+            notes = (f"the robot program in cell {cell.number} of {notebook.name} is marked{again}", *notes)
+        return _executed(submission, notebook, assignment, Code(notebook.name, text), flags, notes)
+    if cell is None:
+        raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
+    responder = _part("responder", "responder.py", asked.responder, None, assignment)
+    program = _program(Code(f"cell {cell.number}", text), flags, assignment)
+    beside = _responder(responder, _files(submission, assignment), assignment)
+    notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
+    return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
+
+
+def _beside_each_other(
+    trial: ProgramTrial,
+    program: ProgramSpec | None,
+    flags: Flags,
+    responder: ResponderSpec | None,
+    assignment: Assignment,
+    notes: tuple[str, ...],
+) -> RunPlan:
+    """A robot program, and a responder that is a module of its own; one that is trained answers no robot."""
+    answers = responder if assignment.training is None else None
+    codes: Mapping[Part, ProgramSpec | ResponderSpec | None] = {"program": program, "responder": responder}
+    return RunPlan(
+        assignment,
+        trial,
+        program,
+        answers,
+        responder,
+        answers is not None or "L" in flags.switches,
+        flags,
+        MappingProxyType({part: {"text": spec.code.text} for part, spec in codes.items() if spec is not None}),
+        notes=notes,
+    )
+
+
+def _executed(
+    submission: Submission,
+    notebook: Notebook,
+    assignment: Assignment,
+    program: Code | None,
+    flags: Flags,
+    notes: tuple[str, ...],
+) -> RunPlan:
+    """A notebook from top to bottom; what in it is no robot program stands for the responder."""
+    files = _files(submission, assignment)
+    functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
+    assert functions is not None
+    sources = tuple(cell.source for cell in notebook.cells)
+    spec = NotebookSpec(notebook.name, sources, files, functions.limits, functions.output_bytes, 0)
+    asked = assignment.parts
+    which = asked.cell if asked.program == "student" else None
+    as_read = which is not None and any(
+        isinstance(each, SourceRules) and each.part == "program" for each in assignment.criteria
+    )
+    read_as: dict[Part, Mapping[str, Any]] = {
+        "responder": {"cells": [(cell.number, cell.source) for cell in notebook.cells]}
+    }
+    if program is not None:
+        read_as["program"] = {"text": program.text}
+    return RunPlan(
+        assignment,
+        NotebookTrial(spec, marked_site(notebook, which) if which is not None else None, which, as_read),
+        _program(program, flags, assignment) if program is not None else None,
+        None,
+        functions,
+        True,
+        flags,
+        MappingProxyType(read_as),
+        notes=notes,
+    )
+
+
+def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: Assignment) -> Code | None:
+    if who == "none":
+        return None
+    if who != "student":
+        return Code(who, assignment.given_parts[who])
+    if submitted is None:
+        raise UsageError(f"the submission has no {what}; {assignment.id} asks for {usual}")
+    return submitted
+
+
+def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ...]]:
+    """The flags of the program's first line, its text, and notes where the assignment decides otherwise."""
+    try:
+        flags, text = split_program(text)
+        wanted = setup(flags)
+    except UsageError as error:
+        return Flags(), without_magic(text), (f"{_IGNORED}: {error}",)
+    world = assignment.world
+    notes = []
+    if "b" in flags.values and wanted.background != world.background:
+        notes.append(f"the program asks for the background {wanted.background}; the assignment's is {world.background}")
+    if "r" in flags.values and wanted.robot != world.robot:
+        notes.append(f"the program asks for the robot {wanted.robot}; the assignment's is {world.robot}")
+    if flags.values.keys() & {"N", "M"}:
+        notes.append("the assignment's noise is used, not the program's -N or -M")
+    return flags, text, tuple(notes)
+
+
+def _files(submission: Submission, assignment: Assignment) -> Mapping[str, bytes]:
+    """What lies in the responder's folder; a submission's own file wins over a given one."""
+    return {**assignment.given, **submission.files}
+
+
+def _program(code: Code, flags: Flags, assignment: Assignment) -> ProgramSpec:
+    limits = assignment.limits
+    allowed = ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _avoided(assignment, "program"))
+    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes)
+
+
+def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assignment) -> ResponderSpec | None:
+    if code is None:
+        return None
+    limits = assignment.limits
+    avoided = _avoided(assignment, "responder")
+    allowed = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, avoided)
+    return ResponderSpec(code, files, allowed, limits.output_bytes)
+
+
+def _avoided(assignment: Assignment, part: Part) -> tuple[str, ...]:
+    """The modules that a student's part may not import: what carries marks is refused when it is run, too."""
+    if getattr(assignment.parts, part) != "student":
+        return ()
+    rules = (each for each in assignment.criteria if isinstance(each, SourceRules) and each.part == part and each.marks)
+    return tuple(sorted({module for each in rules for module in each.avoided_modules}))

@@ -1,0 +1,44 @@
+"""Where assignments lie: the catalogue, and the folder that a name or a path means.
+
+It opens no file; what one says is ``reader.py``'s.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import resources
+from pathlib import Path
+
+from sim.errors import UsageError
+from submissions.assignment.schema import did_you_mean
+
+FILE_NAME = "assignment.toml"
+
+
+def catalogue() -> tuple[str, ...]:
+    """The ids of the assignments that come with Robomark, sorted."""
+    return tuple(sorted(folder.name for folder in _catalogue_folder().iterdir() if (folder / FILE_NAME).is_file()))
+
+
+def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
+    """The folder of the assignment with this id in the catalogue, or this folder itself.
+
+    Raises UsageError if there is neither.
+    """
+    name = os.fspath(name_or_path)
+    ids = catalogue()
+    if name in ids:
+        return _catalogue_folder() / name
+    path = Path(name)
+    if path.name == FILE_NAME and path.is_file():
+        path = path.parent
+    if path.is_dir():
+        return path
+    if path.is_file():
+        raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
+    hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
+    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
+
+
+def _catalogue_folder() -> Path:
+    return Path(str(resources.files("submissions"))) / "catalogue"

@@ -1,2 +1,0 @@
-def responder(text):
-    return 'JSON::{"message": {"shape": "right facing triangle"}}'
