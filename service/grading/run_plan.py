@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
-from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner

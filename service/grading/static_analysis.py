@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from responders.code import Code
@@ -37,7 +36,6 @@ _MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001
 _RESPONDERS = ("responder", "*_responder")
 
 
-@dataclass(frozen=True, slots=True)
 class Caller(Protocol):
     """Calls functions inside the sandbox; a runner does."""
 
