@@ -20,8 +20,8 @@ from submissions.assignment.reader import find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
 
 TESTS = Path(__file__).parent
-FAILING = TESTS / "failing_submissions"
-FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FAILING / "expected.toml").read_text())
+FOLDER = TESTS / "failing_submissions"
+FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
 
 
 def graded(folder: Path, assignment: str, runner: TrialRunner) -> Grade:
@@ -52,14 +52,14 @@ def test_failing_submission_gets_a_verdict_or_one_sentence(name: str, runner: Tr
     wanted = FAILING[name]
     if "refused" in wanted:
         with pytest.raises(UsageError) as refusal:
-            graded(FAILING / name, "echo-responder", runner)
+            graded(FOLDER / name, "echo-responder", runner)
         assert str(refusal.value) == wanted["refused"]
     else:
-        assert_as_expected(graded(FAILING / name, "echo-responder", runner), Expectation(**wanted))
+        assert_as_expected(graded(FOLDER / name, "echo-responder", runner), Expectation(**wanted))
 
 
 def test_every_failing_submission_has_an_expectation() -> None:
-    assert {path.name for path in FAILING.iterdir() if path.is_dir()} == set(FAILING)
+    assert {path.name for path in FOLDER.iterdir() if path.is_dir()} == set(FAILING)
 
 
 def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
