@@ -1,6 +1,6 @@
 """A thousand submissions through a service to which everything happens, on SQLite and on PostgreSQL.
 
-Not part of the table: ``python -m benchmarks chaos [HAND-INS]`` runs it and takes some minutes.
+Not part of the table: ``python -m benchmarks chaos [SUBMISSIONS]`` runs it and takes some minutes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Makes the folders in ``model_handins``: responders that bring models, good and bad. Run it to make them again.
+"""Makes the folders in ``model_submissions``: responders that bring models, good and bad. Run it to make them again.
 
 Grading them is ``test_student_models.py``'s. Their models are small, and made from the packaged shape network or from
 nothing; ``convolution/shapes.onnx`` alone needs the package onnx, and is left as it is without.

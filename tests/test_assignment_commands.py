@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from command import robomark
-from service.grading.example_check import Figure, check_examples
+from service.grading.example_check import ComparedMeasure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment.examples import OriginalFigure, expected
+from submissions.assignment.examples import OriginalMeasure, expected
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import catalogue
 from submissions.assignment.problems import AssignmentProblems
@@ -113,7 +113,7 @@ def test_ids_are_listed_whole_on_a_narrow_screen(tmp_path: Path) -> None:
     ("value", "agrees"), [(100.0, True), (101.0, True), (99.0, True), (101.1, False), (None, False)]
 )
 def test_a_figure_agrees_within_a_hundredth(value: float | None, agrees: bool) -> None:
-    assert Figure(OriginalFigure(measure="side", value=100), value).agrees == agrees
+    assert ComparedMeasure(OriginalMeasure(measure="side", value=100), value).agrees == agrees
 
 
 def test_examples_and_starter_do_not_change_the_version(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Notebooks as hand-ins: executed from top to bottom, with one run marked, and everything else told as a note."""
+"""Notebooks as submissions: executed from top to bottom, with one run marked, and everything else told as a note."""
 
 from __future__ import annotations
 

@@ -180,12 +180,12 @@ def recordings(draw: st.DrawFn) -> Recording:
         [{}, {"images": "last"}, {"late": "wrong"}, {"each_pattern": "majority", "patterns": 2}, {"answer": "shape"}]
     ),
 )
-def test_the_counts_add_up(played: list[Recording], keys: dict[str, Any]) -> None:
-    result = judged(asked(**keys), *played)
+def test_the_counts_add_up(driven: list[Recording], keys: dict[str, Any]) -> None:
+    result = judged(asked(**keys), *driven)
     found = accuracy(result)
     counts = found.counts
     assert counts is not None
-    assert counts.sent == sum(len(recording.images) for recording in played)
+    assert counts.sent == sum(len(recording.images) for recording in driven)
     assert counts.sent == counts.answered + counts.late + counts.malformed + counts.unanswered
     assert found.n == counts.counted + counts.missing == sum(number for _, _, number in found.confusion)
     assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_IMAGE)

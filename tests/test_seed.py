@@ -22,7 +22,7 @@ SHAPES = (
 )
 
 
-def play(runner: TrialRunner, name: str, start: Pose | None = None) -> Recording:
+def driven(runner: TrialRunner, name: str, start: Pose | None = None) -> Recording:
     grading_request = examples(name) / "seed"
     flags, text = split_program((grading_request / "robot.py").read_text())
     chosen = setup(flags)
@@ -37,7 +37,7 @@ def play(runner: TrialRunner, name: str, start: Pose | None = None) -> Recording
 
 
 def test_echo(runner: TrialRunner) -> None:
-    recording = play(runner, "echo-responder")
+    recording = driven(runner, "echo-responder")
     assert [(message.sender, message.text) for message in recording.messages] == [
         line
         for number in (0, 2, 4)
@@ -50,7 +50,7 @@ def test_echo(runner: TrialRunner) -> None:
 
 
 def test_json(runner: TrialRunner) -> None:
-    recording = play(runner, "json-queue")
+    recording = driven(runner, "json-queue")
     queues = [line.text for line in recording.printed if line.text.startswith("Message queue")]
     assert [queue.count("Py saw") for queue in queues] == [0, 1, 1, 2, 2, 3]
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
@@ -59,7 +59,7 @@ def test_json(runner: TrialRunner) -> None:
 
 
 def test_image_data(runner: TrialRunner) -> None:
-    recording = play(runner, "image-parser")
+    recording = driven(runner, "image-parser")
     answers = [message.text for message in recording.messages if message.sender == "responder"]
     assert answers[0] == """JSON::{"message": "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"}"""
     assert answers[1].startswith("""JSON::{"message": "Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,""")
@@ -67,7 +67,7 @@ def test_image_data(runner: TrialRunner) -> None:
 
 
 def test_shape_from_520_900(runner: TrialRunner) -> None:
-    recording = play(runner, "shape-recognition")
+    recording = driven(runner, "shape-recognition")
     assert recording.spoken[-1].text == "Is that a upwards facing triangle"
     assert [(call.caller, call.callee) for call in recording.calls] == [
         ("responder", "parser"),
@@ -79,6 +79,6 @@ def test_shape_from_520_900(runner: TrialRunner) -> None:
 
 @pytest.mark.parametrize(("number", "shape"), list(enumerate(SHAPES)))
 def test_every_shape(runner: TrialRunner, number: int, shape: str) -> None:
-    recording = play(runner, "shape-recognition", Pose(200 + 80 * number, 900, 0))
+    recording = driven(runner, "shape-recognition", Pose(200 + 80 * number, 900, 0))
     assert recording.spoken[-1].text == f"Is that a {shape}"
     assert recording.images[0].truth == shape

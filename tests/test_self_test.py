@@ -148,7 +148,7 @@ def test_forked_from_the_worker_a_child_would_find_its_secrets(name: str) -> Non
         capture_output=True,
         text=True,
         check=True,
-        env={"CANARY": _SECRETS["environment"]},
+        env={"DECOY": _SECRETS["environment"]},
     )
     assert "LEAK" in ran.stdout
     assert memory.__name__.endswith(attack.group)

@@ -31,7 +31,7 @@ from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutsi
 from sim.errors import HostError
 
 Role = Literal["robot", "responder"]
-Play = Literal["role", "battery"]
+Work = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
 _END_SECONDS = 0.5
@@ -111,7 +111,7 @@ class Zygote:
         limits: ChildLimits,
         folder: Path | None = None,
         meter: JobMeter | None = None,
-        play: Play = "role",
+        work: Work = "role",
         blamed: bool = False,
     ) -> Child:
         """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
@@ -122,7 +122,7 @@ class Zygote:
         self._forks += 1
         for attempt in (1, 2):
             try:
-                return self._spawn(limits, folder, meter or JobMeter(), play, blamed)
+                return self._spawn(limits, folder, meter or JobMeter(), work, blamed)
             except (OSError, EOFError, _ZygoteEnded) as error:
                 self.close()
                 if attempt == 2:
@@ -135,7 +135,7 @@ class Zygote:
             child = self.spawn(_BATTERY_LIMITS)
             child.close()
             return child.sandbox
-        child = self.spawn(_BATTERY_LIMITS, play="battery")
+        child = self.spawn(_BATTERY_LIMITS, work="battery")
         try:
             told = child.receive(wire.BATTERY)
         except ChildStopped as stop:
@@ -175,7 +175,7 @@ class Zygote:
             self._folders_inside = -1
         self._forks = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, play: Play, blamed: bool) -> Child:
+    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: Work, blamed: bool) -> Child:
         self._start()
         descriptors = []
         if folder is not None:
@@ -186,7 +186,7 @@ class Zygote:
             data, received = self._ask(
                 {
                     "do": "spawn",
-                    "work": play,
+                    "work": work,
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "without": limits.without,

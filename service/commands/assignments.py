@@ -13,7 +13,7 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
-from service.commands.example_table import catalogue_table, examples_table, figures_table
+from service.commands.example_table import catalogue_table, examples_table, measures_table
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
@@ -153,8 +153,8 @@ def _print_checked(checked: CheckedAssignment) -> None:
         _console().print(examples_table(checked))
     else:
         typer.echo(f"no examples to grade: expected {EXAMPLES}/{REFERENCE} beside {FILE_NAME}")
-    if checked.figures:
-        _console().print(figures_table(checked))
+    if checked.measures:
+        _console().print(measures_table(checked))
 
 
 def _count(number: int, one: str, many: str) -> str:

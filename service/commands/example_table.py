@@ -10,15 +10,15 @@ from collections.abc import Iterable
 from rich.table import Table
 from rich.text import Text
 
-from service.grading.example_check import CheckedAssignment, ExampleResult, Figure
+from service.grading.example_check import CheckedAssignment, ComparedMeasure, ExampleResult
 from service.reports.readable import number, one_line
 from submissions.assignment.examples import REFERENCE
 
 
 def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
-    """A row for each assignment: marks of the reference and of the wrong solutions, time, figures."""
+    """A row for each assignment: marks of the reference and of the wrong solutions, time, measures."""
     table = Table(
-        "section", "assignment", "of", REFERENCE, "others", "s", "figures (original)", box=None, pad_edge=False
+        "section", "assignment", "of", REFERENCE, "others", "s", "measures (original)", box=None, pad_edge=False
     )
     for index in (2, 3, 5):
         table.columns[index].justify = "right"
@@ -31,7 +31,7 @@ def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
             " ".join(_marks(example) for example in each.examples if example.name == REFERENCE),
             " ".join(_marks(example) for example in each.examples if example.name != REFERENCE),
             f"{sum(example.seconds for example in each.examples):.1f}",
-            Text("\n".join(map(_figure_words, each.figures))),
+            Text("\n".join(map(_measure_words, each.measures))),
         )
     return table
 
@@ -52,17 +52,17 @@ def examples_table(checked: CheckedAssignment) -> Table:
     return table
 
 
-def figures_table(checked: CheckedAssignment) -> Table:
-    """What the reference measured beside the figures of the original simulator."""
+def measures_table(checked: CheckedAssignment) -> Table:
+    """What the reference measured beside the measures of the original simulator."""
     table = Table("measure", "here", "original", "unit", "", box=None, pad_edge=False)
     table.columns[1].justify = table.columns[2].justify = "right"
-    for figure in checked.figures:
+    for measure in checked.measures:
         table.add_row(
-            figure.original.measure,
-            "none" if figure.value is None else f"{figure.value:.6g}",
-            f"{figure.original.value:g}",
-            figure.unit,
-            "" if figure.agrees else figure.original.explained or "differs",
+            measure.original.measure,
+            "none" if measure.value is None else f"{measure.value:.6g}",
+            f"{measure.original.value:g}",
+            measure.unit,
+            "" if measure.agrees else measure.original.explained or "differs",
         )
     return table
 
@@ -72,8 +72,8 @@ def _marks(example: ExampleResult) -> str:
     return f"{marks}!" if example.problems else marks
 
 
-def _figure_words(figure: Figure) -> str:
-    original = figure.original
-    value = "none" if figure.value is None else f"{figure.value:.5g}"
-    why = "" if figure.agrees else f": {original.explained or 'differs'}"
-    return f"{original.measure} {value} ({original.value:g}) {figure.unit}".rstrip() + why
+def _measure_words(measure: ComparedMeasure) -> str:
+    original = measure.original
+    value = "none" if measure.value is None else f"{measure.value:.5g}"
+    why = "" if measure.agrees else f": {original.explained or 'differs'}"
+    return f"{original.measure} {value} ({original.value:g}) {measure.unit}".rstrip() + why

@@ -16,7 +16,7 @@ from service.grading.judging.words import fault_words
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import REFERENCE, Expectation, OriginalFigure, examples, expected
+from submissions.assignment.examples import REFERENCE, Expectation, OriginalMeasure, examples, expected
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
@@ -33,10 +33,10 @@ class ExampleResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class ComparedMeasure:
     """A measure of the reference beside what programs reach in the original simulator."""
 
-    original: OriginalFigure
+    original: OriginalMeasure
     value: float | None  # None when the reference measured nothing of that name
     unit: str = ""
 
@@ -52,12 +52,12 @@ class CheckedAssignment:
 
     assignment: Assignment
     examples: tuple[ExampleResult, ...]
-    figures: tuple[Figure, ...]
+    measures: tuple[ComparedMeasure, ...]
 
     @property
     def problems(self) -> tuple[str, ...]:
         of_examples = (problem for example in self.examples for problem in example.problems)
-        return (*of_examples, *(problem for figure in self.figures for problem in _figure_problems(figure)))
+        return (*of_examples, *(problem for measure in self.measures for problem in _measure_problems(measure)))
 
 
 def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignment:
@@ -69,15 +69,15 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
     wanted = expected(name_or_path)
     names = example_names(name_or_path)
     results: list[ExampleResult] = []
-    figures: tuple[Figure, ...] = ()
+    measures: tuple[ComparedMeasure, ...] = ()
     for name in names:
         result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), runner)
         results.append(result)
         if name == REFERENCE and graded is not None:
-            figures = tuple(_figure(original, graded) for original in wanted.original)
+            measures = tuple(_compared(original, graded) for original in wanted.original)
     missing = sorted(wanted.examples.keys() - set(names))
     results += [ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is no example",)) for name in missing]
-    return CheckedAssignment(assignment, tuple(results), figures)
+    return CheckedAssignment(assignment, tuple(results), measures)
 
 
 def example_names(name_or_path: str) -> tuple[str, ...]:
@@ -142,23 +142,23 @@ def _lost_words(graded: Grade) -> str:
     return " ".join(words) or "nothing was lost"
 
 
-def _figure(original: OriginalFigure, graded: Grade) -> Figure:
+def _compared(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
     """The first measure of that name, over criteria and trials in their order."""
     for result in graded.criteria:
         for evidence in result.evidence:
             for measure in evidence.measures:
                 if measure.name == original.measure:
-                    return Figure(original, measure.value, measure.unit)
-    return Figure(original, None)
+                    return ComparedMeasure(original, measure.value, measure.unit)
+    return ComparedMeasure(original, None)
 
 
-def _figure_problems(figure: Figure) -> tuple[str, ...]:
-    original = figure.original
-    if figure.value is None:
+def _measure_problems(measure: ComparedMeasure) -> tuple[str, ...]:
+    original = measure.original
+    if measure.value is None:
         return (f"{REFERENCE}: measured no {original.measure}, expected about {original.value:g}",)
-    if figure.agrees or original.explained:
+    if measure.agrees or original.explained:
         return ()
     return (
-        f"{REFERENCE}: {original.measure} is {figure.value:g} {figure.unit}".rstrip()
+        f"{REFERENCE}: {original.measure} is {measure.value:g} {measure.unit}".rstrip()
         + f", expected {original.value:g} within {original.within:.0%}, or an explanation",
     )

@@ -96,7 +96,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A figure that was measured on the way to a judgement: ``lap time``, 47.3, ``s``."""
+    """What was measured on the way to a judgement: ``lap time``, 47.3, ``s``."""
 
     name: str
     value: float

@@ -35,7 +35,7 @@ class Expectation(StrictTable):
     feedback: tuple[str, ...] = ()  # each must be in what the student is told
 
 
-class OriginalFigure(StrictTable):
+class OriginalMeasure(StrictTable):
     """What a program reached in the original simulator, beside the reference's measure of that name."""
 
     measure: str
@@ -45,10 +45,10 @@ class OriginalFigure(StrictTable):
 
 
 class Expected(StrictTable):
-    """The file ``expected.toml``: a table for each example, and the original's figures."""
+    """The file ``expected.toml``: a table for each example, and the original's measures."""
 
     examples: dict[str, Expectation]
-    original: tuple[OriginalFigure, ...] = ()
+    original: tuple[OriginalMeasure, ...] = ()
 
 
 def examples(assignment: str) -> Path:
@@ -76,7 +76,7 @@ def expected(assignment: str) -> Expected:
         problems = Problems(where, find_lines(text))
         for details in error.errors(include_url=False):
             part, which, *rest = (*details["loc"], "", "")
-            schema, place = (OriginalFigure, (part, which)) if part == "original" else (Expectation, (which,))
+            schema, place = (OriginalMeasure, (part, which)) if part == "original" else (Expectation, (which,))
             problem = problem_of(schema, {**details, "loc": tuple(each for each in rest if each != "")})
             problems.add((*place, *problem.path), problem.sentence)
         raise AssignmentProblems(problems.sorted()) from error
