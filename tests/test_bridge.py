@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from responders.channel import Channel, Line
+from responders.channel import Channel, ChannelOfTrial
 from responders.sandbox.zygote import NONE
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -149,7 +149,7 @@ def test_names_are_looked_up_when_a_message_comes_and_the_calls_are_noted(runner
 
 
 def test_a_lossy_channel_loses_its_share_and_the_same_texts_every_time() -> None:
-    line, again = (Line(Channel(loss=0.3, duplication=0.2), 5) for _ in range(2))
+    line, again = (ChannelOfTrial(Channel(loss=0.3, duplication=0.2), 5) for _ in range(2))
     copies = [line.copies(number) for number in range(2000)]
     assert copies == [again.copies(number) for number in range(2000)]
     assert copies.count(0) / 2000 == pytest.approx(0.3, abs=0.04)
@@ -157,7 +157,7 @@ def test_a_lossy_channel_loses_its_share_and_the_same_texts_every_time() -> None
 
 
 def test_reordering_lets_later_answers_overtake() -> None:
-    line = Line(Channel(delay=0.1, reordering=0.3), 5)
+    line = ChannelOfTrial(Channel(delay=0.1, reordering=0.3), 5)
     arrivals = [line.arrivals(number, 0, number * SECOND // 10, 0)[0] for number in range(100)]
     assert arrivals != sorted(arrivals)
     assert sorted(arrivals)[0] >= SECOND // 10

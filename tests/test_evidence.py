@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,13 @@ from driving import along, driven, rest, spin, straight
 from responders.code import Code
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
+from service.grading.judging import collecting, patterns
+from service.grading.judging.judge import judge
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Datum, Image, Line, Message, Pose, Recording
+from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
 from submissions.submission import Submission
 from test_judging import criterion, judged, recorded
 
@@ -155,6 +160,42 @@ def test_one_pattern_from_many_headings_is_one_pattern(how: str, headings: range
     assert "images of 1 patterns, and 6 were expected" in result.message
     six = [(_looking_at(230 + 80 * number, 920, 60 * number), "square", "square") for number in range(6)]
     assert judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*six)).marks == 4
+
+
+#: What is driven, by whom it is answered, and the marks of a criterion: now, and before this was thought of.
+_DRIVEN = [
+    ("one-shape-from-six-sides", "always the same", "shapes-on-the-move", "shapes", "0.00", "3.00"),
+    ("one-shape-from-six-sides", "the network", "shapes-on-the-move", "shapes", "0.00", "6.00"),
+    ("one-shape-from-six-sides", "always the same", "shapes-on-a-track", "track", "1.33", "4.00"),
+    ("one-place-four-times", "nobody", "collect-shapes", "enough", "2.64", "4.93"),
+]
+
+
+@pytest.mark.parametrize(("folder", "answers", "name", "marked", "now", "before"), _DRIVEN)
+def test_what_was_seen_from_many_sides_is_one_thing(
+    folder: str,
+    answers: str,
+    name: str,
+    marked: str,
+    now: str,
+    before: str,
+    runner: TrialRunner,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = find_assignment(name)
+    only = next(each for each in asked.criteria if each.id == marked)
+    asked = replace(asked, criteria=(only,))
+    submission = read_submission(Path(__file__).with_name("evidence") / folder, asked=asked.parts)
+    if answers == "the network":
+        responder = (examples(name) / "reference" / "responder.py").read_text()
+        submission = replace(submission, responder=Code("responder.py", responder))
+    graded = grade(submission, asked, runner=runner)
+    assert graded.marks == Decimal(now), graded.criteria[0].message
+    # It did what it is here for: told apart by where the robot stood, or not at all, it was worth much more.
+    monkeypatch.setattr(patterns, "part_at", lambda recording, side, pose: (pose.x, pose.y))
+    monkeypatch.setattr(collecting, "_different", lambda found, recording: found)
+    (once,) = judge(asked, graded.trials)
+    assert once.marks == Decimal(before), once.message
 
 
 def test_a_pattern_that_a_patch_names_is_where_the_patch_is() -> None:

@@ -139,7 +139,7 @@ def _status(process: subprocess.Popen[bytes]) -> int:
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 0.3)
+    monkeypatch.setattr(running_child, "_STALLED_SECONDS", 0.1)
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
 
 

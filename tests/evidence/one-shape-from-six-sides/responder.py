@@ -1,0 +1,2 @@
+def responder(text):
+    return 'JSON::{"message": {"shape": "right facing triangle"}}'
