@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 # The harness is the one of the tests.
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from builders import settings_in
 from databases import fresh_database

@@ -15,7 +15,7 @@ from pathlib import Path
 from responders.code import Code
 
 # The server is the one of the tests.
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from benchmarks.measurement import Measurement
 from postgresql_server import PostgresqlServer

@@ -11,6 +11,7 @@ from pathlib import Path
 from alembic import command
 from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, insert, inspect, select, text
 
+from paths import DATA
 from service.store.engine import open_engine
 from service.store.migrate import configuration
 from service.store.models import Base
@@ -18,7 +19,7 @@ from service.store.models import Base
 REVISION = "0002"
 #: What columns of then are called today.
 _TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions"}
-_SQL = Path(__file__).with_name("first_release.sql")
+_SQL = DATA / "first_release.sql"
 
 
 def lay_first_release(url: str, folder: Path) -> Engine:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import struct
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+
+from paths import DATA
 
 X86_64, I386, AARCH64 = 0xC000003E, 0x40000003, 0xC00000B7
 #: The golden list: number, name and what is decided, one call a line.
-LIST = Path(__file__).parent / "expected" / "system-calls.txt"
+LIST = DATA / "expected" / "system-calls.txt"
 
 
 def decide(program: bytes, number: int, arguments: Sequence[int] = (), architecture: int = X86_64) -> str:

@@ -23,6 +23,7 @@ import pytest
 from model_submissions_maker import FOLDER, TRACE, grading_requests
 from models import weights_bytes
 from models.networks import read
+from paths import ROOT
 from running import run_program
 from service.grading.grade import Grade
 from service.grading.grader import grade
@@ -33,7 +34,7 @@ from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
 EXPECTED: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
-KIT = Path(__file__).parents[1] / "responders" / "kit"
+KIT = ROOT / "responders" / "kit"
 ONNX = importlib.util.find_spec("onnxruntime") is not None
 
 ASK_ONCE = 'import time\nprint("PY::now")\ntime.sleep(1)\n'

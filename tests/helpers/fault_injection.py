@@ -27,6 +27,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from builders import grading_request
+from paths import DATA
 from postgresql_server import PostgresqlServer
 from processes import children, command_line, descendants
 from service.grading.grader import grade
@@ -179,7 +180,7 @@ class FaultInjector:
         environment = {**os.environ, **self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
         if place == 0 and self._server is not None:
             # On many machines, one's clock is wrong.
-            environment["PYTHONPATH"] = str(Path(__file__).parent / "wrong_clock")
+            environment["PYTHONPATH"] = str(DATA / "wrong_clock")
         log = self._home / "log" / f"worker-{place}.log"
         return start_process([sys.executable, "-m", "service.queue.worker"], environment, log, signal.SIGKILL)
 

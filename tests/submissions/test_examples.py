@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from paths import DATA
 from service.grading.example_check import check_examples
 from service.grading.grade import Grade
 from service.grading.grader import grade
@@ -19,8 +20,7 @@ from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
 
-TESTS = Path(__file__).parent
-FOLDER = TESTS / "failing_submissions"
+FOLDER = DATA / "failing_submissions"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
 
 

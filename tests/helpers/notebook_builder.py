@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-NOTEBOOKS = Path(__file__).parent / "notebooks"
+from paths import DATA
+
+NOTEBOOKS = DATA / "notebooks"
 #: The course's notebook on messaging, its magics included, and what nbconvert makes of it.
 MESSAGING = NOTEBOOKS / "messaging.ipynb"
 MESSAGING_SCRIPT = NOTEBOOKS / "messaging.nbconvert.txt"

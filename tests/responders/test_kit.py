@@ -18,9 +18,10 @@ from PIL import Image
 from sklearn.neural_network import MLPClassifier
 
 from models import weights_bytes
+from paths import ROOT
 from sim import floors
 
-KIT = Path(__file__).parent.parent / "responders" / "kit"
+KIT = ROOT / "responders" / "kit"
 KIT_MODULES = ("nbev3devsim.load_nbev3devwidget", "nn_tools.sensor_data", "nn_tools.network_views")
 
 #: Black pixels in the 14 x 14 focus of each shape, and the rows and columns that they fill.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+from paths import DATA
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
@@ -17,7 +17,7 @@ from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World
 
-GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("original_simulator.toml").read_text())
+GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads((DATA / "original_simulator.toml").read_text())
 
 
 @pytest.mark.parametrize("row", GOLDEN["drive"], ids=lambda row: row["program"].replace("\n", "; "))

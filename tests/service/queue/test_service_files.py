@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from paths import ROOT
 from service.store.engine import Store
 from service.web.metrics import metrics_text
 
-PAGE = Path(__file__).parents[1] / "docs" / "operators.md"
+PAGE = ROOT / "docs" / "operators.md"
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="this machine has no systemd")

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 from rich.console import Console
 from sqlalchemy import select, update
+from test_batch_commands import Ended, robomark
 
 from builders import grading_request, settings_in
 from service.commands.batch.waiting import Waiting
@@ -26,7 +27,6 @@ from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.models import CriterionResultRow, Job, JobState, Lane, TrialRow
 from submissions.assignment.examples import examples
-from test_batch_commands import Ended, robomark
 
 SPIN = "while True:\n    pass\n"
 

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import report_builders as build
+from paths import ROOT
 from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, TrialResult
 from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import decoded
@@ -281,7 +282,7 @@ def test_mistakes_are_named_with_their_line(
 
 
 def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
-    document = (Path(__file__).parents[1] / "docs" / "recognition.md").read_text()
+    document = (ROOT / "docs" / "recognition.md").read_text()
     shown, training = re.findall(r"```toml\n(.*?)```", document, re.DOTALL)
     (tmp_path / "assignment.toml").write_text(shown)
     found = read_assignment(tmp_path)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from paths import HELPERS
 from responders.sandbox.meter import JobMeter
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -46,7 +47,7 @@ _WAITING = 'import select\nprint("PY::x")\nselect.select([], [], [])'
 @pytest.mark.parametrize("killed", ["worker", "zygotes"])
 def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder: str, tmp_path: Path) -> None:
     worker = subprocess.Popen(
-        [sys.executable, "-c", _WORKER, str(Path(__file__).parent), program, responder],
+        [sys.executable, "-c", _WORKER, str(HELPERS), program, responder],
         stderr=subprocess.DEVNULL,
         env=os.environ | {"TMPDIR": str(tmp_path)},
     )

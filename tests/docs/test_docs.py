@@ -16,6 +16,7 @@ import pytest
 from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
+from paths import ROOT
 from service.reports.formats import FORMATS
 from service.settings import Settings
 from sim.floors import OBSTACLE_PRESETS
@@ -33,7 +34,6 @@ from submissions.assignment.schema import (
 )
 from submissions.criteria import SCHEMAS, Criterion
 
-ROOT = Path(__file__).parents[1]
 EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
 #: The section of each kind of criterion.

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from paths import ROOT
+
 ROOMS = ("sim", "models", "responders", "submissions", "service")
 DIFFS = dict(
     re.findall(r"^### An? ([a-z ]+):.*?\n```diff\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)

@@ -12,7 +12,6 @@ import os
 import warnings
 import zipfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import joblib
@@ -24,8 +23,9 @@ from sklearn.neural_network import MLPClassifier, MLPRegressor
 from models import weights_bytes
 from models.families.shapes import TASK
 from models.networks import read
+from paths import DATA
 
-FOLDER = Path(__file__).parent / "model_submissions"
+FOLDER = DATA / "model_submissions"
 #: What the hostile pickle would make, if it could.
 TRACE = "/tmp/robomark-hostile-pickle-was-here"
 

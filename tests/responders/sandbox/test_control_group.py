@@ -19,6 +19,7 @@ import pytest
 
 from builders import settings_in
 from memory_group import MemoryGroup, memory_group
+from paths import HELPERS
 from processes import PATIENCE, alive, descendants, until
 from responders.sandbox import control_group
 from responders.sandbox.control_group import ControlGroup
@@ -178,7 +179,7 @@ def in_group(script: str, memory_bytes: int = 3 << 30, **environment: str) -> tu
     with memory_group(memory_bytes) as group:
         ran = subprocess.run(
             [sys.executable, "-c", _BEGIN + script],
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)} | environment,
+            env=os.environ | {"PYTHONPATH": str(HELPERS)} | environment,
             preexec_fn=_of_version_2(group).enter,
             capture_output=True,
             text=True,

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from paths import DATA, ROOT
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -27,7 +28,7 @@ from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission
 
-_TABLE = tomllib.loads(Path(__file__).with_name("source_evasions.toml").read_text("utf-8"))
+_TABLE = tomllib.loads((DATA / "source_evasions.toml").read_text("utf-8"))
 CASES: list[dict[str, Any]] = _TABLE["case"]
 _RULES = ("uses", "avoids", "in_loop", "defines")
 
@@ -130,7 +131,7 @@ def f(): return hasattr(SourcelessFileLoader("x", nn_tools.__path__[0] + "/__pyc
 def test_what_was_compiled_of_a_closed_file_is_closed_too(
     module: str, marks: int, tmp_path: Path, runner: TrialRunner
 ) -> None:
-    source = Path(__file__).parent.parent / "responders" / "kit" / "nn_tools" / "weights.py"
+    source = ROOT / "responders" / "kit" / "nn_tools" / "weights.py"
     compiled = Path(py_compile.compile(str(source), doraise=True))
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})

@@ -6,13 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from test_judging import criterion, judged, recorded
 
 from driving import along, driven, rest, spin, straight
+from paths import DATA
 from responders.code import Code
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
@@ -24,7 +25,6 @@ from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.submission import Submission
-from test_judging import criterion, judged, recorded
 
 _BEGIN = "%%sim_magic_preloaded\nimport time\n"
 _TINY_SQUARE = """
@@ -185,7 +185,7 @@ def test_what_was_seen_from_many_sides_is_one_thing(
     asked = find_assignment(name)
     only = next(each for each in asked.criteria if each.id == marked)
     asked = replace(asked, criteria=(only,))
-    submission = read_submission(Path(__file__).with_name("evidence") / folder, asked=asked.parts)
+    submission = read_submission(DATA / "evidence" / folder, asked=asked.parts)
     if answers == "the network":
         responder = (examples(name) / "reference" / "responder.py").read_text()
         submission = replace(submission, responder=Code("responder.py", responder))

@@ -6,11 +6,11 @@ import random
 import subprocess
 import sys
 import textwrap
-from pathlib import Path
 
 import pytest
 
 from models import weights_bytes
+from paths import HELPERS
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
@@ -75,7 +75,7 @@ def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner)
             for half in range(2):
                 spec = ["follower", "talk"]
                 random.Random(number * 2 + half).shuffle(spec)
-                command = [sys.executable, "-c", ELSEWHERE, str(Path(__file__).parent), *spec]
+                command = [sys.executable, "-c", ELSEWHERE, str(HELPERS), *spec]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
             for process in pair:
                 output, _ = process.communicate(timeout=300)

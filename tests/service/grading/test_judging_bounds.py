@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from test_judging import START, criterion, recorded
 
 from responders.code import Code
 from service.grading.grade import CriterionResult, TrialResult
@@ -33,7 +34,6 @@ from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS
 from submissions.criteria.expressions import found_in, usable
 from submissions.submission import Submission
-from test_judging import START, criterion, recorded
 
 # Texts that students choose
 
