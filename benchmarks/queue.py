@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from responders.code import Code
+from submissions.grading_request import GradingRequest
 
 # The server is the one of the tests.
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
@@ -143,8 +144,8 @@ def _seconds(values: Sequence[float]) -> str:
     return ", ".join(f"{quantile(values, share):.2f}" for share in (0.5, 0.95, 0.99)) + " s"
 
 
-def _request(student: str) -> intake.GradingRequest:
+def _request(student: str) -> GradingRequest:
     # A text of its own, or it would be a copy of the one before, which is not run again.
     program = Code("robot.py", f"# {student}\n{_PROGRAM}")
     submission = Submission(student, program, Code("responder.py", _RESPONDER))
-    return intake.GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")
+    return GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")

@@ -18,6 +18,7 @@ from service.store.models import Job, JobState, Lane, PlotState
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
+from submissions.grading_request import GradingRequest
 
 _ASSIGNMENT = "json-queue"
 _TIMES = 7
@@ -44,7 +45,7 @@ def _once(store: Store, notifier: Notifier, student: str) -> tuple[float, float]
     submission = read_submission(examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
     # A file of its own, or it would be a copy of the one before, which is not run again.
     submission = replace(submission, files={**submission.files, "student.txt": student.encode()})
-    job = intake.accept(store, intake.GradingRequest(submission, assignment, student), max_attempts=3).job_id
+    job = intake.accept(store, GradingRequest(submission, assignment, student), max_attempts=3).job_id
     notifier.grade(Lane.INTERACTIVE)
     marks = None
     while True:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, NoReturn
 
-from responders import messages, wire
+from responders import message_format, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.responder_process import Collected, ResponderProcess
@@ -110,7 +110,7 @@ class Bridge:
         """What the program has logged since this was last asked, data and images."""
         lines, images = self.printed[self._told_lines :], self.image_log[self._told_images :]
         self._told_lines, self._told_images = len(self.printed), len(self.image_log)
-        data = (messages.datum(line.text, line.t) for line in lines)
+        data = (message_format.datum(line.text, line.t) for line in lines)
         return Collected(
             tuple((datum.name, datum.value, datum.simtime, datum.t) for datum in data if datum is not None),
             tuple(f"{side} {csv} {tick}" for side, csv, tick in images),
@@ -131,7 +131,7 @@ class Bridge:
         }
         for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
             rgb = readings[side]
-            state[f"sensor{number + 1}dataArray"] = messages.csv(image)
+            state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
             state[f"{side}_light_raw"] = rgb
             state[f"{side}_light"] = int(rgb[0])
             state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
@@ -250,7 +250,7 @@ class Bridge:
         self._free_act()
         self._spend(len(text.encode()) + 1, "printed")
         self.chain.add("print", self.now, text.encode())
-        kind = messages.kind(text)
+        kind = message_format.kind(text)
         if kind == "log image":
             self._log_image(text)
             return
@@ -276,7 +276,7 @@ class Bridge:
         left, right = self.world.images()
         self._spend(len(left) + len(right), "sent images of")
         where = self.world.left_footprint
-        text = messages.image_message(left, right)
+        text = message_format.image_message(left, right)
         self._meter.keep(len(text) + len(left) + len(right))
         message = self._send(text)
         self.images.append(
@@ -293,14 +293,14 @@ class Bridge:
         )
 
     def _log_image(self, text: str) -> None:
-        sides = messages.logged_sides(text)
+        sides = message_format.logged_sides(text)
         word = text.split(" ")[1] if " " in text else "undefined"
         self.printed.append(Line(self.now / SECOND, f"{word} image data logged..."))
         images = dict(zip(("left", "right"), self.world.images(), strict=True))
         for side in sides:
             self._spend(len(images[side]), "logged images of")
             self.chain.add("image", self.now, images[side])
-            pixels = messages.csv(images[side])
+            pixels = message_format.csv(images[side])
             self._meter.keep(len(pixels))
             self.image_log.append((side, pixels, self.world.clock))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from responders import messages, wire
+from responders import message_format, wire
 from responders.conversation import Answer
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
@@ -106,11 +106,11 @@ class ResponderProcess:
         said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
         self._spend(said, "printed and answered")
         match frame["kind"]:
-            case "text" if not said.startswith(messages.JSON):
+            case "text" if not said.startswith(message_format.JSON):
                 return Answer(said, self._slept)
             case "text":
                 try:
-                    entry = messages.queue_entry(said)
+                    entry = message_format.queue_entry(said)
                 except ValueError as error:
                     sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
                     return Answer(said, self._slept, self._protocol_fault(t, sentence), note="malformed")

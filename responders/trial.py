@@ -10,7 +10,7 @@ import stat
 from dataclasses import replace
 from pathlib import Path
 
-from responders import messages
+from responders import message_format
 from responders.bridge import Bridge
 from responders.faults import stopped
 from responders.responder_process import ResponderProcess
@@ -71,7 +71,7 @@ def run_trial(
 def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
     """What a bridge that has served its program has seen, but for what the responder's process told of itself."""
     world = bridge.world
-    data = (messages.datum(line.text, line.t) for line in bridge.printed)
+    data = (message_format.datum(line.text, line.t) for line in bridge.printed)
     return Recording(
         background=spec.floor.name,
         start=spec.pose,

@@ -12,7 +12,6 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from service.roster import moment
 from service.settings import load_settings
 from service.store import audit, policies
 from service.store.engine import Store, now, open_store
@@ -21,6 +20,7 @@ from service.store.policies import PolicyLimits
 from service.store.students import Students
 from sim.errors import UsageError
 from submissions.names import shown_name
+from submissions.roster import moment
 
 course_app = typer.Typer(help="When and how often students may submit.", no_args_is_help=True)
 

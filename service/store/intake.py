@@ -35,26 +35,11 @@ from service.version import grader_sha256
 from sim.errors import HostError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.bundle import pack_submission, unpack_submission
+from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
 
 DEFAULT_COURSE = "default"
 Read = TypeVar("Read")
-
-
-@dataclass(frozen=True, slots=True)
-class GradingRequest:
-    """One submission and what it is marked against; ``source`` is the name it came under."""
-
-    submission: Submission
-    assignment: Assignment
-    source: str
-    submitted_at: datetime | None = None  # by the student, where anybody said
-    written: str = ""  # the student, as the file or folder has it, where that is not the normal form
-
-    @property
-    def student(self) -> str:
-        """As it was written."""
-        return self.written or self.submission.student
 
 
 @dataclass(frozen=True, slots=True)

@@ -164,7 +164,7 @@ class Batch(Base):
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
-    problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that preflight refused
+    problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that were refused when it was read
     regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose submissions these are
     created_at: Mapped[datetime]
 

@@ -13,11 +13,12 @@ from service.grading.grade import Grade
 from service.settings import Settings
 from service.store import recordings
 from service.store.engine import Store, open_store
-from service.store.intake import Accepted, GradingRequest, accept
+from service.store.intake import Accepted, accept
 from service.store.models import Lane
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment
+from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
 
 PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"

@@ -40,9 +40,10 @@ from service.queue.tasks import WORKER_VARIABLE
 from service.queue.worker import new_worker_name
 from service.settings import Settings
 from service.store.engine import Store
-from service.store.intake import GradingRequest, accept_batch, load_grading_request
+from service.store.intake import accept_batch, load_grading_request
 from service.store.models import UNFINISHED, CriterionResultRow, Heartbeat, Job, JobState, Lane, TrialRow
 from sim.errors import HostError
+from submissions.grading_request import GradingRequest
 
 #: Behaviours that differ; every submission is one of them, with a text of its own so that none is a copy of another.
 _VARIANTS = 12

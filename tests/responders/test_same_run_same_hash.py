@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import pytest
 
@@ -55,13 +57,13 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
+WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys
-    sys.path.insert(0, sys.argv[1])
     from service.grading.trial_runner import TrialRunner
     from test_same_run_same_hash import chain
     with TrialRunner() as runner:
-        for name in sys.argv[2:]:
+        for name in sys.argv[1:]:
             print(name, chain(name, runner), flush=True)
 """)
 
@@ -73,10 +75,10 @@ def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner)
         for number in range(5):
             pair = []
             for half in range(2):
-                spec = ["follower", "talk"]
-                random.Random(number * 2 + half).shuffle(spec)
-                command = [sys.executable, "-c", ELSEWHERE, str(HELPERS), *spec]
-                pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+                names = ["follower", "talk"]
+                random.Random(number * 2 + half).shuffle(names)
+                command = [sys.executable, "-c", ELSEWHERE, *names]
+                pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=WITH_TESTS))
             for process in pair:
                 output, _ = process.communicate(timeout=300)
                 assert process.returncode == 0

@@ -14,13 +14,13 @@ from sqlalchemy import insert, select, update
 
 from builders import grading_request
 from command import robomark
-from service.preflight import Preflight, preflight
 from service.reports.written import file_stem, file_stems
 from service.store import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Person, Role
 from service.store.students import Students
 from sim.errors import UsageError
+from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission
 from submissions.names import alike, forms, shown_name
 
@@ -98,7 +98,7 @@ def _roster(tmp_path: Path, *names: str) -> Path:
     return tmp_path / "roster.csv"
 
 
-def _refused(checked: Preflight) -> list[str]:
+def _refused(checked: BatchContents) -> list[str]:
     assert all("\n" not in sentence and sentence.endswith(".") for _, sentence in checked.problems)
     return [sentence for _, sentence in checked.problems]
 
@@ -108,7 +108,7 @@ def _refused(checked: Preflight) -> list[str]:
 def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
     tmp_path: Path, batch: Callable[..., Path], ada: str, eve: str
 ) -> None:
-    checked = preflight(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
+    checked = read_batch(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob the third"]
     assert len(_refused(checked)) == 2
     assert all("cannot be told from" in each or "too, and not the same" in each for each in _refused(checked))
@@ -117,7 +117,7 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
 @PAIRS
 def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: Store, ada: str, eve: str) -> None:
     """Refused in a later batch; but for what one normal form makes the same name, it can only be written otherwise."""
-    batches = [preflight(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
+    batches = [read_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
     first, later = (
         intake.accept_new(store, "b", each.grading_requests, each.problems, max_attempts=3) for each in batches
     )
@@ -154,7 +154,7 @@ def test_files_of_alike_names_never_share_a_name(ada: str, eve: str) -> None:
 )
 def test_students_of_different_names_are_all_taken_in(tmp_path: Path, names: tuple[str, ...]) -> None:
     assert alike(names) == {}
-    checked = preflight(_folder(tmp_path, *names), ASSIGNMENT)
+    checked = read_batch(_folder(tmp_path, *names), ASSIGNMENT)
     assert {each.submission.student for each in checked.grading_requests} == set(names)
     assert checked.problems == ()
 
@@ -164,7 +164,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
     with zipfile.ZipFile(folder / "ada.zip", "w") as archive:
         archive.writestr("robot.py", "print('not hers')\n")
         archive.writestr("responder.py", RESPONDER)
-    checked = preflight(folder, ASSIGNMENT)
+    checked = read_batch(folder, ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob"]
     assert [name for name, _ in checked.problems] == ["ada", "ada.zip"]
     assert all("not the same; expected one" in sentence for sentence in _refused(checked))
@@ -172,7 +172,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
 
 @pytest.mark.parametrize("name", ["\u200b", "\u3164", "x" * 101])
 def test_a_folder_that_names_nobody_is_refused(tmp_path: Path, name: str) -> None:
-    checked = preflight(_folder(tmp_path, "ada", name), ASSIGNMENT)
+    checked = read_batch(_folder(tmp_path, "ada", name), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["ada"]
     (sentence,) = _refused(checked)
     assert f"a student's name of {len(shown_name(name))} characters" in sentence
@@ -186,7 +186,7 @@ def test_a_submission_does_not_say_whose_it_is(tmp_path: Path, named: str) -> No
     assert "submission.toml names the student" in submission.notes[0]
     roster = tmp_path / "roster.csv"
     roster.write_text("student,file\nmallory,eve\n")
-    (taken,) = preflight(roster, ASSIGNMENT).grading_requests
+    (taken,) = read_batch(roster, ASSIGNMENT).grading_requests
     assert taken.submission.student == "mallory"
 
 

@@ -1,6 +1,6 @@
 """``robomark batch``: hands folders of submissions to the queue, waits for them, and shows what came of them.
 
-Reading the folder is ``preflight.py``; the grading itself is the workers'.
+Reading the folder is `batch_folder.py``; the grading itself is the workers'.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from service.commands.batch.control import BatchId, cancel, pause, resume, retry
 from service.commands.batch.export import export
 from service.commands.batch.regrade import publish, regrade
 from service.commands.batch.tables import changes_table, history_table, marks_table, summary, unjudged_words
-from service.preflight import Preflight, preflight
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
@@ -31,6 +30,7 @@ from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.models import JobState, Lane
 from sim.errors import Cancelled, HostError, UsageError
+from submissions.batch_folder import BatchContents, read_batch
 
 batch_app = typer.Typer(help="Grade many submissions through the queue.", no_args_is_help=True)
 
@@ -160,8 +160,8 @@ batch_app.command()(regrade)
 batch_app.command()(publish)
 
 
-def _checked(grading_requests: Path, assignment: str | None, console: Console) -> Preflight:
-    checked = preflight(grading_requests, assignment)
+def _checked(grading_requests: Path, assignment: str | None, console: Console) -> BatchContents:
+    checked = read_batch(grading_requests, assignment)
     _print_problems(checked.problems, console)
     if not checked.grading_requests:
         raise UsageError(f"{grading_requests}: none of {len(checked.problems)} submissions can be taken in")
@@ -169,7 +169,7 @@ def _checked(grading_requests: Path, assignment: str | None, console: Console) -
 
 
 def _accept(
-    store: Store, settings: Settings, path: Path, checked: Preflight, *, again: bool, console: Console
+    store: Store, settings: Settings, path: Path, checked: BatchContents, *, again: bool, console: Console
 ) -> intake.AcceptedNew:
     """Take in what passed, and say what was new of it."""
     batch = (path.name, checked.grading_requests, checked.problems)

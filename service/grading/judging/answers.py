@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 
-from responders.messages import JSON, parsed_answer
+from responders.message_format import JSON, parsed_answer
 from service.grading.judging.words import fault_words
 from sim.recording import Fault, Message, Recording
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from responders.messages import JSON, PY
+from responders.message_format import JSON, PY
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
 from service.grading.judging.judges import judges

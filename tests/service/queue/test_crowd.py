@@ -28,9 +28,10 @@ from service.queue.notifier import Notifier
 from service.queue.processes import end_processes
 from service.settings import Settings
 from service.store.engine import Store, open_store
-from service.store.intake import GradingRequest, accept_batch
+from service.store.intake import accept_batch
 from service.store.models import UNFINISHED, Enrolment, Job, JobState, Lane
 from sim.recording import Verdict
+from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
 
 MEMORY = 1_500_000_000

@@ -20,7 +20,6 @@ from processes import children, command_line, descendants, until
 from service.commands.batch.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.preflight import preflight
 from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
@@ -29,9 +28,11 @@ from service.settings import Settings
 from service.store import artifacts, batch_control, batches, results
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
-from service.store.intake import GradingRequest, accept_batch, load_grading_request
+from service.store.intake import accept_batch, load_grading_request
 from service.store.models import CriterionResultRow, Job, JobState, Lane, PlotState, TrialRow
 from submissions.assignment.examples import examples
+from submissions.batch_folder import read_batch
+from submissions.grading_request import GradingRequest
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
 SPIN = "print('begun')\nwhile True:\n    pass\n"
@@ -118,7 +119,7 @@ def _spinning(count: int) -> list[GradingRequest]:
 
 
 def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
-    checked = preflight(examples("echo-responder"), "echo-responder")
+    checked = read_batch(examples("echo-responder"), "echo-responder")
     assert checked.problems == ()
     batch = service.submit(list(checked.grading_requests))
     graded = service.wait(batch)
@@ -190,7 +191,7 @@ def test_a_batch_on_postgresql(tmp_path: Path, postgresql: str) -> None:
     settings = settings_in(tmp_path, database_url=fresh_database(postgresql))
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         service = Service(settings, store, services)
-        batch = service.submit([*preflight(examples("json-queue"), "json-queue").grading_requests, *_spinning(1)])
+        batch = service.submit([*read_batch(examples("json-queue"), "json-queue").grading_requests, *_spinning(1)])
         service.until_running(batch)
         assert services.worker_pid is not None
         os.kill(services.worker_pid, signal.SIGKILL)

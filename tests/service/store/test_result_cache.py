@@ -16,9 +16,10 @@ from service.grading.grade import Cost, Grade
 from service.store import artifacts, batches, jobs, metrics, plots, results, self_tests
 from service.store.engine import Store
 from service.store.installation import secret_of
-from service.store.intake import Accepted, GradingRequest, accept, accept_batch
+from service.store.intake import Accepted, accept, accept_batch
 from service.store.models import Job, JobState, PlotState, Standing
 from sim.recording import Verdict
+from submissions.grading_request import GradingRequest
 from submissions.seeds import Secret
 
 SANDBOX = "Landlock 7, seccomp, process limits, policy 0"

@@ -10,10 +10,11 @@ from sqlalchemy import func, select
 from builders import echo, grading_request
 from service.store import batch_control, batches, jobs
 from service.store.engine import Store
-from service.store.intake import GradingRequest, accept_batch, accept_new
+from service.store.intake import accept_batch, accept_new
 from service.store.lease_reaper import wanting_notices
 from service.store.models import Batch, BatchState, Job, JobState, Lane, SubmissionRow
 from sim.errors import UsageError
+from submissions.grading_request import GradingRequest
 
 OTHER = "print('other')\n"
 

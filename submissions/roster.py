@@ -1,6 +1,6 @@
 """Reads a CSV roster: which student submitted which file, for which assignment. Every bad row is named by its line.
 
-Says where a file would lie, never outside the roster's folder; reading the submissions is ``preflight.py``'s.
+Says where a file would lie, never outside the roster's folder; reading the submissions is `batch_folder.py``'s.
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from service.commands.grade import read_with_assignment
-from service.preflight import preflight
 from sim.errors import UsageError
 from submissions.assignment.folder import assignment_folder
+from submissions.batch_folder import read_batch
 
 PROGRAM = "print('hello')\n"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -48,7 +48,7 @@ def class_folder(tmp_path: Path) -> Path:
 
 
 def test_every_bad_row_is_named_and_the_rest_taken(class_folder: Path) -> None:
-    checked = preflight(class_folder, "echo-responder")
+    checked = read_batch(class_folder, "echo-responder")
     assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
     problems = dict(checked.problems)
     assert set(problems) == {
@@ -68,7 +68,7 @@ def test_a_zip_of_the_same_folder_is_the_same(class_folder: Path, tmp_path: Path
         for path in sorted(class_folder.rglob("*")):
             if path.is_file() and not path.is_symlink():
                 archive.write(path, prefix + str(path.relative_to(class_folder)))
-    checked = preflight(tmp_path / "all.zip", "echo-responder")
+    checked = read_batch(tmp_path / "all.zip", "echo-responder")
     assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
     assert {name for name, _ in checked.problems} == {
         "no-responder", "notes.docx", "broken.zip", "ada.zip", "climber.zip",
@@ -80,7 +80,7 @@ def test_each_submission_may_name_its_own_assignment(tmp_path: Path) -> None:
     _student(folder, "ada", toml='assignment = "echo-responder"\n')
     _student(folder, "bob", toml='assignment = "json-queue"\n')
     _student(folder, "eve", toml='assignment = "no-such-thing"\n')
-    checked = preflight(folder, None)
+    checked = read_batch(folder, None)
     named = {
         grading_request.submission.student: grading_request.assignment.id
         for grading_request in checked.grading_requests
@@ -99,7 +99,7 @@ def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatc
     monkeypatch.chdir(folder)
     with pytest.raises(UsageError, match="no assignment 'eve' in the catalogue"):
         read_with_assignment(Path("eve"), None)
-    checked = preflight(Path(), None)
+    checked = read_batch(Path(), None)
     assert checked.grading_requests == ()
     assert "no assignment 'eve' in the catalogue" in dict(checked.problems)["eve"]
 
@@ -108,7 +108,7 @@ def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
     folder = tmp_path / "class"
     _student(folder, "ada", toml='student = "bob"\n')
     _student(folder, "bob")
-    checked = preflight(folder, "echo-responder")
+    checked = read_batch(folder, "echo-responder")
     assert checked.problems == ()
     ada, bob = checked.grading_requests
     assert (ada.submission.student, bob.submission.student) == ("ada", "bob")
@@ -118,7 +118,7 @@ def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
 def test_a_folder_named_after_an_assignment_names_it(tmp_path: Path) -> None:
     folder = tmp_path / "echo-responder"
     _student(folder, "ada")
-    (grading_request,) = preflight(folder, None).grading_requests
+    (grading_request,) = read_batch(folder, None).grading_requests
     assert grading_request.assignment.id == "echo-responder"
 
 
@@ -175,18 +175,18 @@ def _double_zip(tmp_path: Path) -> Path:
 def test_what_is_no_batch_is_refused_in_one_sentence(tmp_path: Path, make: object, expected: str) -> None:
     path = make(tmp_path)  # type: ignore[operator]
     with pytest.raises(UsageError, match=expected) as caught:
-        preflight(path, "echo-responder")
+        read_batch(path, "echo-responder")
     assert "\n" not in str(caught.value)
 
 
 def test_a_zip_that_grows_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.preflight._MOST_BYTES", 1_000_000)
+    monkeypatch.setattr("submissions.batch_folder._MOST_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "all.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("ada/robot.py", b"\0" * 2_000_000)
     with pytest.raises(UsageError, match="unpacks to more than"):
-        preflight(tmp_path / "all.zip", "echo-responder")
+        read_batch(tmp_path / "all.zip", "echo-responder")
 
 
 def test_an_unknown_assignment_is_the_callers_mistake(class_folder: Path) -> None:
     with pytest.raises(UsageError, match="no-such-thing"):
-        preflight(class_folder, "no-such-thing")
+        read_batch(class_folder, "no-such-thing")

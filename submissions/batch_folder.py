@@ -16,15 +16,15 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path, PurePosixPath
 
-from service.roster import RosterRow, file_inside, read_roster
-from service.store.intake import GradingRequest
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
 from submissions.bundle import fit_parts, named_by, read_submission
+from submissions.grading_request import GradingRequest
 from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
 from submissions.raw_files import shown
+from submissions.roster import RosterRow, file_inside, read_roster
 
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
@@ -34,7 +34,7 @@ _CHUNK = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Preflight:
+class BatchContents:
     """What a batch would take in, and the rows it would not: name, sentence."""
 
     grading_requests: tuple[GradingRequest, ...]
@@ -50,7 +50,7 @@ class _Row:
     read: Callable[[], GradingRequest]
 
 
-def preflight(path: Path, assignment: str | None) -> Preflight:
+def read_batch(path: Path, assignment: str | None) -> BatchContents:
     """Read every submission of a folder, zip or CSV roster.
 
     In a folder or zip a subfolder, a .py or a .zip is one student's, and without ``assignment`` each submission names
@@ -76,7 +76,7 @@ def preflight(path: Path, assignment: str | None) -> Preflight:
         )
 
 
-def _read(rows: Iterable[_Row]) -> Preflight:
+def _read(rows: Iterable[_Row]) -> BatchContents:
     rows = list(rows)
     near = alike(row.student for row in rows if row.student)
     found: list[GradingRequest | str] = []
@@ -88,7 +88,7 @@ def _read(rows: Iterable[_Row]) -> Preflight:
         except UsageError as error:
             found.append(" ".join(str(error).split()))
     found = _one_each(rows, found)
-    return Preflight(
+    return BatchContents(
         tuple(each for each in found if isinstance(each, GradingRequest)),
         tuple((row.name, each) for row, each in zip(rows, found, strict=True) if isinstance(each, str)),
     )
