@@ -28,6 +28,7 @@ class Tally:
 
     @property
     def share(self) -> float:
+        """The part of the images that was named rightly, 0 to 1; 0 without images."""
         return self.right / self.n if self.n else 0.0
 
     @property
@@ -95,6 +96,7 @@ class Card:
 
     @classmethod
     def from_json(cls, text: str) -> Card:
+        """The card that ``to_json`` made this text of."""
         data = json.loads(text)
         data["classes"] = tuple(data["classes"])
         data["measured"] = Measured.from_json(data["measured"])

@@ -44,6 +44,7 @@ class Answered:
 
     @property
     def right(self) -> bool:
+        """Whether the image was taken for what it shows."""
         return self.answer == self.place.label
 
 

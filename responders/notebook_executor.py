@@ -56,7 +56,8 @@ class PlannedRun:
 class RunPlanner(Protocol):
     """Decides what magics come to."""
 
-    def call(self, call: MagicCall) -> PlannedRun: ...
+    def call(self, call: MagicCall) -> PlannedRun:
+        """Say what a magic comes to: a run, notes, or nothing."""
 
     def ran(self, recording: Recording) -> None:
         """A run that was planned has ended."""
@@ -91,6 +92,7 @@ class ExecutedNotebook:
 
     @property
     def marked(self) -> Run | None:
+        """The run that marks are given for, if there was one."""
         return next((run for run in self.runs if run.marked), None)
 
     def told(self, recording: Recording) -> Recording:

@@ -79,6 +79,7 @@ class ResponderProcess:
 
     @property
     def alive(self) -> bool:
+        """Whether there is a child that can answer."""
         return self._child is not None
 
     def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
@@ -97,6 +98,7 @@ class ResponderProcess:
             return Answer(fault=self._stopped(surprise(error), t))
 
     def close(self) -> None:
+        """End the child, if there is one."""
         if self._child is not None:
             self._child.close()
             self._child = None

@@ -52,6 +52,7 @@ class Arena:
         self._motions: dict[tuple[str, Physics], Motion] = {}
 
     def close(self) -> None:
+        """Leave Bullet, and let every robot's motion do so."""
         self._client.close()
         for motion in self._motions.values():
             motion.close()

@@ -34,6 +34,7 @@ class Client:
         self.id: int = pb.connect(pb.DIRECT)
 
     def close(self) -> None:
+        """Leave Bullet; once is enough, and more does no harm."""
         if self.id >= 0:
             pb.disconnect(physicsClientId=self.id)
             self.id = -1

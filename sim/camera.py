@@ -80,6 +80,7 @@ class BulletCamera:
         self._shoot(0, 0, 2, light=True)
 
     def close(self) -> None:
+        """Leave Bullet; no image can be taken afterwards."""
         self._client.close()
 
     def window(self, column: int, row: int, side: int) -> Bytes:

@@ -49,6 +49,7 @@ class Column:
 
     @property
     def dtype(self) -> type[np.generic]:
+        """The type of its array: int64 for whole numbers, else float64."""
         return np.int64 if self.whole else np.float64
 
     def unknown(self, rows: int) -> NDArray[Any]:

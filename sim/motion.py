@@ -64,6 +64,7 @@ class FreeMotion:
         """Nothing is remembered from tick to tick."""
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+        """The new x and y, mm, and the turn, radians, by the equations alone."""
         if left == 0.0 and right == 0.0:
             return x, y, 0.0
         sine, cosine = sincos(heading)
@@ -115,12 +116,14 @@ class SolidMotion:
         self._state = pb.saveState(physicsClientId=client)
 
     def close(self) -> None:
+        """Leave Bullet."""
         self._client.close()
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Nothing is remembered from tick to tick."""
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+        """The new x and y, mm, and the turn, radians; Bullet is asked only near a wall or an obstacle."""
         new_x, new_y, turned = self._free.moved(x, y, heading, left, right)
         far = self._reach + math.hypot(new_x - x, new_y - y)
         if all(gap(box, x, y) > far for box in self._boxes):

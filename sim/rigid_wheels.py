@@ -51,6 +51,7 @@ class RigidWheels:
         self._state = pb.saveState(physicsClientId=client)
 
     def close(self) -> None:
+        """Leave Bullet."""
         self._client.close()
 
     def place(self, x: float, y: float, heading: float) -> None:

@@ -61,6 +61,7 @@ class Chain:
         self._digest.update(f"{kind}:{time}:{len(data)}:".encode() + data)
 
     def hexdigest(self) -> str:
+        """The hash of all that was added so far, 64 hexadecimal digits."""
         return self._digest.hexdigest()
 
 
@@ -110,6 +111,7 @@ class World:
 
     @property
     def pose(self) -> Pose:
+        """Where the robot is now: the middle of its axle, mm, and its heading, degrees."""
         return Pose(self.drive.x, self.drive.y, self.drive.heading_degrees)
 
     def tick(self) -> None:
@@ -135,10 +137,12 @@ class World:
 
     @property
     def right_means(self) -> list[float]:
+        """Mean R, G, B of the right light sensor."""
         return [total / self._lights[1].pixels for total in self.right_sums]
 
     @property
     def gyro_angle_and_rate(self) -> list[float]:
+        """What the gyro has turned, degrees, and its rate, degrees a second; both clockwise."""
         return [self.drive.gyro_angle, self.drive.gyro_rate]
 
     def images(self) -> tuple[bytes, bytes]:

@@ -1,0 +1,1 @@
+"""What is submitted and what it is marked against, read and checked; nothing here is run."""

@@ -36,10 +36,11 @@ def shown_name(text: str) -> str:
 
 @lru_cache(maxsize=4096)
 def forms(name: str) -> frozenset[str]:
-    """What names that are alike have in common: one name's case, odd blanks and invisible characters gone, and, in the
-    other form, each letter that looks like a Latin one or a digit in its place.
+    """What names that are alike have at least one of in common: two forms of a name, or one where they are the same.
 
-    Latin letters and digits stand for themselves: Kai and Kal are two students, as are a1 and al.
+    In both, case, odd blanks and invisible characters are gone; the second has, for each letter that looks like a
+    Latin one or a digit, that one. Latin letters and digits stand for themselves: Kai and Kal are two students, as are
+    a1 and al.
     """
     if name.isascii() and name.isprintable():
         return frozenset([_folded(name)])

@@ -17,6 +17,7 @@ class Secret:
 
     @property
     def sha256(self) -> str:
+        """Its hash, 64 hexadecimal digits, which may be shown."""
         return hashlib.sha256(self.text.encode("utf-8", "surrogateescape")).hexdigest()
 
     @property

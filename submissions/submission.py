@@ -51,8 +51,9 @@ class Submission:
         return digest.hexdigest()
 
     def hashed(self) -> Iterator[bytes]:
-        """What the hash is over: records of fields, each told how long it is before it comes, so that no two
-        submissions have the same bytes. Names count, for a program and its report can tell them.
+        """What the hash is over: records of fields, each told how long it is before it comes.
+
+        No two submissions have the same bytes so. Names count, for a program and its report can tell them.
         """
         yield b"robomark submission 2\n"
         for record in self._records():

@@ -104,6 +104,7 @@ class Sandboxes:
         return self._cpu_of_closed + sum(zygote.children_cpu_seconds for zygote in self._zygotes.values())
 
     def close(self) -> None:
+        """End all zygotes, and remove the control group and the private folders."""
         while self._zygotes:
             self._zygotes.popitem()[1].close()
         if self._group is not None:

@@ -55,10 +55,12 @@ class JobMeter:
 
     @property
     def spent(self) -> Spent:
+        """What the job has cost so far; seconds are counted of children that are gone."""
         return Spent(self._kept, self._cpu, self._sleep)
 
     @property
     def limits(self) -> JobLimits:
+        """What the job may cost."""
         return self._limits
 
     def heartbeat(self) -> None:
@@ -81,6 +83,7 @@ class JobMeter:
 
     @property
     def left_bytes(self) -> int:
+        """How many bytes may still be kept, 0 when all are spent."""
         return max(0, self._limits.kept_bytes - self._kept)
 
     def check_cpu(self, running: float) -> None:
@@ -100,6 +103,7 @@ class JobMeter:
             )
 
     def child_ended(self, cpu_seconds: float, sleep_seconds: float) -> None:
+        """Count the seconds of a child that is gone; the first ones asleep are free."""
         self._cpu += cpu_seconds
         self._sleep += max(0.0, sleep_seconds - _FREE_SLEEP_SECONDS)
 

@@ -55,6 +55,7 @@ class PrivateFolders:
             _remove(folder)
 
     def close(self) -> None:
+        """Remove the folder and let go of its lock."""
         if self._path is not None:
             _remove(self._path)
             self._path = None

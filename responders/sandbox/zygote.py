@@ -160,6 +160,7 @@ class Zygote:
             raise _ZygoteEnded(f"the {self._role} zygote ended while a program ran") from error
 
     def close(self) -> None:
+        """End the zygote, by force if it does not end by itself, and close what leads to it."""
         if self._control is not None:
             self._control.close()
             self._control = None

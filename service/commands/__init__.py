@@ -1,0 +1,1 @@
+"""The commands of ``robomark``, each module a group of them."""

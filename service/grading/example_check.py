@@ -42,6 +42,7 @@ class ComparedMeasure:
 
     @property
     def agrees(self) -> bool:
+        """Whether the reference comes near enough to the original; not so where it measured nothing."""
         near = self.original.within * max(abs(self.original.value), 1e-9)
         return self.value is not None and abs(self.value - self.original.value) <= near + 1e-9
 
@@ -56,6 +57,7 @@ class CheckedAssignment:
 
     @property
     def problems(self) -> tuple[str, ...]:
+        """A sentence for each thing that is wrong: with the examples first, then with the measures."""
         of_examples = (problem for example in self.examples for problem in example.problems)
         return (*of_examples, *(problem for measure in self.measures for problem in _measure_problems(measure)))
 

@@ -71,6 +71,7 @@ class Level:
 
     @property
     def value(self) -> float:
+        """The part of the images that was named rightly, 0 to 1; 0 without images."""
         return self.right / self.n if self.n else 0.0
 
 
@@ -162,6 +163,7 @@ class TrialResult:
 
     @property
     def verdict(self) -> Verdict:
+        """How the run ended, as recorded."""
         return self.recording.verdict
 
 
@@ -192,10 +194,12 @@ class Grade:
 
     @property
     def marks(self) -> Decimal:
+        """The marks of all criteria together."""
         return sum((result.marks for result in self.criteria), Decimal(0))
 
     @property
     def max_marks(self) -> Decimal:
+        """The marks that all criteria together could have given."""
         return sum((result.max_marks for result in self.criteria), Decimal(0))
 
     @property

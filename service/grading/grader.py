@@ -45,7 +45,8 @@ class GradingProgress:
 class Observe(Protocol):
     """Called after each trial and about once a second; raises Cancelled to stop the grading."""
 
-    def __call__(self, progress: GradingProgress, /) -> None: ...
+    def __call__(self, progress: GradingProgress, /) -> None:
+        """Take in how far it is, soon, for the grading waits; raise Cancelled to stop it."""
 
 
 def _nobody(progress: GradingProgress) -> None:

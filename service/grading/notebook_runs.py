@@ -98,6 +98,7 @@ class NotebookRuns:
         self.simulator.leave_at(recording.end)
 
     def last(self) -> PlannedRun:
+        """What is run after all cells, if anything."""
         return self._last
 
     def _load(self, call: MagicCall, flags: Flags) -> tuple[Flags, Setup]:

@@ -39,7 +39,8 @@ _RESPONDERS = ("responder", "*_responder")
 class Caller(Protocol):
     """Calls functions inside the sandbox; a runner does."""
 
-    def call(self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter) -> Called: ...
+    def call(self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter) -> Called:
+        """Call a module's functions one after the other in a fresh child, and return what they gave."""
 
 
 def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter: JobMeter) -> StaticAnalysis:

@@ -113,6 +113,7 @@ class TrialRunner:
         return self._sandboxes.children_cpu_seconds
 
     def close(self) -> None:
+        """End all children, and give back the sandboxes, cameras and arenas."""
         self._sandboxes.close()
         self._cameras.close()
         while self._arenas:

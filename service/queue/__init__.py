@@ -1,0 +1,1 @@
+"""Who grades when: the broker, the workers, and the self-test that each must pass."""

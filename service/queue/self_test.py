@@ -67,6 +67,7 @@ def ask(runner: TrialRunner) -> KnownAnswer | None:
 
 
 def found(graded: Grade) -> KnownAnswer:
+    """The marks of a grade, and the hash of each trial's recording."""
     return KnownAnswer(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
 
 

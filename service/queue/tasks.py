@@ -47,6 +47,7 @@ class PoolChild:
     watch: Watch
 
     def close(self) -> None:
+        """Stop watching, and give back the runner and the store."""
         self.watch.end()
         self.runner.close()
         self.store.close()
@@ -59,6 +60,7 @@ class WarmTask(Task):  # type: ignore[type-arg]
 
     @property
     def child(self) -> PoolChild:
+        """The things of this process, made when first asked for."""
         return _children.child
 
 

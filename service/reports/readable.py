@@ -16,10 +16,10 @@ _HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Cn", "Zl", "Zp"})
 
 
 def readable(text: str, limit: int = 2000, *, lines: int = 40) -> str:
-    """``text`` with nothing invisible left in it, at most ``limit`` characters and ``lines`` lines long.
+    r"""``text`` with nothing invisible left in it, at most ``limit`` characters and ``lines`` lines long.
 
-    Control characters, bidirectional overrides, lone surrogates and their like become escapes such as ``\\x1b``
-    and ``\\u202e``; line feeds stay, tabs become four spaces. What was cut is said at the end.
+    Control characters, bidirectional overrides, lone surrogates and their like become escapes such as ``\x1b``
+    and ``\u202e``; line feeds stay, tabs become four spaces. What was cut is said at the end.
     """
     head = text[:limit]
     kept = head.replace("\r\n", "\n").split("\n")[:lines]

@@ -1,0 +1,1 @@
+"""The database: who submitted what, the jobs, and what came of them."""

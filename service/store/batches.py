@@ -57,6 +57,7 @@ class JobLine:
 
     @property
     def ended(self) -> bool:
+        """Whether nothing will come of the job any more but what has come."""
         return self.state not in UNFINISHED
 
 

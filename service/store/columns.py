@@ -42,6 +42,7 @@ class UtcDateTime(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """The moment in UTC, for SQLite without its zone; raises ValueError where it has none."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -50,6 +51,7 @@ class UtcDateTime(TypeDecorator[datetime]):
         return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """The moment in UTC, aware on every database."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
@@ -62,14 +64,17 @@ class ExactDecimal(TypeDecorator[Decimal]):
     cache_ok = True
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        """NUMERIC on PostgreSQL, else text of at most 32 characters."""
         return dialect.type_descriptor(Numeric() if dialect.name == "postgresql" else String(32))
 
     def process_bind_param(self, value: Decimal | None, dialect: Dialect) -> Decimal | str | None:
+        """The number itself for PostgreSQL, else its digits as text."""
         if value is None or dialect.name == "postgresql":
             return value
         return str(value)
 
     def process_result_value(self, value: Decimal | str | None, dialect: Dialect) -> Decimal | None:
+        """The number, with every digit that was stored."""
         return None if value is None else Decimal(value)
 
 
@@ -80,6 +85,7 @@ class SafeText(TypeDecorator[str]):
     cache_ok = True
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """The text without what a database would refuse."""
         return None if value is None else storable(value)
 
 
@@ -90,9 +96,11 @@ class SafeJson(TypeDecorator[Any]):
     cache_ok = True
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        """JSONB on PostgreSQL, else JSON; None is NULL on both."""
         return dialect.type_descriptor(
             JSONB(none_as_null=True) if dialect.name == "postgresql" else JSON(none_as_null=True)
         )
 
     def process_bind_param(self, value: Json, dialect: Dialect) -> Json:
+        """The value with texts that every database takes; raises ValueError for infinity and what is no number."""
         return storable_json(value)

@@ -53,6 +53,7 @@ class Store:
             yield session
 
     def close(self) -> None:
+        """Close the connections that are kept for later."""
         self.engine.dispose()
 
     def __enter__(self) -> Self:

@@ -21,6 +21,8 @@ from service.store.ids import new_id
 
 
 class Role(StrEnum):
+    """What somebody is in a course."""
+
     STUDENT = "student"
     STAFF = "staff"
 
@@ -33,6 +35,8 @@ class Lane(StrEnum):
 
 
 class JobState(StrEnum):
+    """How far a job has come on its way to a grade."""
+
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"  # has a grade
@@ -79,6 +83,8 @@ def _enum(kind: type[StrEnum]) -> Enum:
 
 
 class Base(DeclarativeBase):
+    """What all tables share: the names of their constraints, and the column type of each Python type."""
+
     metadata = MetaData(
         naming_convention={
             "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -113,6 +119,8 @@ class Installation(Base):
 
 
 class Course(Base):
+    """A course; no two have the same name."""
+
     __tablename__ = "course"
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -121,6 +129,8 @@ class Course(Base):
 
 
 class Person(Base):
+    """Somebody who is in a course; what the course knows them by is in the enrolment."""
+
     __tablename__ = "person"
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -158,6 +168,8 @@ class AssignmentVersion(Base):
 
 
 class Batch(Base):
+    """Submissions of one course that were taken in together, or the regrade of such."""
+
     __tablename__ = "batch"
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)

@@ -42,6 +42,7 @@ class Kept:
 
     @property
     def has_images(self) -> bool:
+        """Whether at least one image was kept."""
         return bool(self.recording.images)
 
 

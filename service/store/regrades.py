@@ -70,6 +70,7 @@ class Change:
 
     @property
     def differs(self) -> bool:
+        """Whether there is a new grade and its marks, or what they are out of, are others than before."""
         return self.state is JobState.DONE and (self.before, self.before_max) != (self.after, self.after_max)
 
 

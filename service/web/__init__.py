@@ -1,0 +1,1 @@
+"""The pages and the measures that are served over HTTP."""

@@ -33,6 +33,7 @@ YELLOW: Colour = (255, 255, 0)
 
 
 def grey(level: int) -> Colour:
+    """The grey whose three channels are ``level``, 0 (black) to 255 (white)."""
     return (level, level, level)
 
 
@@ -54,6 +55,7 @@ class SmoothCanvas:
         self._canvas: Canvas = ImageDraw.Draw(self._image)
 
     def line(self, points: Sequence[Point], width: float, colour: Colour = BLACK) -> None:
+        """Draw a line ``width`` pixels wide from point to point, round at its bends."""
         scaled = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
         self._canvas.line(scaled, colour, width=round(width * SCALE), joint="curve")
 
@@ -64,6 +66,7 @@ class SmoothCanvas:
             self.disc((x, y), radius, colour)
 
     def disc(self, centre: Point, radius: float, colour: Colour) -> None:
+        """Fill a circle; ``radius`` in pixels."""
         x, y = centre
         self.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
 
@@ -75,12 +78,15 @@ class SmoothCanvas:
         self._canvas.ellipse(box, outline=colour, width=round(width * SCALE))
 
     def ellipse(self, box: Box, colour: Colour) -> None:
+        """Fill the ellipse that touches the four sides of ``box``: left, top, right, bottom."""
         self._canvas.ellipse(self._inside(box), colour)
 
     def rectangle(self, box: Box, colour: Colour) -> None:
+        """Fill ``box``: left, top, right, bottom."""
         self._canvas.rectangle(self._inside(box), colour)
 
     def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
+        """Fill what lies between the corners, in whatever direction they are given."""
         self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
 
     def pixels(self) -> Pixels:

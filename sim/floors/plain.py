@@ -50,6 +50,7 @@ def nothing(canvas: Canvas) -> None:
 
 @painted("Grey_bands", Pose(150, 500, 0), menu=4)
 def grey_bands(canvas: Canvas) -> None:
+    """Four upright bands, three grey and one black, and to their right a red, a green and a blue disc."""
     for left, level in ((250, 220), (650, 211), (1050, 128), (1450, 0)):
         canvas.rectangle((left, 150, left + 200, 900), grey(level))
     for top, colour in ((250, RED), (450, GREEN), (650, BLUE)):
@@ -58,12 +59,14 @@ def grey_bands(canvas: Canvas) -> None:
 
 @painted("Coloured_bands", Pose(100, 800, 0), menu=8)
 def coloured_bands(canvas: Canvas) -> None:
+    """Four upright bands apart from each other: red, green, blue and black."""
     for left, colour in ((250, RED), (650, GREEN), (1050, BLUE), (1450, BLACK)):
         canvas.rectangle((left, 150, left + 200, 750), colour)
 
 
 @painted("Rainbow_bands", Pose(100, 800, 0), menu=9)
 def rainbow_bands(canvas: Canvas) -> None:
+    """Seven upright bands side by side: red, green, blue, cyan, magenta, yellow and black."""
     colours = (RED, GREEN, BLUE, (0, 255, 255), (255, 0, 255), YELLOW, BLACK)
     for index, colour in enumerate(colours):
         left = 200 + 200 * index
@@ -72,6 +75,7 @@ def rainbow_bands(canvas: Canvas) -> None:
 
 @painted("Grey_and_black", Pose(400, 700, 90), menu=10)
 def grey_and_black(canvas: Canvas) -> None:
+    """A black strip near the top, and lower down a strip of three greys and black."""
     canvas.rectangle((200, 100, 1800, 200), BLACK)
     for left, level in ((200, 211), (600, 0), (1000, 220), (1400, 128)):
         canvas.rectangle((left, 600, left + 400, 700), grey(level))
@@ -79,18 +83,21 @@ def grey_and_black(canvas: Canvas) -> None:
 
 @painted("Square", Pose(550, 300, -90), menu=13)
 def square(canvas: Canvas) -> None:
+    """A grey square inside the grey outline of a larger one."""
     canvas.rectangle((600, 400, 1000, 800), grey(128))
     canvas.rectangle((300, 100, 1300, 1100), outline=grey(128), width=20)
 
 
 @painted("Loop", Pose(500, 500, 90), menu=2)
 def loop(canvas: Canvas) -> None:
+    """A black track with rounded corners, 100 pixels wide."""
     canvas.rounded_rectangle((200, 200, 1900, 1000), 80, BLACK)
     canvas.rounded_rectangle((300, 300, 1800, 900), 50, WHITE)
 
 
 @painted("Two_shapes", Pose(200, 500, 90), menu=3)
 def two_shapes(canvas: Canvas) -> None:
+    """The thick black outlines of a rounded square and, to its right, of a circle."""
     canvas.rounded_rectangle((200, 400, 700, 900), 80, BLACK)
     canvas.rounded_rectangle((300, 500, 600, 800), 50, WHITE)
     canvas.ellipse((1200, 400, 1700, 900), BLACK)
@@ -128,6 +135,7 @@ def lollipop(canvas: Canvas) -> None:
 
 @painted("Sensor_Diameter_Test", Pose(550, 450, 90), menu=20)
 def sensor_diameter_test(canvas: Canvas) -> None:
+    """Black and red lines across and down, each 1, 3, 5, 7 and 9 pixels wide, and two blue dots."""
     for top, lefts, colour in ((200, (200, 240), BLACK), (640, (1000, 1040), RED)):
         for index in range(5):
             thickness = 2 * index

@@ -50,6 +50,7 @@ class FloorLabel:
     height: float
 
     def holds(self, x: float, y: float) -> bool:
+        """Whether the point, world mm, is in it; the edges belong to it."""
         return self.x <= x <= self.x + self.width and self.y <= y <= self.y + self.height
 
 

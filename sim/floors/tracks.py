@@ -111,11 +111,13 @@ class Stand:
     turn: float
 
     def at(self, along: float, across: float) -> Point:
+        """The point of the image that is so far along the stand's first axis, and so far down from it, pixels."""
         cosine, sine = math.cos(math.radians(self.turn)), math.sin(math.radians(self.turn))
         x, y = self.centre
         return (x + along * cosine + across * sine, y - along * sine + across * cosine)
 
     def box(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
+        """The four corners of what lies between two distances along and two across, pixels, in turn."""
         (near, far), (top, bottom) = along, across
         return (self.at(near, top), self.at(far, top), self.at(far, bottom), self.at(near, bottom))
 

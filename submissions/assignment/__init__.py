@@ -1,0 +1,1 @@
+"""Assignments: their files, read, checked and put in the form that grading needs."""

@@ -144,6 +144,7 @@ class Assignment:
 
     @property
     def max_marks(self) -> Decimal:
+        """The marks that all criteria together can give."""
         return sum((criterion.marks for criterion in self.criteria), Decimal(0))
 
     def trials(self, secret: Secret = PUBLIC) -> Iterator[Trial]:

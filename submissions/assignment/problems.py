@@ -32,6 +32,7 @@ class Problems:
     found: list[tuple[int, str]] = field(default_factory=list)
 
     def add(self, path: Path, sentence: str) -> None:
+        """Note what is wrong at the line where this key stands."""
         self.found.append((line_of(self.lines, path), sentence))
 
     def sorted(self) -> tuple[str, ...]:

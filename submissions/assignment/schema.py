@@ -41,6 +41,8 @@ class HeadTable(StrictTable):
 
 
 class WorldTable(StrictTable):
+    """The floor, what stands on it, and the robot with its physics."""
+
     background: str = "Empty_Map"
     labels: bool = True
     obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
@@ -76,6 +78,8 @@ class WorldTable(StrictTable):
 
 
 class PartsTable(StrictTable):
+    """Whose program and responder are run, and which cell of a notebook is the program."""
+
     program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
     cell: str | int = "last"
@@ -92,6 +96,8 @@ class PartsTable(StrictTable):
 
 
 class ChannelTable(StrictTable):
+    """What becomes of messages on their way: delays in seconds, the rest as probabilities."""
+
     delay: float = Field(default=0.1, ge=0, le=60)
     jitter: float = Field(default=0.0, ge=0, le=60)
     loss: float = Field(default=0.0, ge=0, le=1)
@@ -120,6 +126,8 @@ class SweepTable(StrictTable):
 
 
 class ScenarioTable(StrictTable):
+    """Where and under what conditions trials begin, and how many there are."""
+
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
@@ -164,12 +172,16 @@ class ScenarioTable(StrictTable):
 
 
 class TrainingTable(StrictTable):
+    """Which scenarios' images a submitted function is trained with."""
+
     scenarios: tuple[str, ...] = Field(min_length=1)
     function: str = Field(default="train", pattern=r"^[A-Za-z_]\w*$", max_length=80)
     image: Literal["focus", "whole"] = "focus"
 
 
 class LimitsTable(StrictTable):
+    """What one trial, and what all of them together (``all_``), may take."""
+
     program_cpu: float = Field(default=5.0, gt=0, le=120)
     responder_cpu: float = Field(default=10.0, gt=0, le=120)
     program_memory_mb: int = Field(default=128, ge=64, le=4096)

@@ -84,6 +84,7 @@ class SourceRules(Criterion):
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """The part whose source it reads has to be there."""
         yield from _without("part", self.part, around)
 
     @model_validator(mode="after")
@@ -136,6 +137,7 @@ class Functions(Criterion):
     judges_runs: ClassVar[bool] = False
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """The responder whose functions it calls has to be there."""
         yield from _without("check", "responder", around)
 
     @model_validator(mode="after")
@@ -165,9 +167,11 @@ class PythonCheck(Criterion):
 
     @property
     def python_files(self) -> Texts:
+        """The one file that has ``check``."""
         return (self.file,)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """Its file has to be beside the assignment."""
         if self.file not in around.files:
             yield Misfit("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
 

@@ -32,6 +32,7 @@ class AskedMotion(StrictTable):
 
     @property
     def asks(self) -> bool:
+        """Whether any range is given."""
         given = (self.forward, self.sideways, self.distance, self.turn, self.turn_size, self.seconds)
         return any(value is not None for value in given)
 

@@ -131,7 +131,7 @@ class LineToFollow(StrictTable):
         return tuple((x + across * math.cos(angle), y + up * math.sin(angle)) for angle in angles)
 
     def length(self) -> float:
-        """mm."""
+        """Along all its corners, mm."""
         corners = self.corners()
         return sum(math.dist(before, after) for before, after in itertools.pairwise(corners))
 

@@ -76,6 +76,7 @@ class Recognition(Criterion):
 
     @property
     def asks_responder(self) -> bool:
+        """True: what images are taken for is what a responder answers."""
         return True
 
     def completed(self, around: Surroundings) -> Self:

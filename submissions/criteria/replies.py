@@ -34,6 +34,7 @@ class Replies(TextConditions):
 
     @property
     def asks_responder(self) -> bool:
+        """True: nothing else is looked at."""
         return True
 
     @model_validator(mode="after")

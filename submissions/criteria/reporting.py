@@ -47,6 +47,7 @@ class Reports(Criterion):
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """Lists for single poses must be as many as each scenario has poses."""
         if self.expected == "label" or len(self.expected) == 1:
             return
         for scenario in around.looked_at_by(self):

@@ -30,6 +30,7 @@ class Robustness(Recognition):
     level: float | None = Field(default=None, gt=0, le=1)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """What recognition needs, and a scenario that is swept over the condition."""
         yield from super().misfits(around)
         if not any(scenario.varies(self.along) for scenario in around.looked_at_by(self)):
             yield Misfit(

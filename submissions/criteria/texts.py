@@ -29,6 +29,7 @@ class TextConditions(Criterion):
 
     @property
     def has_conditions(self) -> bool:
+        """Whether it asks anything of a single text."""
         return bool(self.equals or self.starts_with or self.contains or self.matches is not None)
 
 
@@ -113,6 +114,7 @@ class Messages(TextSequence):
 
     @property
     def asks_responder(self) -> bool:
+        """Whether it looks at the queue, which only answers fill."""
         return self.json_queue or self.queue_grows
 
     @model_validator(mode="after")

@@ -45,9 +45,11 @@ class Ranking(Criterion):
 
     @property
     def result_needed(self) -> str:
+        """The criterion whose figure is ranked."""
         return self.of
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """The criterion that is ranked has to be there, and to need no other's result itself."""
         # What is itself judged after another is judged too late to be ranked.
         if self.of not in {each.id for each in around.criteria if each.result_needed is None}:
             yield Misfit("of", f'of is "{self.of[:60]}", expected the id of another criterion')

@@ -33,6 +33,7 @@ class Wire:
             self._write(b"")
 
     def send(self, frame: Frame) -> None:
+        """Send now, after what was held back."""
         self._write(self._line(frame))
 
     def _line(self, frame: Frame) -> bytes:

@@ -36,6 +36,7 @@ class NotebookRole(ResponderRole):
 
     @property
     def namespace(self) -> dict[str, Any]:
+        """What all cells have bound, by its name."""
         return self._namespace
 
     def run(self) -> None:
@@ -81,6 +82,7 @@ class NotebookRole(ResponderRole):
         exec(compile(text, self._name, "exec", dont_inherit=True), self._namespace)
 
     def muted(self, work: Callable[[], None]) -> None:
+        """Do ``work`` and drop what is printed meanwhile."""
         self._muted = True
         try:
             work()

@@ -36,13 +36,23 @@ class RunRequester(Protocol):
     """What the shell needs of the notebook that is being executed."""
 
     @property
-    def namespace(self) -> dict[str, Any]: ...
+    def namespace(self) -> dict[str, Any]:
+        """What all cells have bound, by its name."""
 
-    def note(self, text: str) -> None: ...
-    def start_robot(self, name: str, arguments: str, body: str | None) -> None: ...
-    def run_python(self, text: str) -> None: ...
-    def expand(self, line: str) -> str: ...
-    def muted(self, work: Callable[[], None]) -> None: ...
+    def note(self, text: str) -> None:
+        """Tell the worker what was skipped or refused."""
+
+    def start_robot(self, name: str, arguments: str, body: str | None) -> None:
+        """Run a robot program, or set its flags, as the magic ``%name`` asks; ``body`` is the rest of its cell."""
+
+    def run_python(self, text: str) -> None:
+        """Run more code among the cell's names."""
+
+    def expand(self, line: str) -> str:
+        """Put values in the places of ``{expression}`` and ``$name`` in a magic's line."""
+
+    def muted(self, work: Callable[[], None]) -> None:
+        """Do ``work`` and drop what is printed meanwhile."""
 
 
 class Shell:
@@ -67,6 +77,7 @@ class Shell:
 
     @property
     def user_ns(self) -> dict[str, Any]:
+        """What all cells have bound, where IPython has it."""
         return self._requester.namespace
 
     def run_line_magic(self, magic_name: str, line: str, _stack_depth: int = 1) -> Any:
@@ -95,6 +106,7 @@ class Shell:
         return self._without(name, f"%%{name}")
 
     def magic(self, arg_s: str) -> Any:
+        """``%name line`` in one text, as older notebooks write it."""
         name, _, line = str(arg_s).lstrip("%").partition(" ")
         return self.run_line_magic(name, line)
 

@@ -191,6 +191,7 @@ def surely_bound(statement: ast.stmt) -> set[str]:
 
 
 def arguments_of(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -> set[str]:
+    """The names of all parameters, those with stars too."""
     return {each.arg for each in ast.iter_child_nodes(function.args) if isinstance(each, ast.arg)}
 
 

@@ -97,6 +97,7 @@ class Naming:
 
     @contextlib.contextmanager
     def scope(self, kind: str, bound: set[str] | None = None) -> Iterator[None]:
+        """Code with names of its own: ``bound`` are those that it binds somewhere."""
         self._scopes.append(_Scope(kind, bound or set()))
         yield
         self._scopes.pop()

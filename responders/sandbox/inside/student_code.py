@@ -64,6 +64,7 @@ class Output:
         self._emit = emit
 
     def write(self, text: str) -> int:
+        """Hand on one text without its last line feed and return its length; raises TypeError for what is no text."""
         if not isinstance(text, str):
             raise TypeError(f"write() argument must be str, not {type(text).__name__}")
         stripped = text[:-1] if text.endswith("\n") else text
@@ -72,6 +73,7 @@ class Output:
         return len(text)
 
     def writelines(self, lines: Any) -> None:
+        """Hand on each line as one text."""
         for line in lines:
             self.write(line)
 
@@ -79,12 +81,15 @@ class Output:
         """Nothing is held back."""
 
     def isatty(self) -> bool:
+        """False: what is written goes to no terminal."""
         return False
 
     def writable(self) -> bool:
+        """True, as for any stream that is written to."""
         return True
 
     def readable(self) -> bool:
+        """False; nothing can be read from it."""
         return False
 
 

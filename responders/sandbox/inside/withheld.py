@@ -30,6 +30,7 @@ def rule_for(module: str, names: tuple[str, ...]) -> str | None:
 
 
 def sentence(name: str) -> str:
+    """What a student is told when importing what the assignment withholds."""
     return f"this assignment does without {name}"
 
 

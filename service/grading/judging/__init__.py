@@ -1,0 +1,1 @@
+"""What each criterion makes of the trials; a module a family, named as in ``submissions/criteria``."""

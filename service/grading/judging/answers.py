@@ -23,6 +23,7 @@ NOTHING = Nothing()
 
 
 def is_json_answer(text: str) -> bool:
+    """Whether it is ``JSON::`` and well-formed JSON."""
     return not isinstance(parsed(text), Nothing)
 
 

@@ -18,6 +18,8 @@ from submissions.criteria.classification import Classification
 
 @judges_case(Classification)
 def judge_classification(criterion: Classification, case: Case) -> CriterionResult:
+    """The share of images that are named rightly, all trials pooled, and the marks for it."""
+
     def judged(trials: Indexed) -> CriterionResult:
         found = classify(criterion, case.assignment, trials)
         share = _share(criterion, found)

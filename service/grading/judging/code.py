@@ -29,6 +29,7 @@ _MOST_TOLD = 4
 
 @judges_case(SourceRules)
 def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
+    """What the source has and does without, once for all trials."""
     driven = case.trials if criterion.part == "program" else ()
     answers = case.analysis.answers.get(criterion.id)
     return once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
@@ -36,11 +37,13 @@ def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
 
 @judges_case(Functions)
 def judge_functions(criterion: Functions, case: Case) -> CriterionResult:
+    """What the responder's functions returned when they were called, once for all trials."""
     return once(criterion, _returned(criterion, case.analysis.called.get(criterion.id)))
 
 
 @judges_case(PythonCheck)
 def judge_python_check(criterion: PythonCheck, case: Case) -> CriterionResult:
+    """What the instructor's own check made of each trial."""
     return by_trial(criterion, case, lambda index, _: _checked(criterion, case.analysis.checks[criterion.id, index]))
 
 

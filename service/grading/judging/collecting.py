@@ -41,6 +41,7 @@ class Pair:
 
 @judges(Collects)
 def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
+    """The labelled pairs of images, counted by class without repetitions, beside how many are asked for."""
     recording = trial.recording
     found = pairs(recording, criterion.source, trial.light_noise)
     classes = criterion.classes or label_names(recording.background)

@@ -38,6 +38,7 @@ class Leg:
 
     @property
     def length(self) -> float:
+        """From end to end, mm."""
         return math.dist(self.start, self.end)
 
     @property

@@ -20,6 +20,7 @@ from submissions.criteria.ending import EndPose, Finishes
 
 @judges(Finishes)
 def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
+    """How the program ended and when; a fault of the responder's does not count."""
     recording = trial.recording
     fault = cut(recording)
     measures = (Measure("time", recording.end_t, "s"),)

@@ -38,7 +38,7 @@ def headings(recording: Recording) -> Floats:
 
 
 def positions(recording: Recording, part: Part = "robot") -> Floats:
-    """x and y of a part, mm, shape (n + 1, 2). Where the pen is up, its rows are NaN.
+    """Where a part is: x and y, mm, shape (n + 1, 2). Where the pen is up, its rows are NaN.
 
     Positions that are no numbers are NaN too, so that no comparison with them holds.
     """
@@ -142,6 +142,7 @@ def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool
 
 
 def zone_words(zone: Zone) -> str:
+    """``x from 0 to 100 and y from 20 to 80``, for a sentence."""
     left, bottom, right, top = zone
     return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
 
@@ -185,8 +186,11 @@ _WINDOW = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Along:
-    """For each row from ``first`` on: ``progress`` along the line (mm, growing beyond its length where it is closed)
-    and ``offset`` from it (mm, to the left of its direction above 0)."""
+    """Where each row from ``first`` on is with regard to a line.
+
+    ``progress`` is along the line (mm, growing beyond its length where it is closed), ``offset`` from it (mm, to the
+    left of its direction above 0).
+    """
 
     first: int
     progress: Floats

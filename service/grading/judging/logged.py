@@ -29,6 +29,7 @@ Check = tuple[Fraction, str]  # the part of it that was reached, and what to say
 
 @judges(Datalog)
 def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
+    """The samples of one series of the datalog; if so asked only those that a sensor read."""
     recording = trial.recording
     name = criterion.series
     logged = [datum for datum in recording.datalog if datum.name == name]
@@ -62,6 +63,7 @@ def _there(count: int) -> str:
 
 @judges(ImageLog)
 def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
+    """How many images of each light sensor were logged, in what order, and what those at the start show."""
     recording = trial.recording
     log = recording.image_log
     checks: list[tuple[bool, str]] = []

@@ -41,6 +41,7 @@ class Move:
 
     @property
     def distance(self) -> float:
+        """From where the move began straight to where it ended, mm."""
         return math.hypot(self.forward, self.sideways)
 
     def __str__(self) -> str:

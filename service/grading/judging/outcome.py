@@ -34,6 +34,7 @@ def passed(
     measures: tuple[Measure, ...] = (),
     for_staff: str = "",
 ) -> Outcome:
+    """An outcome with the whole score."""
     return Outcome(True, Fraction(1), message, t, pose, measures, for_staff)
 
 

@@ -81,6 +81,7 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
 
 @judges(StaysInside)
 def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
+    """The first place outside all areas fails it; the score is the share of the path before that."""
     recording = trial.recording
     points = _driven(recording, criterion.of)
     if points is None:
@@ -140,6 +141,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
 
 @judges(TouchesNothing)
 def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
+    """What the body touched; the first touch that is not forgiven fails it."""
     recording = trial.recording
     touches = recording.touches
     measures = (Measure("touches", len(touches)),)

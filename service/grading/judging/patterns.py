@@ -33,6 +33,7 @@ class Sample:
 
     @property
     def right(self) -> bool:
+        """Whether it was taken for what it shows."""
         return self.answer == self.truth
 
 

@@ -24,10 +24,12 @@ class ClassScore:
 
     @property
     def precision(self) -> float | None:
+        """The part of the images taken for this class that show it, 0 to 1."""
         return self.right / self.answered if self.answered else None
 
     @property
     def recall(self) -> float | None:
+        """The part of the images showing this class that were taken for it, 0 to 1."""
         return self.right / self.shown if self.shown else None
 
 

@@ -105,6 +105,7 @@ _CORNER = 30.0
 
 @judges(Circuits)
 def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
+    """How many times the path goes round a point, and which way; parts of a round count."""
     recording = trial.recording
     round_it = rounds(positions(recording, criterion.of), criterion.x, criterion.y)
     times = float(abs(round_it[-1])) if len(round_it) else 0.0

@@ -108,6 +108,7 @@ class Classified:
 
     @property
     def right(self) -> int:
+        """How many samples were named rightly."""
         return sum(sample.right for sample in self.samples)
 
 

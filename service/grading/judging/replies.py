@@ -22,6 +22,7 @@ from submissions.criteria.replies import Replies
 
 @judges(Replies)
 def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
+    """Each text that is expected, or each different question that arrived, and what it was answered."""
     recording = trial.recording
     asked = [
         (index, message)

@@ -24,6 +24,7 @@ _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answe
 
 @judges(Reports)
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
+    """The figures and words that belong to the trial's pose, looked for in order in what was told."""
     wanted = _expected_entries(criterion, trial)
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
@@ -174,6 +175,7 @@ _SPEECH_ROUNDING = 0.011  # a waiting program looks every 10 ms
 
 @judges(WordSequence)
 def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
+    """Words one after the other in what was said or printed; of several beginnings the best counts."""
     recording = trial.recording
     lines = recording.spoken if criterion.source == "speech" else recording.printed
     verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")

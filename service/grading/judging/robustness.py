@@ -21,6 +21,8 @@ _MOST_LEVELS_TOLD = 12
 
 @judges_case(Robustness)
 def judge_robustness(criterion: Robustness, case: Case) -> CriterionResult:
+    """The curve of accuracy along the swept condition, and the marks for it."""
+
     def judged(trials: Indexed) -> CriterionResult:
         levels = levels_along(criterion.along, dict(trials))
         swept = {index: trial for index, trial in trials if index in levels}

@@ -24,6 +24,7 @@ _MM = 0.01  # less than this in a tick is no movement
 
 @judges(StopOn)
 def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
+    """What the light sensor saw where the robot stopped; of two sensors the better one counts."""
     recording = trial.recording
     fault = cut(recording)
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:

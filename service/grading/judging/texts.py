@@ -41,11 +41,13 @@ _RECEIVE = Deed("the robot", "receive", "received")
 
 @judges(Prints)
 def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
+    """What the program printed, call by call."""
     return judge_sequence(criterion, trial.recording.printed, _PRINT, trial.recording)
 
 
 @judges(Says)
 def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
+    """What the robot said, in order."""
     return judge_sequence(criterion, trial.recording.spoken, _SAY, trial.recording)
 
 
@@ -104,6 +106,7 @@ def conditions(criterion: TextConditions) -> str:
 
 
 def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
+    """Whether two texts are the same but for blanks at their ends, runs of blanks and, if so asked, case."""
     return _plain(text, ignore_case) == _plain(wanted, ignore_case)
 
 

@@ -23,6 +23,7 @@ _STILL = 1e-6  # mm or degrees a tick
 
 @judges(Timing)
 def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
+    """How long it took, simulated seconds; the bounds are allowed."""
     recording = trial.recording
     seconds, what = _seconds(criterion, recording)
     least, most = criterion.between
@@ -39,6 +40,7 @@ def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
 
 @judges_case(Ranking)
 def judge_ranking(criterion: Ranking, case: Case) -> CriterionResult:
+    """The figure that another criterion measured in each trial, and the share of the marks for it."""
     other = case.results.get(criterion.of)
     return by_trial(criterion, case, lambda index, _: _ranked(criterion, index, other))
 

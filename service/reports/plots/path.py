@@ -63,10 +63,12 @@ class View:
 
     @property
     def width(self) -> float:
+        """From the left edge to the right, mm."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
+        """From the bottom edge to the top, mm."""
         return self.top - self.bottom
 
 

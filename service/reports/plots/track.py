@@ -1,5 +1,4 @@
-"""Draws recognition along a track: where each image was taken on the floor and whether it was named rightly, and the
-share that was right along the way.
+"""Draws recognition along a track: where images were taken, which were named rightly, what share.
 
 What is right was decided when the work was marked; the floor is an image that the caller gives.
 """
