@@ -27,7 +27,15 @@ demo: setup
 test: setup lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long"
 
-# What needs no worker, no sandbox and no second process: under a minute.
+# What needs no worker and little of the sandbox: under a minute.
+FAST := tests/models/test_model_plots.py tests/responders/test_bridge.py tests/responders/test_conversation.py \
+	tests/responders/test_kit.py tests/responders/test_wire.py tests/service/grading/test_judging*.py \
+	tests/service/grading/test_recognition.py tests/service/reports/test_report_html.py \
+	tests/service/reports/test_report_outputs.py tests/service/store/test_store_batches.py \
+	tests/service/store/test_store_recordings.py tests/service/store/test_store_times.py tests/sim/test_backgrounds.py \
+	tests/sim/test_brick.py tests/sim/test_original_simulator.py tests/submissions/test_assignment_file.py \
+	tests/submissions/test_bundle.py tests/submissions/test_criteria_tables.py tests/submissions/test_magic_flags.py
+
 test-fast: setup
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long" $(FAST)
 

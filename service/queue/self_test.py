@@ -36,7 +36,7 @@ _ANSWER = FOLDER / "answer.json"
 _CUT = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
 
 
-class Answer(Enum):
+class SelfTestAnswer(Enum):
     """What came of a look."""
 
     RIGHT = "right"
@@ -109,7 +109,7 @@ class Watch:
                 self._look()
             yield
 
-    def look(self) -> Answer:
+    def look(self) -> SelfTestAnswer:
         """Grade the known answer now, and write down what came of it."""
         with self._lock:
             return self._look()
@@ -132,22 +132,22 @@ class Watch:
                 if not self._ended.is_set() and time.monotonic() >= self._next:
                     self._look()
 
-    def _look(self) -> Answer:
+    def _look(self) -> SelfTestAnswer:
         self._next = time.monotonic() + self._every
         try:
             actual = ask(self._runner)
             if actual is None:
                 _log.warning("self_test.unclear", reason="it was cut by a limit of this machine")
-                return Answer.UNCLEAR
+                return SelfTestAnswer.UNCLEAR
             wrong = difference(known(), actual)
             if not wrong:
                 self_tests.answered_rightly(self._store, self._worker, os.getpid())
-                return Answer.RIGHT
+                return SelfTestAnswer.RIGHT
             spoilt = self_tests.quarantine(self._store, self._worker, wrong)
         except Exception:
             # Trouble with the machine or the database shows in the jobs themselves.
             _log.exception("self_test.unclear")
-            return Answer.UNCLEAR
+            return SelfTestAnswer.UNCLEAR
         _log.error(
             "worker.quarantined",
             worker=self._worker,
@@ -156,7 +156,7 @@ class Watch:
             graded_again=len(spoilt.again),
             taken_back=spoilt.taken_back,
         )
-        return Answer.WRONG
+        return SelfTestAnswer.WRONG
 
 
 @cache

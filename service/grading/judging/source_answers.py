@@ -17,7 +17,7 @@ _UNREADABLE = "it cannot be read"
 
 
 @dataclass(frozen=True, slots=True)
-class SourcePlace:
+class MentionPlace:
     """A file beside the part, or a cell of a notebook (empty: the part itself), and a line."""
 
     file: str
@@ -35,11 +35,11 @@ class SourceAnswers:
     can do more than their text shows.
     """
 
-    uses: tuple[SourcePlace | None, ...] = ()
-    avoids: tuple[SourcePlace | None, ...] = ()
-    in_loop: tuple[SourcePlace | None, ...] = ()
-    defines: tuple[SourcePlace | None, ...] = ()
-    speech: tuple[SourcePlace | None, ...] = ()
+    uses: tuple[MentionPlace | None, ...] = ()
+    avoids: tuple[MentionPlace | None, ...] = ()
+    in_loop: tuple[MentionPlace | None, ...] = ()
+    defines: tuple[MentionPlace | None, ...] = ()
+    speech: tuple[MentionPlace | None, ...] = ()
     doubts: tuple[str, ...] = ()
     error: str = ""
     unread: str = ""
@@ -65,10 +65,10 @@ class SourceAnswers:
         return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(why)[:200]}" if name else "")
 
 
-def _places(told: Any, rules: Sequence[str]) -> tuple[SourcePlace | None, ...]:
+def _places(told: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
     """Raises one of Python's errors for what is no answer to each of the rules."""
     return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
 
 
-def _place(file: Any, line: Any) -> SourcePlace:
-    return SourcePlace(str(file)[:60], int(line))
+def _place(file: Any, line: Any) -> MentionPlace:
+    return MentionPlace(str(file)[:60], int(line))

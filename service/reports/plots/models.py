@@ -12,13 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from models.cards import Curve as Counted
-from models.cards import Tally
+from models.cards import Tally, TestedCurve
 from models.evaluation import Answered, Evaluation
 from models.preprocessing import Grey
 from service.reports.plots.confusion import ConfusionTable, draw_table
-from service.reports.plots.curve import AccuracyPanel, draw_curves
-from service.reports.plots.curve import Curve as DrawnCurve
+from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -78,10 +76,10 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
     )
 
 
-def _curve(counted: Counted) -> DrawnCurve:
+def _curve(counted: TestedCurve) -> Curve:
     intervals = [tally.interval for tally in counted.tallies]
     counts = {tally.n for tally in counted.tallies}
-    return DrawnCurve(
+    return Curve(
         label=f"{counted.under}, n = {counts.pop()}" if len(counts) == 1 else counted.under,
         x=counted.values,
         share=tuple(tally.share for tally in counted.tallies),

@@ -53,7 +53,7 @@ _DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Viewport:
     """The part of the world that is drawn, mm."""
 
     left: float
@@ -127,31 +127,31 @@ def _points(recording: Recording) -> NDArray[np.float64]:
     return rows[np.isfinite(rows).all(axis=1)]
 
 
-def _view(recording: Recording, points: NDArray[np.float64]) -> View:
+def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
     reach = robot_of(recording).reach
     low_x, low_y = (float(value) for value in points[:, :2].min(axis=0))
     high_x, high_y = (float(value) for value in points[:, :2].max(axis=0))
     margin = max(_MARGIN, reach + 15)
-    view = View(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
+    view = Viewport(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
     if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
-        view = View(
+        view = Viewport(
             min(0.0, low_x - 60), min(0.0, low_y - 60), max(FLOOR_WIDTH, high_x + 60), max(FLOOR_HEIGHT, high_y + 60)
         )
     left, right = max(view.left, -_BEYOND), min(view.right, FLOOR_WIDTH + _BEYOND)
     bottom, top = max(view.bottom, -_BEYOND), min(view.top, FLOOR_HEIGHT + _BEYOND)
-    return _shaped(View(left, bottom, right, top))
+    return _shaped(Viewport(left, bottom, right, top))
 
 
-def _shaped(view: View) -> View:
+def _shaped(view: Viewport) -> Viewport:
     """``view`` widened to a shape between square and the floor's own."""
     width, height = max(view.width, _SMALLEST_VIEW), max(view.height, _SMALLEST_VIEW / 1.6)
     width = max(width, height * 1.1)
     height = max(height, width * FLOOR_HEIGHT / FLOOR_WIDTH)
     x, y = (view.left + view.right) / 2, (view.bottom + view.top) / 2
-    return View(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+    return Viewport(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def draw_floor(axes: Axes, floor: Pixels | None, view: View) -> None:
+def draw_floor(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
     """The part of the floor that is in ``view``, lifted towards white; without a floor a white one."""
     if floor is None:
         axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
@@ -303,7 +303,7 @@ def _tag(axes: Axes, x: float, y: float, text: str, size: float) -> None:
     )  # fmt: skip
 
 
-def _goes_on(points: NDArray[np.float64], view: View) -> bool:
+def _goes_on(points: NDArray[np.float64], view: Viewport) -> bool:
     x, y = points[:, 0], points[:, 1]
     return bool(((x < view.left) | (x > view.right) | (y < view.bottom) | (y > view.top)).any())
 
@@ -312,7 +312,7 @@ def _columns(located: bool) -> int:
     return 2 if located else 3
 
 
-def _legend(recording: Recording, view: View) -> list[Artist]:
+def _legend(recording: Recording, view: Viewport) -> list[Artist]:
     """A handle for every kind of thing that is in the image."""
     handles: list[Artist] = [
         Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
@@ -339,7 +339,7 @@ def _legend(recording: Recording, view: View) -> list[Artist]:
     return handles
 
 
-def _draw_locator(figure: Figure, floor: Pixels | None, view: View) -> None:
+def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
     width = 1.12
     height = width * FLOOR_HEIGHT / FLOOR_WIDTH
     axes = axes_at(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)

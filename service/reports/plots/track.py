@@ -17,7 +17,7 @@ from models.intervals import wilson
 from service.grading.grade import Prediction, TrialResult
 from service.grading.judging.geometry import part_at
 from service.reports.plots.curve import Curve, draw_curve
-from service.reports.plots.path import Pixels, View, draw_floor
+from service.reports.plots.path import Pixels, Viewport, draw_floor
 from service.reports.plots.predictions import is_right
 from service.reports.plots.style import (
     FAINT,
@@ -196,7 +196,7 @@ def _way_driven(recording: Recording) -> list[float]:
     return way
 
 
-def _view(images: Sequence[Taken]) -> View:
+def _view(images: Sequence[Taken]) -> Viewport:
     xs, ys = [item.x for item in images], [item.y for item in images]
     left, right, bottom, top = min(xs) - _MARGIN, max(xs) + _MARGIN, min(ys) - _MARGIN, max(ys) + _MARGIN
     width, height = right - left, top - bottom
@@ -206,4 +206,4 @@ def _view(images: Sequence[Taken]) -> View:
     if width < 0.9 * height:
         middle, width = (left + right) / 2, 0.9 * height
         left, right = middle - width / 2, middle + width / 2
-    return View(left, bottom, right, top)
+    return Viewport(left, bottom, right, top)

@@ -27,7 +27,7 @@ from service.queue import self_test as known_answers
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
-from service.queue.self_test import Answer, Watch
+from service.queue.self_test import SelfTestAnswer, Watch
 from service.queue.worker import QUARANTINED
 from service.settings import Settings
 from service.store import audit, intake, jobs, results, self_tests, workers
@@ -66,12 +66,12 @@ def test_this_machine_gives_the_known_answer(runner: TrialRunner) -> None:
 
 def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     watch = Watch(store, runner, "machine-1", 3600)
-    assert watch.look() is Answer.RIGHT
+    assert watch.look() is SelfTestAnswer.RIGHT
     monkeypatch.setattr(sim.robot, "ACCELERATION", 5100.0)
     _take(store, "ada")
     with watch.busy():
         assert jobs.claim(store, "machine-1", 60) is not None
-    assert watch.look() is Answer.WRONG
+    assert watch.look() is SelfTestAnswer.WRONG
     with store.reading() as session:
         (shut_out,) = workers.in_quarantine(session)
         assert shut_out.worker == "machine-1"
@@ -85,7 +85,7 @@ def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
             raise OSError("no more processes")
 
     with Broken() as broken:
-        assert Watch(store, broken, "machine-1", 3600).look() is Answer.UNCLEAR
+        assert Watch(store, broken, "machine-1", 3600).look() is SelfTestAnswer.UNCLEAR
     with store.reading() as session:
         assert workers.in_quarantine(session) == []
 

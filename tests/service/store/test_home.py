@@ -227,7 +227,8 @@ def test_a_home_may_be_a_link_of_its_own_user(tmp_path: Path) -> None:
 def test_what_is_not_robomarks_keeps_its_mode_behind_the_closed_door(tmp_path: Path) -> None:
     home = tmp_path / "home"
     (home / "bin").mkdir(parents=True)
-    (home / "bin" / "tool").touch(0o755)
+    (home / "bin" / "tool").touch()
+    (home / "bin" / "tool").chmod(0o755)
     open_home(home)
     assert _mode(home / "bin" / "tool") == 0o755
     assert _mode(home) == 0o700
