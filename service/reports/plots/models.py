@@ -63,7 +63,7 @@ def in_words(tally: Tally) -> str:
 
 def draw_robustness(evaluation: Evaluation) -> Figure:
     """One panel for each condition that was varied."""
-    panels: dict[str, list[Counted]] = {}
+    panels: dict[str, list[TestedCurve]] = {}
     for curve in evaluation.measured.curves:
         panels.setdefault(curve.varied, []).append(curve)
     return draw_curves(
