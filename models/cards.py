@@ -38,7 +38,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class TestedCurve:
+class CardCurve:
     """Tallies while one condition is varied and the rest stays as ``under`` says."""
 
     varied: str
@@ -54,13 +54,13 @@ class Measured:
 
     accuracy: Tally  # of everything in the confusion
     confusion: Confusion  # rows are the truth, columns what was answered
-    curves: tuple[TestedCurve, ...]
+    curves: tuple[CardCurve, ...]
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Measured:
         """From what ``asdict`` and JSON have made of one."""
         curves = tuple(
-            TestedCurve(
+            CardCurve(
                 curve["varied"],
                 curve["unit"],
                 curve["under"],

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import networks
-from models.cards import Card, Measured, Tally, TestedCurve, card, weights_bytes
+from models.cards import Card, CardCurve, Measured, Tally, card, weights_bytes
 from models.images import LabelledPose, Photographer, Shift
 from models.preprocessing import Grey, features
 from models.tasks import Task, tasks
@@ -85,7 +85,7 @@ def _accuracy(task: Task, network: Network, photographer: Photographer) -> Itera
             yield Answered(place, noise, grey, int(answer))
 
 
-def _curves(task: Task, network: Network, photographer: Photographer) -> Iterator[TestedCurve]:
+def _curves(task: Task, network: Network, photographer: Photographer) -> Iterator[CardCurve]:
     words = ("light noise", "grey levels either way", "on the spot")
     yield _curve(task, network, photographer, words, _LIGHT_NOISES, Shift(), "noise")
     sweeps: tuple[tuple[str, str, tuple[float, ...], Axis], ...] = (
@@ -107,7 +107,7 @@ def _curve(
     values: Sequence[float],
     rest: Shift,
     axis: Axis,
-) -> TestedCurve:
+) -> CardCurve:
     test = task.test()
     tallies = []
     for value in values:
@@ -115,4 +115,4 @@ def _curve(
         answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
         right = sum(place.label == answer for (place, _), answer in zip(found, answers, strict=True))
         tallies.append(Tally(int(right), len(found)))
-    return TestedCurve(*words, tuple(float(value) for value in values), tuple(tallies))
+    return CardCurve(*words, tuple(float(value) for value in values), tuple(tallies))

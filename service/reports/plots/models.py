@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from models.cards import Tally, TestedCurve
+from models.cards import CardCurve, Tally
 from models.evaluation import Answered, Evaluation
 from models.preprocessing import Grey
 from service.reports.plots.confusion import ConfusionTable, draw_table
@@ -63,7 +63,7 @@ def in_words(tally: Tally) -> str:
 
 def draw_robustness(evaluation: Evaluation) -> Figure:
     """One panel for each condition that was varied."""
-    panels: dict[str, list[TestedCurve]] = {}
+    panels: dict[str, list[CardCurve]] = {}
     for curve in evaluation.measured.curves:
         panels.setdefault(curve.varied, []).append(curve)
     return draw_curves(
@@ -76,7 +76,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
     )
 
 
-def _curve(counted: TestedCurve) -> Curve:
+def _curve(counted: CardCurve) -> Curve:
     intervals = [tally.interval for tally in counted.tallies]
     counts = {tally.n for tally in counted.tallies}
     return Curve(
