@@ -209,7 +209,9 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         batch = service.submit(_spinning(1))
         job = service.until_running(batch)
         assert services.worker_pid is not None
-        busy = [pid for pid in _pool_children(services.worker_pid) if _has_student(pid)]
+        worker = services.worker_pid
+        # A job runs for a while before the student does.
+        busy = until(lambda: [pid for pid in _pool_children(worker) if _has_student(pid)])
         for pid in busy:
             os.kill(pid, signal.SIGSTOP)
         _until(lambda: next((found for found in service.jobs(batch) if found.attempt == 2), None))
