@@ -1,4 +1,4 @@
-"""The plain Python of a notebook as one file, so that its functions can be called without playing it.
+"""The plain Python of a notebook as one file, so that its functions can be called without executing it.
 
 Robot programs and magics are left out; playing a notebook with them is the responders' business.
 """

@@ -81,11 +81,6 @@ class JobMeter:
                 f"all trials together said more than {self._limits.kept_bytes >> 20} MB, counting messages and images",
             )
 
-    @property
-    def left_bytes(self) -> int:
-        """How many bytes may still be kept, 0 when all are spent."""
-        return max(0, self._limits.kept_bytes - self._kept)
-
     def check_cpu(self, running: float) -> None:
         """``running`` is what a child has used so far that is still there. Raises ChildStopped."""
         if self._cpu + running > self._limits.cpu_seconds:

@@ -46,11 +46,6 @@ class EmbeddedServices:
         """The process id of the worker that was started here."""
         return self._worker.process.pid
 
-    @property
-    def broker_pid(self) -> int | None:
-        """The process id of the broker that was started here."""
-        return self._broker.pid
-
     def __enter__(self) -> Self:
         try:
             release_dead_workers(self.settings, self._store)

@@ -40,11 +40,6 @@ class Kept:
     recording: Recording
     data: bytes
 
-    @property
-    def has_images(self) -> bool:
-        """Whether at least one image was kept."""
-        return bool(self.recording.images)
-
 
 def cap_for(trials: int) -> int:
     """Bytes that each of a grade's recordings may take."""
