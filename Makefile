@@ -27,7 +27,7 @@ demo: setup
 test: setup lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long"
 
-# What needs no worker and little of the sandbox: under a minute.
+# The quick third, which needs no worker: under a minute.
 FAST := tests/models/test_model_plots.py tests/responders/test_bridge.py tests/responders/test_conversation.py \
 	tests/responders/test_kit.py tests/responders/test_wire.py tests/service/grading/test_judging*.py \
 	tests/service/grading/test_recognition.py tests/service/reports/test_report_html.py \

@@ -214,12 +214,12 @@ def put_a_sitecustomize_into_the_packages():
 
 @attack(UNTRIED)
 def put_compiled_code_into_the_packages():
-    return _create(os.path.join(sysconfig.get_path("purelib"), "robomark_self_test.pyc"))
+    return _create(os.path.join(sysconfig.get_path("purelib"), "robomark_decoy.pyc"))
 
 
 @attack(UNTRIED)
 def put_a_path_file_into_the_packages():
-    return _create(os.path.join(sysconfig.get_path("purelib"), "robomark_self_test.pth"))
+    return _create(os.path.join(sysconfig.get_path("purelib"), "robomark_decoy.pth"))
 
 
 @attack(LANDLOCK)

@@ -233,7 +233,7 @@ globals().update(
             perf_event_open=(bytes(128), 0, -1, -1, 0),
             init_module=(b"", 0, b""),
             finit_module=(0, b"", 0),
-            delete_module=(b"robomark_self_test", 0),
+            delete_module=(b"robomark_decoy", 0),
             kexec_load=(0, 0, 0, 0),
             iopl=(3,),
             ioperm=(0, 1, 1),
