@@ -17,7 +17,7 @@ from databases import fresh_database
 from fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
 from postgresql_server import PostgresqlServer
 from service.store.engine import open_store
-from service.store.models import JobState
+from service.store.states import JobState
 
 _SUBMISSIONS = 1000
 _WORKERS = 2

@@ -28,7 +28,8 @@ from service.settings import load_settings
 from service.store import batches, intake
 from service.store.engine import Store, open_store
 from service.store.metrics import quantile
-from service.store.models import Job, JobState, Lane
+from service.store.models import Job
+from service.store.states import JobState, Lane
 from submissions.assignment.reader import find_assignment
 from submissions.submission import Submission
 

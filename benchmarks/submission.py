@@ -14,7 +14,8 @@ from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store import intake
 from service.store.engine import Store, open_store
-from service.store.models import Job, JobState, Lane, PlotState
+from service.store.models import Job
+from service.store.states import JobState, Lane, PlotState
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission

@@ -17,7 +17,7 @@ from service.reports.written import file_stems, write_page
 from service.store import intake, plots, policies, results
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.models import JobState, PlotState
+from service.store.states import JobState, PlotState
 from sim.recording import Verdict
 
 _INDEX = "index.html"

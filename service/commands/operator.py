@@ -29,7 +29,7 @@ from service.store import batches, results
 from service.store.batches import JobLine
 from service.store.engine import open_engine, open_store
 from service.store.migrate import current_revision, newest_revision
-from service.store.models import JobState
+from service.store.states import JobState
 from sim.errors import HostError, UsageError
 
 database_app = typer.Typer(help="Look after the database.", no_args_is_help=True)

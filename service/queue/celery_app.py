@@ -9,7 +9,7 @@ from celery import Celery
 from kombu import Exchange, Queue
 
 from service.settings import Settings
-from service.store.models import Lane
+from service.store.states import Lane
 
 PLOTS = "plots"
 #: In the order in which a worker empties them.

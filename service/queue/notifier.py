@@ -20,7 +20,7 @@ from service.store import plots
 from service.store.engine import Store
 from service.store.jobs import Retry
 from service.store.lease_reaper import forget_notices, note_notices, requeue_lost, wanting_notices
-from service.store.models import Lane
+from service.store.states import Lane
 
 _log = structlog.get_logger(__name__)
 #: What a broker that is not there can raise.

@@ -12,7 +12,8 @@ from sqlalchemy.orm import Session, aliased
 
 from service.store import audit, jobs
 from service.store.engine import Store, now
-from service.store.models import Batch, BatchState, Job, JobState, SubmissionRow
+from service.store.models import Batch, Job, SubmissionRow
+from service.store.states import BatchState, JobState
 from sim.errors import UsageError
 
 #: Who it is said to be where nobody was named.

@@ -9,20 +9,8 @@ from decimal import Decimal
 from sqlalchemy import ColumnElement, Row, Select, func, select
 from sqlalchemy.orm import Session
 
-from service.store.models import (
-    UNFINISHED,
-    AssignmentVersion,
-    Batch,
-    BatchState,
-    CriterionResultRow,
-    Enrolment,
-    Job,
-    JobState,
-    PlotState,
-    Standing,
-    SubmissionRow,
-    TrialRow,
-)
+from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
 from sim.errors import UsageError
 
 

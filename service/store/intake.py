@@ -17,18 +17,9 @@ from service.store import jobs, result_cache
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
-from service.store.models import (
-    AssignmentVersion,
-    Batch,
-    BatchState,
-    Course,
-    Job,
-    JobState,
-    Lane,
-    Standing,
-    SubmissionRow,
-)
+from service.store.models import AssignmentVersion, Batch, Course, Job, SubmissionRow
 from service.store.policies import Ruling, rule
+from service.store.states import BatchState, JobState, Lane, Standing
 from service.store.students import Students
 from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
 from service.version import grader_sha256

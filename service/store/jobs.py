@@ -20,8 +20,9 @@ from service.store import phases, plots, result_cache, results, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
-from service.store.models import Job, JobState, PlotState
+from service.store.models import Job
 from service.store.scheduling import next_job
+from service.store.states import JobState, PlotState
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
 

@@ -15,8 +15,9 @@ from sqlalchemy.orm import Session
 from service.store import jobs
 from service.store.engine import Store, now
 from service.store.jobs import Claim, Retry
-from service.store.models import Job, JobState, Lane
+from service.store.models import Job
 from service.store.scheduling import claimable
+from service.store.states import JobState, Lane
 
 #: Databases bound how many values one statement may carry.
 _AT_ONCE = 500

@@ -14,19 +14,9 @@ from sqlalchemy.orm import Session
 
 from service.store import phases, workers
 from service.store.engine import now
-from service.store.models import (
-    UNFINISHED,
-    Batch,
-    BatchState,
-    CriterionResultRow,
-    Job,
-    JobState,
-    Lane,
-    PlotState,
-    TrialRow,
-    Worker,
-)
+from service.store.models import Batch, CriterionResultRow, Job, TrialRow, Worker
 from service.store.scheduling import claimable
+from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotState
 
 #: Times are told of the jobs that ended in this time, the newest of them.
 TIMES_OVER = timedelta(hours=1)

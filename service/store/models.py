@@ -18,58 +18,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import new_id
-
-
-class Role(StrEnum):
-    """What somebody is in a course."""
-
-    STUDENT = "student"
-    STAFF = "staff"
-
-
-class Lane(StrEnum):
-    """Who waits for the job: a person now, or a batch."""
-
-    INTERACTIVE = "interactive"
-    BATCH = "batch"
-
-
-class JobState(StrEnum):
-    """How far a job has come on its way to a grade."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    DONE = "done"  # has a grade
-    DEAD = "dead"  # could not be graded; ``error`` says why
-    CANCELLED = "cancelled"  # by somebody, or because a newer submission came; ``error`` says which
-
-
-UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
-
-
-class PlotState(StrEnum):
-    """Plots come after the marks and never change them."""
-
-    NONE = "none"
-    DUE = "due"
-    DONE = "done"
-    FAILED = "failed"
-
-
-class BatchState(StrEnum):
-    """What a claim looks at; how far a batch is follows from its jobs."""
-
-    OPEN = "open"
-    PAUSED = "paused"  # what runs goes on, what waits is not begun
-    CANCELLED = "cancelled"
-
-
-class Standing(StrEnum):
-    """What a job's grade is to its submission. Of one submission at most one grade stands."""
-
-    STANDS = "stands"  # the one that reports and exports show
-    PROPOSED = "proposed"  # of a regrade, until it is published
-    KEPT = "kept"  # another took its place
+from service.store.states import BatchState, JobState, Lane, PlotState, Role, Standing
 
 
 def _enum(kind: type[StrEnum]) -> Enum:

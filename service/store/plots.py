@@ -13,7 +13,8 @@ from sqlalchemy.orm import Session
 
 from service.store import artifacts, phases
 from service.store.engine import Store, now
-from service.store.models import Job, PlotState
+from service.store.models import Job
+from service.store.states import PlotState
 
 ATTEMPTS = 3
 _PREFIX, _SUFFIX = "plot-", ".png"

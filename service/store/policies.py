@@ -13,7 +13,8 @@ from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.models import Enrolment, Extension, Job, JobState, Policy, SubmissionRow
+from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRow
+from service.store.states import JobState
 from sim.recording import Verdict
 
 _ALWAYS = frozenset({"visible"})

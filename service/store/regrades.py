@@ -15,19 +15,8 @@ from sqlalchemy.orm import Session, aliased
 from service.store import audit
 from service.store.engine import Store, now
 from service.store.jobs import enqueue
-from service.store.models import (
-    UNFINISHED,
-    AssignmentVersion,
-    Batch,
-    CriterionResultRow,
-    Enrolment,
-    Job,
-    JobState,
-    Lane,
-    Standing,
-    SubmissionRow,
-    TrialRow,
-)
+from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.states import UNFINISHED, JobState, Lane, Standing
 from service.store.versions import freeze, keep
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment

@@ -13,17 +13,8 @@ from sqlalchemy import exists, insert, literal, select
 from sqlalchemy.orm import Session
 
 from service.store import phases
-from service.store.models import (
-    Artifact,
-    AssignmentVersion,
-    CriterionResultRow,
-    Job,
-    JobState,
-    PlotState,
-    SubmissionRow,
-    TrialRow,
-    Worker,
-)
+from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
+from service.store.states import JobState, PlotState
 from sim.recording import Verdict
 from submissions.bundle import unpack_submission
 

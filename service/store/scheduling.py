@@ -10,7 +10,8 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, Subquery, and_, case, func, not_, or_, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from service.store.models import Batch, BatchState, Job, JobState, Lane
+from service.store.models import Batch, Job
+from service.store.states import BatchState, JobState, Lane
 from service.store.workers import another_lives
 
 #: Shares are counted over the jobs begun in this time, so that nobody who was served long ago waits for it.

@@ -15,7 +15,8 @@ from sqlalchemy.orm import Session
 
 from service.store import audit, jobs
 from service.store.engine import Store, now
-from service.store.models import Batch, BatchState, Job, JobState, Lane, SelfTest, Standing, Worker
+from service.store.models import Batch, Job, SelfTest, Worker
+from service.store.states import BatchState, JobState, Lane, Standing
 from service.version import GRADER_VERSION, grader_sha256
 
 _FORGOTTEN = timedelta(days=30)

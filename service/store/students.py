@@ -11,7 +11,8 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.models import Enrolment, Person, Role
+from service.store.models import Enrolment, Person
+from service.store.states import Role
 from sim.errors import UsageError
 from submissions.names import cannot_be_told, forms, shown_name
 from submissions.raw_files import shown

@@ -13,7 +13,7 @@ from prometheus_client.registry import Collector
 
 from service.store.engine import Store
 from service.store.metrics import ServiceMetrics, collect, quantile
-from service.store.models import JobState, Lane, PlotState
+from service.store.states import JobState, Lane, PlotState
 from service.version import GRADER_VERSION
 
 _QUANTILES = (0.5, 0.95, 0.99)

@@ -14,7 +14,7 @@ from service.settings import Settings
 from service.store import recordings
 from service.store.engine import Store, open_store
 from service.store.intake import Accepted, accept
-from service.store.models import Lane
+from service.store.states import Lane
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment

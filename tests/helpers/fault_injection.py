@@ -41,7 +41,8 @@ from service.queue.worker import new_worker_name
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.intake import accept_batch, load_grading_request
-from service.store.models import UNFINISHED, CriterionResultRow, Heartbeat, Job, JobState, Lane, TrialRow
+from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
+from service.store.states import UNFINISHED, JobState, Lane
 from sim.errors import HostError
 from submissions.grading_request import GradingRequest
 

@@ -17,7 +17,8 @@ from command import robomark
 from service.reports.written import file_stem, file_stems
 from service.store import intake
 from service.store.engine import Store, now
-from service.store.models import Enrolment, Person, Role
+from service.store.models import Enrolment, Person
+from service.store.states import Role
 from service.store.students import Students
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch

@@ -28,7 +28,7 @@ from service.settings import Settings, load_settings
 from service.store import audit, batches, intake, metrics, regrades
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
-from service.store.models import JobState, Lane
+from service.store.states import JobState, Lane
 from sim.errors import Cancelled, HostError, UsageError
 from submissions.batch_folder import BatchContents, read_batch
 

@@ -18,7 +18,7 @@ from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import batches
 from service.store.engine import Store
-from service.store.models import BatchState, Lane
+from service.store.states import BatchState, Lane
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from service.settings import load_settings
 from service.store import batches, regrades, results
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
-from service.store.models import JobState
+from service.store.states import JobState
 from sim.errors import UsageError
 
 

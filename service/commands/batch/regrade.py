@@ -19,8 +19,8 @@ from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store import audit, batches, regrades
 from service.store.engine import Store, open_store
-from service.store.models import JobState, Lane
 from service.store.regrades import Regraded
+from service.store.states import JobState, Lane
 from sim.errors import HostError
 from submissions.assignment.reader import find_assignment
 

@@ -12,9 +12,9 @@ from rich.text import Text
 
 from service.store.audit import AuditEntry
 from service.store.batches import BatchLine, JobLine
-from service.store.models import BatchState, JobState, Standing
 from service.store.policies import in_days
 from service.store.regrades import Change, CriterionChange
+from service.store.states import BatchState, JobState, Standing
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}

@@ -26,7 +26,8 @@ from sqlalchemy import select
 from service.queue.notifier import Notifier
 from service.store import batches
 from service.store.engine import Store
-from service.store.models import Batch, BatchState
+from service.store.models import Batch
+from service.store.states import BatchState
 
 _LOOK_SECONDS = 0.25
 _REAP_SECONDS = 2.0

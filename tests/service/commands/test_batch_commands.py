@@ -20,7 +20,8 @@ from sqlalchemy import func, select
 
 from service.settings import Settings
 from service.store.engine import open_store
-from service.store.models import Job, JobState
+from service.store.models import Job
+from service.store.states import JobState
 from submissions.assignment.examples import examples
 
 

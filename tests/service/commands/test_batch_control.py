@@ -25,7 +25,8 @@ from service.reports.written import file_stem
 from service.store import batch_control
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
-from service.store.models import CriterionResultRow, Job, JobState, Lane, TrialRow
+from service.store.models import CriterionResultRow, Job, TrialRow
+from service.store.states import JobState, Lane
 from submissions.assignment.examples import examples
 
 SPIN = "while True:\n    pass\n"

@@ -12,7 +12,7 @@ from databases import fresh_database
 from fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
 from postgresql_server import PostgresqlServer
 from service.store.engine import open_store
-from service.store.models import JobState
+from service.store.states import JobState
 
 
 def _assert_whole(tally: Tally, grading_requests: int) -> None:

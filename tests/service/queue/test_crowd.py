@@ -29,7 +29,8 @@ from service.queue.processes import end_processes
 from service.settings import Settings
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
-from service.store.models import UNFINISHED, Enrolment, Job, JobState, Lane
+from service.store.models import Enrolment, Job
+from service.store.states import UNFINISHED, JobState, Lane
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission

@@ -34,7 +34,8 @@ from service.store import audit, intake, jobs, results, self_tests, workers
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
-from service.store.models import Job, JobState, Lane, Standing
+from service.store.models import Job
+from service.store.states import JobState, Lane, Standing
 from sim.recording import Recording
 
 MOVE = (

@@ -29,7 +29,8 @@ from service.store import artifacts, batch_control, batches, results
 from service.store.engine import Store, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch, load_grading_request
-from service.store.models import CriterionResultRow, Job, JobState, Lane, PlotState, TrialRow
+from service.store.models import CriterionResultRow, Job, TrialRow
+from service.store.states import JobState, Lane, PlotState
 from submissions.assignment.examples import examples
 from submissions.batch_folder import read_batch
 from submissions.grading_request import GradingRequest

@@ -25,7 +25,8 @@ from service.settings import Settings
 from service.store import phases
 from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
-from service.store.models import Job, JobState, PlotState
+from service.store.models import Job
+from service.store.states import JobState, PlotState
 from service.web.listening import listen
 from sim.errors import UsageError
 

@@ -19,7 +19,8 @@ from service.store import batch_control, jobs, results
 from service.store.engine import Store, now
 from service.store.intake import accept_batch
 from service.store.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
-from service.store.models import Job, JobState, SubmissionRow
+from service.store.models import Job, SubmissionRow
+from service.store.states import JobState
 from sim.errors import HostError
 
 WORKER = "worker"

@@ -17,7 +17,8 @@ from service.store import artifacts, batches, jobs, metrics, plots, results, sel
 from service.store.engine import Store
 from service.store.installation import secret_of
 from service.store.intake import Accepted, accept, accept_batch
-from service.store.models import Job, JobState, PlotState, Standing
+from service.store.models import Job
+from service.store.states import JobState, PlotState, Standing
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest
 from submissions.seeds import Secret

@@ -12,7 +12,8 @@ from service.store import batch_control, batches, jobs
 from service.store.engine import Store
 from service.store.intake import accept_batch, accept_new
 from service.store.lease_reaper import wanting_notices
-from service.store.models import Batch, BatchState, Job, JobState, Lane, SubmissionRow
+from service.store.models import Batch, Job, SubmissionRow
+from service.store.states import BatchState, JobState, Lane
 from sim.errors import UsageError
 from submissions.grading_request import GradingRequest
 

@@ -19,18 +19,9 @@ from service.store.engine import Store, open_store
 from service.store.intake import accept_batch
 from service.store.jobs import Claim, Fenced, Retry
 from service.store.lease_reaper import note_notices, requeue_lost, wanting_notices
-from service.store.models import (
-    Batch,
-    BatchState,
-    CriterionResultRow,
-    Job,
-    JobState,
-    Lane,
-    PlotState,
-    SubmissionRow,
-    TrialRow,
-)
+from service.store.models import Batch, CriterionResultRow, Job, SubmissionRow, TrialRow
 from service.store.scheduling import BATCH_EVERY
+from service.store.states import BatchState, JobState, Lane, PlotState
 
 NO_WAIT = Retry(0.0)
 

@@ -18,7 +18,8 @@ from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration, current_revision, newest_revision
-from service.store.models import Artifact, Base, Batch, CriterionResultRow, Job, JobState, Standing, TrialRow
+from service.store.models import Artifact, Base, Batch, CriterionResultRow, Job, TrialRow
+from service.store.states import JobState, Standing
 from sim.errors import HostError
 
 

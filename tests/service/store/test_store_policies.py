@@ -13,8 +13,9 @@ from builders import grading_request
 from service.store import batches, jobs, policies, regrades, results
 from service.store.engine import Store, now
 from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
-from service.store.models import Job, JobState, Lane, SubmissionRow
+from service.store.models import Job, SubmissionRow
 from service.store.policies import PolicyLimits
+from service.store.states import JobState, Lane
 from service.store.students import Students
 from sim.recording import Verdict
 

@@ -17,7 +17,8 @@ from service.grading.grade import Grade
 from service.store import audit, batch_control, batches, jobs, regrades, results
 from service.store.engine import Store
 from service.store.intake import accept_batch, accept_new
-from service.store.models import Batch, Job, JobState, Standing
+from service.store.models import Batch, Job
+from service.store.states import JobState, Standing
 from sim.errors import UsageError
 
 GRADE = report_builders.faulty_grade()

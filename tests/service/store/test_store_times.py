@@ -16,7 +16,8 @@ from service.store import jobs, metrics, phases, plots, results, workers
 from service.store.engine import Store
 from service.store.jobs import Retry
 from service.store.lease_reaper import requeue_lost, wanting_notices
-from service.store.models import Heartbeat, Job, JobState, Lane
+from service.store.models import Heartbeat, Job
+from service.store.states import JobState, Lane
 
 HOUR = timedelta(hours=1)
 NO_WAIT = Retry(0.0)
