@@ -10,14 +10,14 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import AmongMany, Criterion
 from submissions.criteria.places import Range
 
 #: What a series may be a log of.
 Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
 
 
-class Datalog(Criterion):
+class Datalog(AmongMany):
     """A series of the datalog, by its name (``Light_left``), has what it should; all that is given must hold.
 
     ``at_least`` and ``at_most`` count its samples. ``plateaus`` are values that it must keep for

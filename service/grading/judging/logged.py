@@ -10,19 +10,20 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import Side, floor_share, footprint_at, light_of
 from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.readings import were_read
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.floors import Floor
-from sim.recorded import TICKS_PER_SECOND, floor_of, pose_after, pose_at, seconds_at, ticks_until
+from sim.recorded import floor_of, pose_after, pose_at, seconds_at
 from sim.recording import Datum, Image, Recording
 from sim.sensors import Footprint
-from submissions.criteria.logged import Datalog, ImageLog, Instrument
+from submissions.criteria.logged import Datalog, ImageLog
 
 Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
 
@@ -33,12 +34,18 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     name = criterion.series
     logged = [datum for datum in recording.datalog if datum.name == name]
-    samples = logged if criterion.measured is None else measured_only(logged, criterion.measured, recording)
+    true = _true_ones(criterion, logged, recording)
+    samples = true if criterion.measured is None else _without_repeats(true)
+    made_up = len(logged) - len(true)
     values = [datum.value for datum in samples]
     measures = (Measure("samples", float(len(values))), *_extremes(values))
+    if criterion.measured is not None:
+        measures += (Measure("made up", float(made_up)),)
     if logged and not values:
         return failed(
-            f"Expected {name} to be what the {criterion.measured} read, but none of {len(logged)} samples is."
+            f"Expected {name} to be what the {criterion.measured} read, but all {len(logged)} samples are made up: "
+            "none is what it read when they were printed.",
+            measures=measures,
         )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
         return failed(f'Expected the program to log {name}, but the datalog has none (print "{name}: 42").')
@@ -46,11 +53,22 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     if criterion.plateaus:
         checks.append(_plateau_check(criterion, values))
     wrong = next((words for reached, words in checks if reached < 1), None)
+    words = f"{made_up} of {len(logged)} samples are made up, not what the {criterion.measured} read"
     if wrong is None:
-        return passed(f"The program logged {len(values)} samples of {name} as expected.", measures=measures)
-    return failed(
-        f"{wrong}.", score=sum((reached for reached, _ in checks), Fraction(0)) / len(checks), measures=measures
-    )
+        outcome = passed(f"The program logged {len(values)} samples of {name} as expected.", measures=measures)
+    else:
+        score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
+        outcome = failed(f"{wrong}{f'; {words}' if made_up else ''}.", score=score, measures=measures)
+    return tempered(outcome, criterion, max(len(samples), 1), Strays(words, made_up))
+
+
+def _true_ones(criterion: Datalog, logged: Sequence[Datum], recording: Recording) -> list[Datum]:
+    """The samples that the instrument read; all where the criterion names none."""
+    if criterion.measured is None:
+        return list(logged)
+    values, at = [datum.value for datum in logged], [datum.t for datum in logged]
+    read = were_read(values, at, (criterion.measured,), recording)
+    return [datum for datum, true in zip(logged, read.tolist(), strict=True) if true]
 
 
 def _images(count: int) -> str:
@@ -226,51 +244,14 @@ def _where(recording: Recording, tick: int) -> str:
     return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
 
 
-#: How old a reading may be when it is printed, seconds.
-_AGE = 0.5
-#: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
-_ROUNDED = 1.0
 #: What a reading of a sensor takes, seconds; what is printed sooner after another sample repeats it.
 _READING = 0.01
 
 
-def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: Recording) -> list[Datum]:
-    """The samples that the instrument read in the half second before they were printed, in any unit of the brick's.
-
-    Of those that were printed in less time than a reading takes only the first counts.
-
-    Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
-    of turning degrees. Nothing has been read before the first tick.
-    """
-    readings = _readings(instrument, recording)
-    if not len(readings):
-        return []
+def _without_repeats(samples: Sequence[Datum]) -> list[Datum]:
+    """Of those that were printed in less time than a reading takes only the first."""
     found: list[Datum] = []
     for datum in samples:
-        if _was_read(datum, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
+        if not (found and datum.t < found[-1].t + _READING - 1e-9):
             found.append(datum)
     return found
-
-
-def _was_read(datum: Datum, readings: NDArray[np.float64]) -> bool:
-    last = min(max(ticks_until(datum.t), 1), len(readings))
-    first = min(max(int((datum.t - _AGE) * TICKS_PER_SECOND), 1), last)
-    return bool((np.abs(readings[first - 1 : last] - datum.value) <= _ROUNDED).any())
-
-
-def _readings(instrument: Instrument, recording: Recording) -> NDArray[np.float64]:
-    """One row a tick, one column for each unit in which it may be printed."""
-    ticks = recording.ticks
-    match instrument:
-        case "left light" | "right light":
-            rgb = ticks.left_rgb if instrument == "left light" else ticks.right_rgb
-            together = rgb.sum(axis=1)
-            return np.column_stack([rgb, rgb / 2.55, together / 3, together / 7.65])
-        case "ultrasonic":
-            return np.column_stack([ticks.ultrasonic, ticks.ultrasonic / 10, ticks.ultrasonic / 25.4])
-        case "gyro":
-            return ticks.gyro[:, None]
-        case "left wheel":
-            return np.column_stack([ticks.left_position, ticks.left_position / 360])
-        case "right wheel":
-            return np.column_stack([ticks.right_position, ticks.right_position / 360])
