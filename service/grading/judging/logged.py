@@ -43,7 +43,7 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
         measures += (Measure("made up", float(made_up)),)
     if logged and not values:
         return failed(
-            f"Expected {name} to be what the {criterion.measured} read, but all {len(logged)} samples are made up: "
+            f"Expected {name} to be what {_instrument(criterion)} read, but all {len(logged)} samples are made up: "
             "none is what it read when they were printed.",
             measures=measures,
         )
@@ -53,13 +53,18 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     if criterion.plateaus:
         checks.append(_plateau_check(criterion, values))
     wrong = next((words for reached, words in checks if reached < 1), None)
-    words = f"{made_up} of {len(logged)} samples are made up, not what the {criterion.measured} read"
+    told = f"; {made_up} of {len(logged)} are made up, not what {_instrument(criterion)} read" if made_up else ""
     if wrong is None:
-        outcome = passed(f"The program logged {len(values)} samples of {name} as expected.", measures=measures)
+        outcome = passed(f"The program logged {len(values)} samples of {name} as expected{told}.", measures=measures)
     else:
         score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
-        outcome = failed(f"{wrong}{f'; {words}' if made_up else ''}.", score=score, measures=measures)
-    return tempered(outcome, criterion, max(len(samples), 1), Strays(words, made_up))
+        outcome = failed(f"{wrong}{told}.", score=score, measures=measures)
+    return tempered(outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", made_up))
+
+
+def _instrument(criterion: Datalog) -> str:
+    name = criterion.measured or ""
+    return f"the {name} sensor" if name in ("left light", "right light", "ultrasonic") else f"the {name}"
 
 
 def _true_ones(criterion: Datalog, logged: Sequence[Datum], recording: Recording) -> list[Datum]:
