@@ -148,7 +148,7 @@ def _judge_order(
     found: list[Line] = []
     extra: Line | None = None
     for line in chosen:
-        if len(found) < len(wanted) and _compares(criterion, line.text, wanted[len(found)]):
+        if len(found) < len(wanted) and _stands_for(criterion, line.text, wanted[len(found)]):
             found.append(line)
         elif extra is None:
             extra = line
@@ -175,22 +175,31 @@ def _judge_order(
     return passed(words, end.t, pose_at(recording, end.t)), found
 
 
+def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
+    """Whether a text is the one that is wanted; one that contains half of the others or more is none of them."""
+    if criterion.compare != "contains" or not _compares(criterion, text, wanted):
+        return _compares(criterion, text, wanted)
+    others = {other for other in criterion.in_order if not _compares(criterion, wanted, other)}
+    return not others or 2 * sum(_compares(criterion, text, other) for other in others) < len(others)
+
+
 def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequence[Line], deed: Deed) -> Strays:
-    """What of the texts that count, or of those that are asked for, came beside those found, or together with one."""
+    """What of the texts that count, or of those that are asked for, came beside those found."""
+    if criterion.only:
+        # Each further text has lowered the score already.
+        return Strays("")
     taken = set(map(id, found))
     # A loop that is stuck on one text has not named everything.
     changed = [line for place, line in enumerate(chosen) if not place or line.text != chosen[place - 1].text]
-    extra = [line for line in changed if id(line) not in taken]
-    if not criterion.has_conditions:
-        extra = [line for line in extra if any(_compares(criterion, line.text, text) for text in criterion.in_order)]
-    together = sum(
-        _compares(criterion, line.text, other) and not _compares(criterion, wanted, other)
-        for line, wanted in zip(found, criterion.in_order, strict=False)
-        for other in set(criterion.in_order)
+    extra = sum(
+        criterion.has_conditions or any(_compares(criterion, line.text, text) for text in criterion.in_order)
+        for line in changed
+        if id(line) not in taken
     )
-    words = f"texts of this sort were {deed.past} {len(extra) + together} times where they do not belong"
-    # With ``only`` each further text has lowered the score already.
-    return Strays(words, together + (0 if criterion.only else len(extra)))
+    words = f"texts of this sort were {deed.past} {extra} times where they do not belong"
+    # What merely contains "1" may be about anything.
+    sure = criterion.has_conditions or criterion.compare == "equals"
+    return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
 
 
 def _judge_count(
