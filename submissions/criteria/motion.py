@@ -76,8 +76,10 @@ class Displacement(AskedMotion, Criterion):
 
 
 class Moves(Criterion):
-    """The run move by move. A move ends where the robot stands still, or where driving straight and turning meet.
+    """The run move by move.
 
+    A move ends where the robot stands still, or where two ways of moving meet: straight on, straight back, turning
+    left, turning right.
     ``moves`` lists what must be among them, in that order (``in_order = false``: in any order);
     ``only`` allows no others.
     """
