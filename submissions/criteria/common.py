@@ -5,6 +5,7 @@ No kind of criterion is here; each has a module of its family.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -88,6 +89,8 @@ class Criterion(StrictTable):
 
     #: Whether it looks at runs of the robot; else at the code alone.
     judges_runs: ClassVar[bool] = True
+    #: The figures that it measures in a trial, by name; # stands for a number from 1, ... for any words.
+    measures: ClassVar[Texts] = ()
 
     @property
     def asks_responder(self) -> bool:
@@ -98,6 +101,11 @@ class Criterion(StrictTable):
     def result_needed(self) -> str | None:
         """The id of the criterion that has to be judged before it."""
         return None
+
+    def measures_a(self, name: str) -> bool:
+        """Whether it measures a figure of this name."""
+        known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
+        return any(re.fullmatch(each, name) for each in known)
 
     @property
     def python_files(self) -> Texts:

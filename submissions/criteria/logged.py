@@ -6,11 +6,11 @@ Logs are what ``print("Light_left: 42")`` and ``print("image_data both")`` leave
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import AmongMany, Criterion
+from submissions.criteria.common import AmongMany, Criterion, Texts
 from submissions.criteria.places import Range
 
 #: What a series may be a log of.
@@ -31,6 +31,7 @@ class Datalog(AmongMany):
     """
 
     check: Literal["datalog"]
+    measures: ClassVar[Texts] = ("samples", "made up", "least", "most")
     series: str = Field(min_length=1, max_length=40)
     at_least: int = Field(default=1, ge=0)
     at_most: int | None = Field(default=None, ge=0)
@@ -62,6 +63,7 @@ class ImageLog(Criterion):
     """
 
     check: Literal["image_log"]
+    measures: ClassVar[Texts] = ("images",)
     left: int | None = Field(default=None, ge=0)
     right: int | None = Field(default=None, ge=0)
     at_start: bool = False

@@ -6,7 +6,7 @@ Single texts and how often they come are asked in ``texts.py``, words one after 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_serializer, field_validator
 
@@ -30,6 +30,7 @@ class Reports(AmongMany):
     """
 
     check: Literal["reports"]
+    measures: ClassVar[Texts] = ("reported #",)
     source: Literal["print", "speech", "either", "reply"] = "either"
     expected: Literal["label"] | tuple[tuple[float | str, ...], ...]
     tolerance: float = Field(default=0.5, ge=0)
@@ -83,6 +84,7 @@ class Events(AmongMany):
     """
 
     check: Literal["events"]
+    measures: ClassVar[Texts] = ("x at ...",)
     source: Source = "either"
     sensor: Literal["left", "right", "middle"] = "left"
     events: tuple[EventAt, ...] = Field(min_length=1)

@@ -5,7 +5,7 @@ Single texts and how often they come are asked in ``texts.py``.
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -22,6 +22,7 @@ class WordSequence(AmongMany):
     """
 
     check: Literal["sequence"]
+    measures: ClassVar[Texts] = ("words", "last at")
     source: Literal["print", "speech"] = "speech"
     words: tuple[Texts, ...] = Field(min_length=1)
     lead_in: bool = False
