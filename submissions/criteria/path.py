@@ -49,7 +49,7 @@ class StaysInside(Criterion):
 
 
 class KeepsOut(Criterion):
-    """At no time is ``of`` in any of the areas.
+    """At no time is ``of`` in any of the areas, nor nearer to one than ``clear_of`` mm.
 
     ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
     """
@@ -58,6 +58,7 @@ class KeepsOut(Criterion):
     measures: ClassVar[Texts] = ("least clearance", "least x", "greatest x", "least y", "greatest y")
     areas: tuple[Area, ...] = Field(min_length=1)
     of: Part = "robot"
+    clear_of: float = Field(default=0.0, ge=0)
     drives: float = Field(default=0.0, ge=0)
 
 

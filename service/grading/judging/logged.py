@@ -89,23 +89,29 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     """How many images of each light sensor were logged, in what order, and what those at the start show."""
     recording = trial.recording
     log = recording.image_log
-    checks: list[tuple[bool, str]] = []
-    for side, count in (("left", criterion.left), ("right", criterion.right)):
+    checks: list[Check] = []
+    for side, count, least in (
+        ("left", criterion.left, criterion.left_at_least),
+        ("right", criterion.right, criterion.right_at_least),
+    ):
         got = sum(entry[0] == side for entry in log)
-        if count is not None:
-            checks.append(
-                (got == count, f"Expected {_images(count)} of the {side} sensor to be logged, but {_there(got)}")
-            )
+        asked = f"at least {_images(least)}" if count is None else _images(count)
+        words = f"Expected {asked} of the {side} sensor to be logged, but {_there(got)}"
+        if count is not None or least:
+            reached = min(Fraction(got, least), Fraction(1)) if count is None else Fraction(got == count)
+            checks.append((reached, words))
     if criterion.pairs:
         sides = [entry[0] for entry in log]
         turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
-        checks.append((turns, "Expected left and right images to take turns, but they did not (image_data both)"))
+        checks.append(
+            (Fraction(turns), "Expected left and right images to take turns, but they did not (image_data both)")
+        )
     if criterion.at_start:
         moved = next((entry for entry in log if not _shows_start(entry, recording, trial.light_noise)), None)
         where = _where(recording, moved[2]) if moved else ""
         checks.append(
             (
-                bool(log) and moved is None,
+                Fraction(bool(log) and moved is None),
                 f"Expected every image to be taken at the start pose, but {where or 'there is none'}",
             )
         )
@@ -114,18 +120,18 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         flat = bool(own) and all(_is_uniform(entry[1]) and _shows_something(entry, recording) for entry in own)
         checks.append(
             (
-                flat,
+                Fraction(flat),
                 f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
                 "or shows no label's patch",
             )
         )
     measures = (Measure("images", float(len(log))),)
-    wrong = next((words for holds, words in checks if not holds), None)
+    wrong = next((words for reached, words in checks if reached < 1), None)
     if wrong is None:
         return passed(f"The program logged {len(log)} images as expected.", measures=measures)
     last = seconds_at(log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
-    held = Fraction(sum(holds for holds, _ in checks), len(checks))
+    held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
     return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
 
 

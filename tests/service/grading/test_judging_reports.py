@@ -350,6 +350,23 @@ def test_image_log_shows_what_lies_at_the_start() -> None:
     assert judged(asked, run(*pair, *pair), poses=(pose,)).marks == 0
 
 
+@pytest.mark.parametrize(
+    ("keys", "images", "marks"),
+    [
+        ({"left_at_least": 4}, 4, 4),
+        ({"left_at_least": 4}, 9, 4),
+        ({"left_at_least": 4}, 1, 1),
+        ({"left_at_least": 4}, 0, 0),
+        ({"left_at_least": 4, "right": 0}, 2, 3),
+        ({"right_at_least": 1}, 4, 0),
+    ],
+)
+def test_so_many_images_at_least(keys: dict[str, Any], images: int, marks: int) -> None:
+    log = (image(Pose(600, 750, 90)),) * images
+    result = judged(criterion("image_log", over="mean", **keys), recorded(background="MNIST_Digits", image_log=log))
+    assert result.marks == marks, result.message
+
+
 def test_image_log_without_images_has_no_marks() -> None:
     result = judged(criterion("image_log", at_start=True), recorded(background="MNIST_Digits"))
     assert "there is none" in result.message
