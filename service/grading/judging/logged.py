@@ -244,10 +244,8 @@ def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
     if side == "left" or recording.background not in GREYS or not recording.label_patches:
         return True
     pixels = bytes(map(int, csv.split(",")))
-    return (
-        decoded(Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4)), recording.background)
-        is not None
-    )
+    image = Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4))
+    return decoded(image, GREYS[recording.background]) is not None
 
 
 def _where(recording: Recording, tick: int) -> str:
