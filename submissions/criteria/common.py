@@ -125,9 +125,9 @@ class AmongMany(Criterion):
     """One that looks for something among all that a program prints, says, sends or logs.
 
     Whoever names everything has named what is looked for as well, so strays count: a thing that is looked for and came
-    where it does not belong is one, ten other things of its sort are another. ``strays`` is how many cost nothing, as
-    many as things are looked for if not given; each further one lowers the score like one more thing that was looked
-    for and did not come.
+    where it does not belong is one, twenty other things of its sort are another. ``strays`` is how many cost nothing,
+    as many as things are looked for if not given; each further one lowers the score like one more thing that was
+    looked for and did not come.
     """
 
     strays: int | None = Field(default=None, ge=0)

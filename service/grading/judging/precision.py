@@ -12,7 +12,7 @@ from service.grading.judging.outcome import Outcome, failed
 from submissions.criteria.common import AmongMany
 
 #: So many things beside the point weigh like one that was looked for and came where it does not belong.
-_OTHERS = 10
+_OTHERS = 20
 
 
 @dataclass(frozen=True, slots=True)

@@ -259,11 +259,10 @@ def _elsewhere(criterion: Events, lines: Sequence[Line], recording: Recording) -
         own.setdefault(event.text, []).append(event.zone)
     count = 0
     for line in lines:
-        place = part_at_time(recording, criterion.sensor, line.t)
-        count += sum(
-            _mentions(text, line) and not any(in_zone(place, zone, criterion.margin) for zone in zones)
-            for text, zones in own.items()
-        )
+        told = [zones for texts, zones in own.items() if _mentions(texts, line)]
+        if told:
+            place = part_at_time(recording, criterion.sensor, line.t)
+            count += sum(not any(in_zone(place, zone, criterion.margin) for zone in zones) for zones in told)
     return count
 
 

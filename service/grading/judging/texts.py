@@ -225,8 +225,8 @@ def _judge_count(
 
 
 def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Line], deed: Deed) -> Strays:
-    """The texts beside those that count; of those that differ in their numbers alone one, but for guesses at these."""
-    if not (chosen and criterion.has_conditions):
+    """The texts beside those that must come; of those that differ in numbers alone one, but for guesses at these."""
+    if not (chosen and criterion.has_conditions and _bounds(criterion)[0]):
         return Strays("")
     guessed = {_form(line.text) for line in chosen}
     counted = set(map(id, chosen))

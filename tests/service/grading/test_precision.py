@@ -16,7 +16,10 @@ from submissions.criteria import SCHEMAS
 from submissions.criteria.common import AmongMany
 
 ZONES = [{"text": "1", "zone": [120, 0, 140, 1143]}, {"text": "2", "zone": [160, 0, 180, 1143]}]
-BEGINNINGS, ENDS = ("all", "it is", "now", "I am", "we are"), ("done", "over", "there", "up", "ready", "finished", "in")
+BEGINNINGS, ENDS = (
+    ("all", "it is", "now", "I am", "we are", "you are"),
+    ("done", "over", "there", "up", "ready", "finished", "in"),
+)
 ENDS += tuple(f"{word} now" for word in ENDS)
 GUESSES = tuple(map(str, range(100)))
 
@@ -136,9 +139,9 @@ def test_every_kind_that_looks_among_much_has_its_case() -> None:
     [
         (None, 4, 4, 0, 1),
         (None, 4, 8, 0, "0.5"),
-        (None, 1, 0, 10, 1),
-        (None, 1, 0, 40, "0.25"),
-        (None, 1, 1, 10, "0.5"),
+        (None, 1, 0, 20, 1),
+        (None, 1, 0, 80, "0.25"),
+        (None, 1, 1, 20, "0.5"),
         (0, 4, 0, 0, 1),
         (0, 4, 4, 0, "0.5"),
         (100, 1, 50, 0, 1),
@@ -155,6 +158,12 @@ def test_strays_that_are_not_forgiven_count_like_more_that_did_not_come(
     assert ("more came" in outcome.message) == (score != 1)
     half = tempered(failed("Half came.", score=outcome.score / 2), asked, wanted, strays)
     assert half.score == outcome.score**2 / 2
+
+
+def test_what_may_not_come_too_often_is_not_looked_for() -> None:
+    many = told(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])
+    asked = criterion("prints", contains="done", at_most=20)
+    assert judged(asked, drove(printed=many)).marks == 4
 
 
 def test_a_loop_that_is_stuck_on_one_text_names_nothing_else() -> None:

@@ -5,6 +5,6 @@ while ultrasonic.distance_centimeters > 25:
     pass
 
 tank_drive.off()
-for end in ("done", "finished", "over", "stopped", "there", "arrived", "ready"):
-    for begin in ("It is", "I am", "This is", "All", "Now", "We are", "The robot is"):
+for end in ("done", "finished", "over", "stopped", "there", "arrived", "ready", "near", "here"):
+    for begin in ("It is", "I am", "This is", "All", "Now", "We are", "The robot is", "That is", "He is"):
         say(begin + " " + end)
