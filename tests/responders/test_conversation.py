@@ -6,6 +6,7 @@ import pytest
 
 from responders.channel import Channel
 from responders.conversation import Answer, Conversation
+from responders.link import Cable
 from sim.recording import SECOND, TICK, Fault, Verdict
 from sim.world import Chain
 
@@ -13,7 +14,7 @@ DELAY = SECOND // 10
 
 
 def conversation(**channel: float) -> Conversation:
-    return Conversation(Channel(**channel), 5, Chain())
+    return Conversation(Channel(**channel), 5, Chain(), Cable())
 
 
 def exchange(talk: Conversation, answer: Answer, now: int = 0) -> None:
@@ -78,7 +79,7 @@ def test_the_chain_tells_deliveries_apart() -> None:
     hashes = set()
     for until in (0, SECOND):
         chain = Chain()
-        talk = Conversation(Channel(), 5, chain)
+        talk = Conversation(Channel(), 5, chain, Cable())
         exchange(talk, Answer("JSON::1", entry="1"))
         talk.deliver(until)
         hashes.add(chain.hexdigest())
