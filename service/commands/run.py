@@ -15,6 +15,21 @@ from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from service.commands.channel_flags import (
+    Beacon,
+    BlockedBy,
+    Corruption,
+    Delay,
+    Duplication,
+    Facing,
+    Jitter,
+    Link,
+    Loss,
+    Range,
+    Reordering,
+    changed,
+    given_flags,
+)
 from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
 from service.grading.grade import TrialResult
@@ -22,7 +37,7 @@ from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
-from service.reports.readable import readable
+from service.reports.readable import befell, readable
 from service.reports.trace import trace
 from sim.errors import UsageError
 from sim.floors import floor
@@ -78,6 +93,17 @@ def run(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
+    link: Link = None,
+    beacon: Beacon = None,
+    reach: Range = None,
+    facing: Facing = None,
+    blocked_by: BlockedBy = None,
+    loss: Loss = None,
+    delay: Delay = None,
+    jitter: Jitter = None,
+    duplication: Duplication = None,
+    reordering: Reordering = None,
+    corruption: Corruption = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     unsafe: Annotated[
@@ -99,6 +125,22 @@ def run(
         "P": pen_colour,
     }
     switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
+    channel = changed(
+        Channel(),
+        given_flags(
+            link=link,
+            beacon=beacon,
+            range=reach,
+            facing=facing,
+            blocked_by=blocked_by,
+            loss=loss,
+            delay=delay,
+            jitter=jitter,
+            duplication=duplication,
+            reordering=reordering,
+            corruption=corruption,
+        ),
+    )
     wanted = Flags(switches=frozenset(switches)).with_values(**values)
     if unsafe:
         warn_of_no_sandbox()
@@ -106,7 +148,7 @@ def run(
     if notebook is not None:
         if responder is not None:
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
-        last = LastRun(wanted, seed, seed if sheet is None else sheet)
+        last = LastRun(wanted, seed, seed if sheet is None else sheet, channel)
         limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
             executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
@@ -125,7 +167,7 @@ def run(
         robot=robot(chosen.robot),
         pose=chosen.pose,
         noise=Noise(chosen.light_noise, chosen.motor_noise),
-        channel=Channel(),
+        channel=channel,
         seconds=seconds,
         seed=seed,
         child_seed=seed,
@@ -213,8 +255,9 @@ def _show(recording: Recording) -> None:
     """What was printed, spoken and answered, in order, and how it ended."""
     shown = [(line.t, 0, line.text) for line in recording.printed]
     shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
+    shown += [(each.t, 2, f"(lost) {each.text}: {befell(each)}") for each in recording.messages if each.lost]
     shown += [
-        (message.delivered, 2, f"(answer) {message.text}")
+        (message.delivered, 2, f"(answer) {message.received}")
         for message in recording.messages
         if message.sender == "responder" and message.delivered is not None
     ]

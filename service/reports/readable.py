@@ -9,6 +9,8 @@ import re
 import unicodedata
 from decimal import Decimal
 
+from sim.recording import Message
+
 #: Joiners that emoji and several scripts need; every other invisible format character is spelled out.
 _JOINERS = "\u200c\u200d"
 _LONGEST_MARKS = 6  # combining marks on one letter; no living script needs more
@@ -45,6 +47,24 @@ def message_words(text: str, limit: int = 120) -> str:
     if text.startswith("IMG_DATA::{") and len(text) > 200:
         return "IMG_DATA::{left, right}"
     return one_line(text, limit)
+
+
+def befell(message: Message) -> str:
+    """What befell a message on its way, in a few words; empty if it arrived once and as it was sent."""
+    if message.arrived_as is not None:
+        words = f"corrupted to {message_words(message.arrived_as, 40)}"
+        return f"{message.note}, {words}" if message.note else words
+    match message.lost:
+        case "":
+            return one_line(message.note, 40)
+        case "chance":
+            return "lost by chance"
+        case "out of range":
+            return f"out of range: {round(message.distance or 0, 1):g} mm"
+        case "facing away":
+            return f"facing away: {abs(round(message.angle or 0, 1)):g}°"
+        case "blocked":
+            return "blocked by an obstacle"
 
 
 def number(value: Decimal) -> str:

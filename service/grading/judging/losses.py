@@ -22,9 +22,10 @@ def loss_words(message: Message) -> str:
     """What befell a text that did not arrive as it was sent, in brackets behind ``the channel lost it``."""
     match message.lost:
         case "out of range":
-            return f"the robot was {message.distance or 0:.0f} mm from the receiver, which is out of the link's range"
+            distance = round(message.distance or 0, 1)
+            return f"the robot was {distance:g} mm from the receiver, which is out of the link's range"
         case "facing away":
-            return f"the robot faced {abs(message.angle or 0):.0f}° away from the receiver"
+            return f"the robot faced {abs(round(message.angle or 0, 1)):g}° away from the receiver"
         case "blocked":
             return "a wall or an obstacle stood between the robot and the receiver"
         case _:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from service.reports.readable import message_words, one_line
+from service.reports.readable import befell, message_words, one_line
 from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
@@ -91,7 +91,7 @@ def conversation(
 
 def troubled(message: Message) -> bool:
     """Whether a message was lost, never arrived, or could not be read."""
-    return message.delivered is None or bool(message.note)
+    return message.delivered is None or bool(befell(message))
 
 
 def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
@@ -151,7 +151,7 @@ def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, li
 
 def _crossing(message: Message) -> Step:
     source, target = ("robot", "responder") if message.sender == "robot" else ("responder", "robot")
-    label, note = message_words(message.text, 90), one_line(message.note, 30)
+    label, note = message_words(message.text, 90), befell(message)
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
     shown_at = message.t if message.sender == "robot" else message.delivered

@@ -21,7 +21,7 @@ def answer(to: int, t: float, text: str, lost: LossReason = "", **more: Any) -> 
     return Message(t - 0.1, "responder", text, None if lost else t, to, "lost" if lost else "", lost, **more)
 
 
-AWAY: dict[str, Any] = {"distance": 812.4, "angle": -95.0}
+AWAY: dict[str, Any] = {"distance": 812.04, "angle": -95.0}
 ECHO = {"PY::0": "saw 0", "PY::1": "saw 1"}
 
 
