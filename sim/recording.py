@@ -272,6 +272,7 @@ class Recording:
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    beacon: tuple[float, float] | None = None  # the other end of an infrared link
     label_patches: bool = True  # whether the floor showed its grey label patches
     sheet: int = 0  # the seed of the digits on it, for a digit sheet
     robot: str = "Default_Robot"

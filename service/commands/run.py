@@ -37,7 +37,7 @@ from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
-from service.reports.readable import befell, readable
+from service.reports.readable import befell_in_full, readable
 from service.reports.trace import trace
 from sim.errors import UsageError
 from sim.floors import floor
@@ -255,7 +255,8 @@ def _show(recording: Recording) -> None:
     """What was printed, spoken and answered, in order, and how it ended."""
     shown = [(line.t, 0, line.text) for line in recording.printed]
     shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
-    shown += [(each.t, 2, f"(lost) {each.text}: {befell(each)}") for each in recording.messages if each.lost]
+    lost = [message for message in recording.messages if message.lost]
+    shown += [(message.t, 2, f"(lost) {message.text}: {befell_in_full(message)}") for message in lost]
     shown += [
         (message.delivered, 2, f"(answer) {message.received}")
         for message in recording.messages

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import Plot, plots_of
-from service.reports.readable import befell, message_words, number, one_line, readable
+from service.reports.readable import befell_in_full, message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
@@ -228,7 +228,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
 def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
     for message in messages:
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
-        happened = befell(message)
+        happened = befell_in_full(message)
         if happened:
             arrived += f" ({happened})"
         wrong = message.delivered is None or bool(happened)
