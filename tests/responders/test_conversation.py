@@ -84,3 +84,20 @@ def test_the_chain_tells_deliveries_apart() -> None:
         talk.deliver(until)
         hashes.add(chain.hexdigest())
     assert len(hashes) == 2
+
+
+@pytest.mark.parametrize(
+    ("channel", "digest"),
+    [
+        ({"loss": 0.4}, "8b2ff904a5a83a0c"),
+        ({"loss": 0.2, "jitter": 0.4, "duplication": 0.4, "reordering": 0.3}, "c9831e6c34c9d0f4"),
+    ],
+)
+def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, float], digest: str) -> None:
+    """Recordings made before there was another link would have other hashes."""
+    chain = Chain()
+    talk = Conversation(Channel(**channel), 5, chain, Cable())
+    for number in range(200):
+        exchange(talk, Answer(f"JSON::{number}", entry=str(number)), number * SECOND // 4)
+        talk.deliver((number + 1) * SECOND // 4)
+    assert chain.hexdigest()[:16] == digest

@@ -274,7 +274,7 @@ check = "pose"
         (HEAD + SCENARIO + INFRARED.format("[3000, 50]") + FINISHES, 6, "has its beacon off the floor, expected"),
         (HEAD + SCENARIO + INFRARED.format("[100]") + FINISHES, 6, "too few numbers, expected [x, y]"),
         (POST + SCENARIO + INFRARED.format("[1000, 510]") + FINISHES, 8, "beacon is in an obstacle, which blocks"),
-        (HEAD + SCENARIO + FINISHES.replace("finishes", "in_reach"), 6, 'expected link = "infrared" in scenario "s"'),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "in_reach"), 9, 'expected link = "infrared" in scenario "s"'),
         (HEAD + SCENARIO + "seconds = nan\n" + FINISHES, 6, "expected a finite number"),
         (HEAD + SCENARIO + "seconds = 1979-05-27\n" + FINISHES, 6, "expected a number"),
         (HEAD + SCENARIO + "trials = true\n" + FINISHES, 6, "expected a whole number"),

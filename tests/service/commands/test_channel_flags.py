@@ -43,7 +43,7 @@ def test_a_run_shows_what_was_lost(tmp_path: Path) -> None:
     trace = tmp_path / "trace.json"
     shown = robomark(
         *("run", ECHO / "robot.py", "--responder", ECHO / "responder.py", "--trace", trace),
-        *("--link", "infrared", "--beacon", "900,800", "--range", "700"),
+        *("-b", "Empty_Map", "-x", "100", "-y", "800", "--link", "infrared", "--beacon", "900,800", "--range", "700"),
     )
     assert "(lost) PY::0: out of range, 800 mm away" in shown.stdout
     first = json.loads(trace.read_text())["messages"][0]
