@@ -52,8 +52,8 @@ class FreshAnswers(Criterion):
     """What the program reports as an answer is the answer to what it sent last, not to something earlier.
 
     A report is a line, printed or said, that begins with ``after``; what follows must have the answer's words in it,
-    or those that its JSON has at ``path``, and no other answer's. Of every text whose answer arrived there must be
-    one; ``at_least`` different texts must be sent.
+    or those that its JSON has at ``path``, and no other answer's. Of every text there must be one,
+    unless chance kept it from being answered; ``at_least`` different texts must be sent.
     """
 
     check: Literal["fresh_answers"]

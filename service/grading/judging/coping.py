@@ -14,7 +14,7 @@ from fractions import Fraction
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
 from service.grading.judging.judges import judges
-from service.grading.judging.losses import loss_words, out_of_reach
+from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, cut, failed, passed
 from service.grading.judging.texts import conditions, meets
 from service.grading.judging.words import quoted, words_of
@@ -30,16 +30,24 @@ _MOST_WORDS = 50  # of an answer, to know it again
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A text of the robot's: when it was sent, and the answers to any of these tries that arrived whole."""
+    """A text of the robot's: when it was sent, all that was answered, and what of that arrived whole."""
 
     text: str
     tries: tuple[Message, ...]
+    replies: tuple[Message, ...]
     answers: tuple[Message, ...]
 
     @property
     def answered(self) -> float | None:
         """When its first answer arrived, seconds."""
         return min((message.delivered or 0.0 for message in self.answers), default=None)
+
+    @property
+    def excused(self) -> bool:
+        """Whether chance alone kept it from being answered."""
+        heard = sum(message.delivered is not None and message.arrived_as is None for message in self.tries)
+        lost = all(map(by_chance, self.replies)) and len(self.replies) >= heard
+        return not self.answers and lost and not any(map(out_of_reach, self.tries))
 
 
 @judges(Resends)
@@ -124,32 +132,41 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
                 fresh.add(text)
             else:
                 stale.setdefault(asked, (line, text))
-    answered = {each.text: each for each in questions if each.answers}
+    wanted = {each.text: each for each in questions if not each.excused}
     right = len(fresh - stale.keys())
-    judged = len(answered.keys() | stale.keys())
+    judged = len(wanted.keys() | fresh | stale.keys())
+    told = f"({right} of {judged} answers right)"
     if stale:
         asked, (line, earlier) = next(iter(stale.items()))
         return failed(
             f"{expected}, but after {quoted(asked)} it reported {quoted(line.text)}, which is the answer to "
-            f"{quoted(earlier)} ({right} of {judged} answers right).",
+            f"{quoted(earlier)} {told}.",
             line.t,
             pose_at(recording, line.t),
             Fraction(right, judged),
         )
-    missing = next((each for text, each in answered.items() if text not in fresh), None)
+    missing = next((each for text, each in wanted.items() if text not in fresh), None)
     if missing is not None:
-        came = missing.answered or 0.0
-        return failed(
-            f"{expected}, but the answer to {quoted(missing.text)} came at {came:.2f} s and no line that begins with "
-            f"{quoted(criterion.after)} has it ({right} of {judged} answers right).",
-            came,
-            pose_at(recording, came),
-            Fraction(right, judged),
+        at = missing.tries[-1].t if missing.answered is None else missing.answered
+        what = (
+            _unanswered(missing)
+            if missing.answered is None
+            else (
+                f"the answer to {quoted(missing.text)} came at {at:.2f} s and no line that begins with "
+                f"{quoted(criterion.after)} has it"
+            )
         )
-    astray = next((message for each in questions for message in each.tries if out_of_reach(message)), None)
-    if not answered and astray is not None:
-        return failed(f"{expected}, but no answer came: the channel lost {quoted(astray.text)} ({loss_words(astray)}).")
-    return passed(f"{right} of {judged} answers that came were reported, each as that to what was sent last.")
+        return failed(f"{expected}, but {what} {told}.", at, pose_at(recording, at), Fraction(right, judged))
+    if not judged:
+        return passed("The channel lost every message or its answer by chance, and the robot believed none.")
+    return passed(f"{right} of {judged} answers were reported, each as that to what was sent last.")
+
+
+def _unanswered(question: _Question) -> str:
+    """That no answer came, and why, where it was not chance."""
+    astray = next(filter(out_of_reach, (*question.tries, *question.replies)), None)
+    why = f": the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
+    return f"no answer to {quoted(question.text)} came{why}"
 
 
 class _Answered:
@@ -187,15 +204,28 @@ class _Answered:
 def _questions(recording: Recording) -> list[_Question]:
     """The different texts that the robot sent, in the order in which each was sent first."""
     tries: dict[str, list[Message]] = {}
-    answers: dict[str, list[Message]] = {}
+    replies: dict[str, list[Message]] = {}
     for message in recording.messages:
         if message.sender == "robot":
             tries.setdefault(message.text, []).append(message)
-        elif message.reply_to is not None and message.delivered is not None and message.arrived_as is None:
+        elif message.reply_to is not None:
             asked = recording.messages[message.reply_to]
-            if asked.arrived_as is None and message.note != "malformed":
-                answers.setdefault(asked.text, []).append(message)
-    return [_Question(text, tuple(sent), tuple(answers.get(text, ()))) for text, sent in tries.items()]
+            # What answers another text than was sent answers nothing.
+            if asked.arrived_as is None:
+                replies.setdefault(asked.text, []).append(message)
+    return [
+        _Question(
+            text,
+            tuple(sent),
+            tuple(replies.get(text, ())),
+            tuple(reply for reply in replies.get(text, ()) if _arrived_whole(reply)),
+        )
+        for text, sent in tries.items()
+    ]
+
+
+def _arrived_whole(reply: Message) -> bool:
+    return reply.delivered is not None and reply.arrived_as is None and reply.note != "malformed"
 
 
 def _mistake(criterion: Resends, question: _Question, recording: Recording) -> tuple[float, str] | None:

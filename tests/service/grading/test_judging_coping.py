@@ -252,6 +252,10 @@ def test_what_never_came_need_not_be_reported() -> None:
     messages = (asked(0, "PY::0", "chance"), asked(1, "PY::1"), answer(1, 1.5, 'JSON::{"saw": 1}'))
     assert believed((0.5, "Answer: none"), (2.0, "Answer: 1"), messages=messages).marks == 4
     assert believed((0.5, "Answer: none"), messages=messages[:1]).marks == 4
+    unasked = believed((0.5, "Answer: none"), messages=(asked(0, "PY::0"),))
+    assert (unasked.marks, 'no answer to "PY::0" came (0 of 1' in unasked.message) == (0, True)
+    unheard = (asked(0, "PY::0"), answer(0, 0.5, 'JSON::{"saw": 0}', "chance"))
+    assert believed((1.0, "Answer: none"), messages=unheard).marks == 4
     away = believed((0.5, "Answer: none"), messages=(asked(0, "PY::0", "facing away", **AWAY),))
-    assert (away.marks, "no answer came: the channel lost" in away.message) == (0, True)
+    assert (away.marks, 'no answer to "PY::0" came: the channel lost' in away.message) == (0, True)
     assert believed(messages=messages, at_least=3).marks == 0
