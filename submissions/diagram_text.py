@@ -6,14 +6,25 @@ sizes and types of letters is read and has no effect, for a report has its own.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from sim.errors import UsageError
-from submissions.diagram import ActorGroup, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider, Heads, Line
+from submissions.diagram import ActorGroup, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider, Heads
 from submissions.diagram_tokens import Token, mistake, tokens_of
+from submissions.diagram_vocabulary import (
+    ARROWS,
+    DIRECTIONS,
+    FRAGMENTS,
+    LINES,
+    OF_ACTORS,
+    OF_ARROWS,
+    OF_DIAGRAMS,
+    OF_GROUPS,
+    SHAPES,
+    meant,
+)
 
 MAX_ACTORS = 16
 MAX_STEPS = 80
@@ -21,34 +32,6 @@ MAX_GROUPS = 8
 MAX_DEPTH = 8
 LONGEST_NAME = 80
 
-_FONT = frozenset({"class", "fontfamily", "fontsize", "fontstyle", "href"})
-_OF_ACTORS = _FONT | frozenset(
-    "label shape color textcolor style linecolor width height colwidth colheight numbered icon background description "
-    "rotate stacked".split()
-)
-_OF_ARROWS = _FONT | frozenset(
-    "label color textcolor style dir hstyle folded nofolded thick async diagonal failed return activate noactivate "
-    "note leftnote rightnote".split()
-)
-_OF_GROUPS = _FONT | frozenset("label color textcolor shape thick style orientation width height icon".split())
-_OF_DIAGRAMS = frozenset(
-    "activation autonumber orientation edge_height edge_length edge_layout page_padding node_width node_height "
-    "span_width span_height default_fontsize default_fontfamily default_fontstyle default_shape default_node_color "
-    "default_node_style default_group_color default_linecolor default_textcolor default_note_color shape_namespace "
-    "width height".split()
-)
-SHAPES = frozenset(
-    "box square roundedbox circle ellipse diamond minidiamond note mail cloud actor dots beginpoint endpoint textbox "
-    "none flowchart.condition flowchart.database flowchart.input flowchart.loopin flowchart.loopout "
-    "flowchart.terminator".split()
-)
-_LINES: dict[str, Line] = {"solid": "solid", "dashed": "dashed", "dotted": "dotted", "none": "solid"}
-_DIRECTIONS = {"forward": "->", "back": "<-", "both": "<->", "none": "--"}
-_ARROWS: dict[str, tuple[str, ...]] = {
-    "blockdiag": ("->", "<-", "<->", "--", "=>"),
-    "seqdiag": ("->", "<-", "-->", "<--", "->>", "<<-", "-->>", "<<--", "=>", "<->"),
-}
-_FRAGMENTS = ("alt", "loop")
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{3}(?:[0-9A-Fa-f]{3})?|[A-Za-z]{3,30}")
 
 Attributes = dict[str, str]
@@ -156,7 +139,7 @@ class _Reader:
                 self._class(token.text)
             elif self._begins_group():
                 self._group(depth)
-            elif token.text in _FRAGMENTS and self._begins_braces():
+            elif token.text in FRAGMENTS and self._begins_braces():
                 self._fragment(depth)
             elif self._is("=", 1):
                 self._setting()
@@ -182,7 +165,7 @@ class _Reader:
 
     def _class(self, keyword: str) -> None:
         name = self._word("the name of a class")
-        attributes = self._attributes(_OF_ACTORS | _OF_ARROWS if keyword == "class" else None, "a class")
+        attributes = self._attributes(OF_ACTORS | OF_ARROWS if keyword == "class" else None, "a class")
         self._classes[name] = attributes
 
     def _fragment(self, depth: int) -> None:
@@ -195,7 +178,7 @@ class _Reader:
         self._add(Divider(f"end of {kind}"))
 
     def _setting(self) -> None:
-        name, value = self._assignment(_OF_DIAGRAMS, "a diagram")
+        name, value = self._assignment(OF_DIAGRAMS, "a diagram")
         if name == "default_shape":
             self._check_shape(value)
         self._settings[name] = value
@@ -214,7 +197,7 @@ class _Reader:
             if self._begins_group():
                 members += self._group(depth + 1)
             elif self._is("=", 1):
-                name, value = self._assignment(_OF_GROUPS, "a group")
+                name, value = self._assignment(OF_GROUPS, "a group")
                 attributes[name] = value
             else:
                 members += self._actors_or_arrows(depth)
@@ -229,22 +212,22 @@ class _Reader:
         chain = [self._names()]
         signs: list[Token] = []
         while (token := self._next()) is not None and token.kind == "arrow":
-            if token.text not in _ARROWS[self._kind]:
-                raise self._unexpected(f"one of {' '.join(_ARROWS[self._kind])}")
+            if token.text not in ARROWS[self._kind]:
+                raise self._unexpected(f"one of {' '.join(ARROWS[self._kind])}")
             self._place += 1
             signs.append(token)
             chain.append(self._names())
         if signs:
             self._arrows(chain, signs, depth)
         else:
-            attributes = self._attributes(_OF_ACTORS, "an actor")
+            attributes = self._attributes(OF_ACTORS, "an actor")
             self._check_shape(attributes.get("shape", "box"))
             for name in chain[0]:
                 self._actors[name].update(attributes)
         return [name for names in chain for name in names]
 
     def _arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[Token], depth: int) -> None:
-        attributes = self._attributes(_OF_ARROWS, "an arrow")
+        attributes = self._attributes(OF_ARROWS, "an arrow")
         returns: list[DiagramArrow] = []
         for sign, left, right in zip(signs, chain[:-1], chain[1:], strict=True):
             for one in left:
@@ -263,7 +246,7 @@ class _Reader:
 
     def _arrow(self, one: str, sign: str, other: str, attributes: Attributes) -> DiagramArrow:
         said = attributes.get("dir", "").lower()
-        sign = _DIRECTIONS.get(said, said) if said else sign
+        sign = DIRECTIONS.get(said, said) if said else sign
         back = sign.startswith("<") and sign != "<->"
         heads: Heads = "both" if sign == "<->" else "none" if sign == "--" else "target"
         dashed = "--" in sign and sign != "--"
@@ -272,7 +255,7 @@ class _Reader:
             other if back else one,
             one if back else other,
             attributes.get("label", ""),
-            _LINES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
+            LINES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
             heads,
             ">>" in sign or "<<" in sign or "async" in attributes,
             "failed" in attributes,
@@ -323,15 +306,12 @@ class _Reader:
     def _known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
         if known is None or name in known:
             return name
-        near = difflib.get_close_matches(name[:40], sorted(known), 1)
-        meant = f"; did you mean {near[0]}?" if near else ", expected one such as label or color"
-        raise mistake(self._line(), f"{name[:40]!r} is no attribute of {whose}{meant}")
+        raise mistake(self._line(), f"{name[:40]!r} is no attribute of {whose}{meant(name, known, 'label or color')}")
 
     def _check_shape(self, shape: str) -> None:
         if shape not in SHAPES:
-            near = difflib.get_close_matches(shape[:40], sorted(SHAPES), 1)
-            meant = f"; did you mean {near[0]}?" if near else ", expected one such as box, ellipse or diamond"
-            raise mistake(self._line(), f"there is no shape {shape[:40]!r}{meant}")
+            expected = meant(shape, SHAPES, "box, ellipse or diamond")
+            raise mistake(self._line(), f"there is no shape {shape[:40]!r}{expected}")
 
     def _add(self, step: DiagramArrow | Divider) -> None:
         if len(self._steps) >= MAX_STEPS:
@@ -345,7 +325,7 @@ class _Reader:
             attributes.get("shape", self._settings.get("default_shape", "box")),
             _colour(attributes.get("color", self._settings.get("default_node_color", ""))),
             _colour(attributes.get("textcolor", "")),
-            _LINES.get(attributes.get("style", "").lower(), "solid"),
+            LINES.get(attributes.get("style", "").lower(), "solid"),
         )
 
     def _numbered(self) -> tuple[DiagramArrow | Divider, ...]:

@@ -1,0 +1,109 @@
+"""Who told whom how often in a trial: the robot, the responder, and what the responder called.
+
+What was said is ``sequence.py``'s; here it is only counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from service.reports.plots.sequence import PARTIES, SequenceDiagram, Step
+from service.reports.readable import one_line
+from sim.recording import Recording
+from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
+
+#: Networks that are counted by the names that they are bound to; those that are called later count as one.
+_MOST_NETWORKS = 4
+_OTHERS = "other networks"
+_NAMED = frozenset(PARTIES) - {"network"}
+
+
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """How often ``source`` told ``target`` something, and how often that got lost on the way."""
+
+    source: str
+    target: str
+    kind: Literal["message", "call", "return"]
+    count: int
+    lost: int = 0
+
+
+def talks(recording: Recording) -> tuple[Talk, ...]:
+    """Everything that was told, by who told whom; messages first."""
+    sent: Counter[str] = Counter(message.sender for message in recording.messages)
+    lost: Counter[str] = Counter(message.sender for message in recording.messages if message.delivered is None)
+    between = (("robot", "responder"), ("responder", "robot"))
+    told = [Talk(one, other, "message", sent[one], lost[one]) for one, other in between if sent[one]]
+    names = _callees(recording)
+    calls = Counter((_name(call.caller, names), _name(call.callee, names)) for call in recording.calls)
+    given = Counter(
+        (_name(call.callee, names), _name(call.caller, names)) for call in recording.calls if call.result != "None"
+    )
+    told += [Talk(*pair, "call", count) for pair, count in calls.items()]
+    told += [Talk(*pair, "return", count) for pair, count in given.items()]
+    return tuple(told)
+
+
+def party_of(name: str) -> str:
+    """The party that a name in ``talks`` belongs to; what is none of them by name is a network."""
+    return name if name in _NAMED else "network"
+
+
+def block_diagram(told: tuple[Talk, ...]) -> Diagram:
+    """The same as boxes and arrows with counts; a call that gave something back has an arrow at both ends."""
+    returned = {(talk.source, talk.target) for talk in told if talk.kind == "return"}
+    arrows = tuple(
+        DiagramArrow(
+            talk.source,
+            talk.target,
+            _count(talk),
+            heads="both" if talk.kind == "call" and (talk.target, talk.source) in returned else "target",
+        )
+        for talk in told
+        if talk.kind != "return"
+    )
+    named = dict.fromkeys(("robot", "responder", *(name for talk in told for name in (talk.source, talk.target))))
+    return Diagram("blockdiag", tuple(DiagramActor(name, name) for name in named), arrows)
+
+
+def sequence_diagram(told: SequenceDiagram) -> Diagram:
+    """What was told, with its words, as a sequence diagram that stands beside a notebook's own."""
+    return Diagram(
+        "seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_steps(told))
+    )  # fmt: skip
+
+
+def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
+    for step in told.steps:
+        if not isinstance(step, Step):
+            yield Divider(f"{step.count} more {step.what}{'' if step.count == 1 else 's'}", delay=True)
+        elif step.kind == "silence":
+            yield Divider("no answer", delay=True)
+        else:
+            yield DiagramArrow(
+                step.source,
+                step.target,
+                step.label,
+                "dashed" if step.kind == "return" else "solid",
+                failed=step.kind == "lost",
+            )
+
+
+def _callees(recording: Recording) -> Mapping[str, str]:
+    """What each name that was called is shown as."""
+    networks = dict.fromkeys(call.callee for call in recording.calls if call.callee not in _NAMED)
+    shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
+    return MappingProxyType(shown | {name: name for name in _NAMED})
+
+
+def _name(name: str, names: Mapping[str, str]) -> str:
+    return names.get(name, "responder")
+
+
+def _count(talk: Talk) -> str:
+    return f"{talk.count}, {talk.lost} lost" if talk.lost else str(talk.count)
