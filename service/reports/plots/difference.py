@@ -35,7 +35,8 @@ _MOST_NAMED = 6
 class Differences:
     """Names as the diagram has them, for what it alone has, and as ``talks`` has them, for what happened besides.
 
-    An arrow at an actor that is itself in one of the two only is not told again.
+    An arrow at an actor that is itself in one of the two only is not told again. ``alike`` is the part of all arrows,
+    0 to 1, that is in both.
     """
 
     drawn_actors: tuple[str, ...] = ()
@@ -43,10 +44,10 @@ class Differences:
     happened_actors: tuple[str, ...] = ()
     happened_arrows: tuple[Pair, ...] = ()
 
-    def __len__(self) -> int:
-        return sum(
-            map(len, (self.drawn_actors, self.drawn_arrows, self.happened_actors, self.happened_arrows))
-        )  # fmt: skip
+    alike: float = 0.0
+
+    def __bool__(self) -> bool:
+        return bool(self.drawn_actors or self.drawn_arrows or self.happened_actors or self.happened_arrows)
 
 
 def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
@@ -55,7 +56,7 @@ def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
     An arrow may stand for a way through actors that are not drawn, so that a diagram can leave out what goes on
     inside, and one without a direction for either. What a call gave back need not be drawn.
     """
-    party = {actor.name: _party(actor) for actor in diagram.actors}
+    party = {actor.name: party_of_actor(actor) for actor in diagram.actors}
     drawn = {each for each in party.values() if each is not None}
     happened = {party_of(name) for talk in told for name in (talk.source, talk.target)}
     if len(drawn & happened) < 2:
@@ -76,12 +77,14 @@ def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
         and {party_of(talk.source), party_of(talk.target)} <= drawn
         and (party_of(talk.source), party_of(talk.target)) not in covered
     ]
+    pairs = {(party_of(talk.source), party_of(talk.target)) for talk in told}
     took_part = dict.fromkeys(name for talk in told for name in (talk.source, talk.target))
     return Differences(
         tuple(name for name, each in party.items() if each not in happened),
         tuple(wrong),
         tuple(name for name in took_part if party_of(name) not in drawn),
         tuple(dict.fromkeys(missing)),
+        len(covered & pairs) / len(covered | pairs),
     )
 
 
@@ -103,7 +106,7 @@ def in_words(found: Differences) -> str:
     return " ".join(told)
 
 
-def _party(actor: DiagramActor) -> str | None:
+def party_of_actor(actor: DiagramActor) -> str | None:
     """Which party an actor is, by its name, or else by its label; None for one that is none of them."""
     for text in (actor.name, actor.label):
         words = set(_WORD.findall(text.lower()))

@@ -26,7 +26,7 @@ from service.reports.plots.style import FAINT, FAULT, HEAD, RULE, WIDTH, axes_at
 from submissions.diagram import Diagram, DiagramArrow, Divider
 
 _EDGE = 0.62  # from the paper's edge to the first and the last lane, inches
-_NARROWEST = 0.86  # between two lanes
+_NARROWEST = 0.79  # between two lanes
 _ARROW = 0.19  # that an arrow takes below its label
 _SELF = 0.30  # that an arrow to its own lane takes to the side
 _DIVIDER = 0.34
@@ -51,7 +51,8 @@ def draw_lanes(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Fig
     lanes = {actor.name: _EDGE + number * gap for number, actor in enumerate(diagram.actors)}
     if count == 1:
         lanes = {diagram.actors[0].name: width / 2}
-    heads = {actor.name: broken(actor.label, min(gap - 0.2, 2 * _EDGE - 0.24), 3) for actor in diagram.actors}
+    half = min(gap / 2 - 0.06, _EDGE - 0.08)
+    heads = {actor.name: broken(actor.label, 2 * half, 3) for actor in diagram.actors}
     rows = [_row(step, lanes, width) for step in diagram.steps]
     head = LINE_HEIGHT * max(map(len, heads.values())) + 0.16
     top = head + (0.24 if diagram.groups else 0.12)
@@ -61,7 +62,6 @@ def draw_lanes(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Fig
     axes.set_axis_off()
     axes.set_xlim(0, width)
     axes.set_ylim(0, body)
-    half = min(gap / 2 - 0.06, _EDGE - 0.08)
     for group in diagram.groups:
         across = [lanes[name] for name in group.members]
         if across:

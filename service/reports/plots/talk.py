@@ -18,6 +18,8 @@ from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
 #: Networks that are counted by the names that they are bound to; those that are called later count as one.
 _MOST_NETWORKS = 4
+#: Of what was said, beside a diagram whose labels are words.
+_LONGEST_LABEL = 32
 _OTHERS = "other networks"
 _NAMED = frozenset(PARTIES) - {"network"}
 
@@ -88,7 +90,7 @@ def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
             yield DiagramArrow(
                 step.source,
                 step.target,
-                step.label,
+                one_line(step.label, _LONGEST_LABEL),
                 "dashed" if step.kind == "return" else "solid",
                 failed=step.kind == "lost",
             )
