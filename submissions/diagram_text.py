@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from sim.errors import UsageError
 from submissions.diagram import ActorGroup, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider, Heads
-from submissions.diagram_tokens import Token, mistake, tokens_of
+from submissions.diagram_tokens import DiagramToken, mistake, tokens_of
 from submissions.diagram_vocabulary import (
     ARROWS,
     DIRECTIONS,
@@ -48,7 +48,7 @@ def read_diagram(kind: DiagramKind, text: str, first_line: int = 1) -> Diagram:
 class _Reader:
     """Where the reading is, and what it has found so far."""
 
-    def __init__(self, kind: DiagramKind, tokens: Sequence[Token], first_line: int) -> None:
+    def __init__(self, kind: DiagramKind, tokens: Sequence[DiagramToken], first_line: int) -> None:
         self._kind = kind
         self._tokens = tokens
         self._place = 0
@@ -88,7 +88,7 @@ class _Reader:
 
     # What is next.
 
-    def _next(self) -> Token | None:
+    def _next(self) -> DiagramToken | None:
         return self._tokens[self._place] if self._place < len(self._tokens) else None
 
     def _is(self, sign: str, ahead: int = 0) -> bool:
@@ -158,7 +158,7 @@ class _Reader:
         if depth > MAX_DEPTH:
             raise mistake(self._line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them")
 
-    def _divide(self, token: Token) -> None:
+    def _divide(self, token: DiagramToken) -> None:
         if self._kind != "seqdiag":
             raise mistake(token.line, "a block diagram has no dividers, expected lines like a -> b;")
         self._add(Divider(token.text[3:-3].strip(), delay=token.text.startswith("...")))
@@ -210,7 +210,7 @@ class _Reader:
     def _actors_or_arrows(self, depth: int) -> list[str]:
         """``a;`` or ``a, b [shape = box];`` or ``a -> b <- c [label = "x"];``; the actors that were named."""
         chain = [self._names()]
-        signs: list[Token] = []
+        signs: list[DiagramToken] = []
         while (token := self._next()) is not None and token.kind == "arrow":
             if token.text not in ARROWS[self._kind]:
                 raise self._unexpected(f"one of {' '.join(ARROWS[self._kind])}")
@@ -226,7 +226,7 @@ class _Reader:
                 self._actors[name].update(attributes)
         return [name for names in chain for name in names]
 
-    def _arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[Token], depth: int) -> None:
+    def _arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[DiagramToken], depth: int) -> None:
         attributes = self._attributes(OF_ARROWS, "an arrow")
         returns: list[DiagramArrow] = []
         for sign, left, right in zip(signs, chain[:-1], chain[1:], strict=True):

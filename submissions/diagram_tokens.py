@@ -30,7 +30,7 @@ _NEVER_ENDS = {'"': "a text in quotes", "'": "a text in quotes", "/": "a comment
 
 
 @dataclass(frozen=True, slots=True)
-class Token:
+class DiagramToken:
     """A piece of the text: an arrow, a sign, a name, a text without its quotes, or a divider without its signs."""
 
     kind: str
@@ -43,11 +43,11 @@ def mistake(line: int, what: str) -> UsageError:
     return UsageError(f"line {line}: {what}")
 
 
-def tokens_of(text: str, first_line: int = 1) -> list[Token]:
+def tokens_of(text: str, first_line: int = 1) -> list[DiagramToken]:
     """The tokens of ``text``, without blanks and comments. Raises UsageError, naming the line, for other signs."""
     if len(text) > MAX_CHARACTERS:
         raise mistake(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
-    found: list[Token] = []
+    found: list[DiagramToken] = []
     place, line = 0, first_line
     while place < len(text):
         match = _TOKEN.match(text, place)
@@ -55,7 +55,7 @@ def tokens_of(text: str, first_line: int = 1) -> list[Token]:
             raise mistake(line, _strange(text[place:]))
         kind, piece = str(match.lastgroup), match[0]
         if kind not in ("space", "comment"):
-            found.append(Token(kind, _content(kind, piece), line))
+            found.append(DiagramToken(kind, _content(kind, piece), line))
         line += piece.count("\n")
         place = match.end()
     return found

@@ -1,4 +1,4 @@
-"""``robomark run`` for a notebook: every robot that its cells start, one after the other. No marks."""
+"""``robomark run`` for a notebook: every robot that its cells start, one after the other. No highlights."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots.diagram_parts import Marks
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.own_diagrams import draw_diagram, title_of_cell
 from service.reports.plots.style import png
 from service.reports.readable import readable
@@ -108,5 +108,5 @@ def show_diagrams(notebook: Notebook, folder: Path | None) -> None:
             typer.echo("note: the notebook draws diagrams; --diagrams FOLDER writes them as pictures", err=True)
         return
     for cell in found.cells:
-        figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Marks())
+        figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())
         typer.echo(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', png(figure))}", err=True)

@@ -28,7 +28,7 @@ from responders.sandbox.running_child import ChildLimits
 from running import run_program
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots.diagram_parts import Marks
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import differences, in_words
 from service.reports.plots.own_diagrams import draw_diagram
 from service.reports.plots.talk import talks
@@ -190,7 +190,7 @@ def test_9_block_diagram(executed: ExecutedNotebook) -> None:
         ("python", "mlp", "both"),
     ]
     assert compared(blocks, run(executed, 33)) == "parser, agent and logger took part and are not drawn."
-    draw_diagram(blocks, "Cell 2", "", Marks()).draw_without_rendering()
+    draw_diagram(blocks, "Cell 2", "", Highlights()).draw_without_rendering()
 
 
 @pytest.mark.parametrize(
@@ -204,4 +204,4 @@ def test_9_block_diagram(executed: ExecutedNotebook) -> None:
 )
 def test_10_sequence_diagrams(executed: ExecutedNotebook, cell: int, described: int, words: str) -> None:
     assert compared(DIAGRAMS[cell], run(executed, described)) == words
-    draw_diagram(DIAGRAMS[cell], f"Cell {cell}", "", Marks()).draw_without_rendering()
+    draw_diagram(DIAGRAMS[cell], f"Cell {cell}", "", Highlights()).draw_without_rendering()

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 from matplotlib.figure import Figure
 
-from service.reports.plots.block_places import Place, places_of
+from service.reports.plots.block_places import places_of
 from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
-    Marks,
+    Highlights,
     arrow_colour,
     broken,
     connect,
@@ -28,7 +28,7 @@ from submissions.diagram import Diagram, DiagramArrow
 _MOST_ACROSS = 4  # levels that stand side by side; more of them go down the paper
 _BOX = 1.02  # inches, as the widest label
 _GAP = 0.44  # between boxes, where no label asks for more
-_ROW = 0.32  # between boxes that stand below each other
+_ROW = 0.42  # between boxes that stand below each other
 _MARGIN = 0.16
 _FOOT = 0.28
 _TWO_WAYS = 0.07  # from the middle, where two arrows run between the same boxes
@@ -48,7 +48,7 @@ class _Sheet:
     height: float
 
 
-def draw_blocks(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Figure:
+def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
     """The block diagram, along the paper or, with many levels or long words at its arrows, down it."""
     diagram = replace(diagram, steps=_merged(diagram))
     sheet = _sheet(diagram)
@@ -67,19 +67,20 @@ def draw_blocks(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Fi
     patches = {}
     for actor in diagram.actors:
         x, y = sheet.centres[actor.name]
-        patches[actor.name] = draw_actor(axes, actor, x, y, width, height, broken(actor.label, width - 0.1, 4), marks)
+        patches[actor.name] = draw_actor(
+            axes, actor, x, y, width, height, broken(actor.label, width - 0.1, 4), highlights
+        )
     pairs = {(arrow.source, arrow.target) for arrow in diagram.arrows}
     for number, arrow in enumerate(diagram.arrows):
         shift = _TWO_WAYS if (arrow.target, arrow.source) in pairs else 0.0
         if arrow.source == arrow.target:
             continue
         start, end, bend = _line(arrow, sheet, shift, 1 if number % 2 else -1)
-        connect(axes, arrow, start, end, marks, (patches[arrow.source], patches[arrow.target]), bend)
-        lines = broken(arrow.label, 2.0, 3)
-        signed = (f"{marks.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if marks.on(arrow) else lines
+        connect(axes, arrow, start, end, highlights, (patches[arrow.source], patches[arrow.target]), bend)
+        signed = highlights.signed(arrow, broken(arrow.label, 2.0, 3))
         x, y = _label_at(start, end, bend, signed if shift else ())
-        label(axes, x, y, signed, arrow_colour(arrow, marks), va="center")
-    marks.explain(figure)
+        label(axes, x, y, signed, arrow_colour(arrow, highlights), va="center")
+    highlights.explain(figure)
     return figure
 
 
@@ -97,39 +98,29 @@ def _merged(diagram: Diagram) -> tuple[DiagramArrow, ...]:
 def _sheet(diagram: Diagram) -> _Sheet:
     places = places_of(diagram)
     levels = 1 + max(place.level for place in places.values())
-    rows = 1 + 2 * max(place.row for place in places.values())
-    words = max((len(line) for arrow in diagram.arrows for line in broken(arrow.label, 2.0, 3)), default=0) / CHARACTERS
-    gap = max(_GAP, words + 0.26)
-    across = levels * _BOX + (levels - 1) * gap + 2 * _MARGIN
-    down = diagram.portrait or levels > _MOST_ACROSS or across > WIDTH
-    if down:
-        across = rows * _BOX + (rows - 1) * gap + 2 * _MARGIN
-    width = max(WIDTH, across)
+    rows = 1 + int(2 * max(place.row for place in places.values()))
+    words = max((len(line) for arrow in diagram.arrows for line in broken(arrow.label, 2.0, 3)), default=0)
+    gap = max(_GAP, words / CHARACTERS + 0.26)
+    down = diagram.portrait or levels > _MOST_ACROSS or _room(levels, gap) > WIDTH
+    across, below = (rows, levels) if down else (levels, rows)
+    width = max(WIDTH, _room(across, gap))
     lines = max(len(broken(actor.label, _BOX - 0.1, 4)) for actor in diagram.actors)
+    framed = 0.24 if diagram.groups else 0.0
     box = (_BOX, max(0.4, LINE_HEIGHT * lines + 0.2))
-    far = box[1] + (max(_ROW, 0.42) if down else _ROW) + (0.24 if diagram.groups else 0)
-    steps = (_BOX + gap, far)
-    height = box[1] + far * ((levels if down else rows) - 1) + 2 * _MARGIN + (0.24 if diagram.groups else 0)
-    room = (0.0 if down else (width - across) / 2, 0.0)
-    if not down and levels > 1:
-        steps = (min(_BOX + 1.4, (width - 2 * _MARGIN - _BOX) / (levels - 1)), far)
-        room = ((width - 2 * _MARGIN - _BOX - steps[0] * (levels - 1)) / 2, 0.0)
-    centres = {name: _centre(place, down, steps, width, height, room[0], box) for name, place in places.items()}
+    spread = (width - 2 * _MARGIN - _BOX) / max(1, across - 1)
+    step = (_BOX + gap if down else min(_BOX + 1.4, spread), box[1] + _ROW + framed)
+    height = box[1] + step[1] * (below - 1) + 2 * _MARGIN + framed
+    centres = {}
+    for name, place in places.items():
+        level = place.level - (levels - 1) / 2
+        right, low = (place.row, level) if down else (level, place.row)
+        centres[name] = (width / 2 + right * step[0], height / 2 - low * step[1])
     return _Sheet(box, centres, width, height)
 
 
-def _centre(
-    place: Place,
-    down: bool,
-    steps: Point,
-    width: float,
-    height: float,
-    room: float,
-    box: Point,
-) -> Point:
-    if down:
-        return width / 2 + place.row * steps[0], height - _MARGIN - box[1] / 2 - place.level * steps[1]
-    return _MARGIN + room + box[0] / 2 + place.level * steps[0], height / 2 - place.row * steps[1]
+def _room(boxes: int, gap: float) -> float:
+    """Inches that boxes beside each other take."""
+    return boxes * _BOX + (boxes - 1) * gap + 2 * _MARGIN
 
 
 def _line(arrow: DiagramArrow, sheet: _Sheet, shift: float, side: int) -> tuple[Point, Point, float]:

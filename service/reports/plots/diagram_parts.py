@@ -1,4 +1,4 @@
-"""What block and sequence diagrams are drawn of: actors, arrows, labels, and what marks a difference.
+"""What block and sequence diagrams are drawn of: actors, arrows, labels, and what highlights a difference.
 
 Where they stand is the diagram's own business, ``blocks.py`` and ``lanes.py``.
 """
@@ -35,8 +35,8 @@ _BARE = ("none", "dots", "textbox")
 
 
 @dataclass(frozen=True, slots=True)
-class Marks:
-    """Which actors and arrows (source, target) are marked as different, and how; by default none."""
+class Highlights:
+    """Which actors and arrows (source, target) are highlighted as different, and how; by default none."""
 
     actors: frozenset[str] = frozenset()
     arrows: frozenset[tuple[str, str]] = frozenset()
@@ -45,10 +45,14 @@ class Marks:
     words: str = ""
 
     def on(self, arrow: DiagramArrow) -> bool:
-        """Whether an arrow is marked, for itself or for one of its ends."""
+        """Whether an arrow is highlighted, for itself or for one of its ends."""
         pair = (arrow.source, arrow.target)
         turned = arrow.heads != "target" and pair[::-1] in self.arrows
         return pair in self.arrows or turned or not self.actors.isdisjoint(pair)
+
+    def signed(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
+        """The label of an arrow, with the sign before it, for who does not tell the colours apart."""
+        return (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.on(arrow) else lines
 
     def explain(self, figure: Figure) -> None:
         """Tell what the mark means, at the foot of the figure, if there is one in it."""
@@ -85,17 +89,17 @@ def draw_actor(
     width: float,
     height: float,
     lines: tuple[str, ...],
-    marks: Marks,
+    highlights: Highlights,
 ) -> Patch:
     """An actor with its centre at ``x``, ``y``; what arrows end at."""
-    marked = actor.name in marks.actors
+    different = actor.name in highlights.actors
     fill = _usable(actor.colour, _FILL)
     patch = _shape(actor.shape, x, y, width, height)
     patch.set(
         facecolor="white" if actor.shape in _BARE else fill,
-        edgecolor=marks.colour if marked else "white" if actor.shape in _BARE else FAINT,
-        linewidth=1.8 if marked else 0.8,
-        linestyle=_DASHES["dashed"] if marked else _DASHES[actor.line],
+        edgecolor=highlights.colour if different else "white" if actor.shape in _BARE else FAINT,
+        linewidth=1.8 if different else 0.8,
+        linestyle=_DASHES["dashed"] if different else _DASHES[actor.line],
         zorder=3,
     )
     axes.add_patch(patch)
@@ -104,19 +108,19 @@ def draw_actor(
         x, y, drawable("\n".join(lines)), font=font(7.8, bold=True), color=ink, ha="center",
         va="center" if len(lines) > 1 else "center_baseline", parse_math=False, linespacing=1.05, zorder=5,
     )  # fmt: skip
-    if marked:
+    if different:
         axes.text(
-            x + width / 2, y + height / 2, marks.sign, font=font(8.5, bold=True), color=marks.colour, ha="center",
-            va="center", zorder=6,
-            bbox={"boxstyle": "circle,pad=0.12", "facecolor": "white", "edgecolor": marks.colour},
+            x + width / 2, y + height / 2, highlights.sign, font=font(8.5, bold=True), color=highlights.colour,
+            ha="center", va="center", zorder=6,
+            bbox={"boxstyle": "circle,pad=0.12", "facecolor": "white", "edgecolor": highlights.colour},
         )  # fmt: skip
     return patch
 
 
-def arrow_colour(arrow: DiagramArrow, marks: Marks) -> str:
-    """The colour of an arrow, as it is marked, or as its text says, or as who sends it."""
-    if marks.on(arrow):
-        return marks.colour
+def arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
+    """The colour of an arrow, as it is highlighted, or as its text says, or as who sends it."""
+    if highlights.on(arrow):
+        return highlights.colour
     if arrow.failed:
         return FAULT
     usual = {("robot", "responder"): LEFT, ("responder", "robot"): RIGHT}.get((arrow.source, arrow.target), INK)
@@ -128,7 +132,7 @@ def connect(
     arrow: DiagramArrow,
     start: tuple[float, float],
     end: tuple[float, float],
-    marks: Marks,
+    highlights: Highlights,
     ends: tuple[Patch | None, Patch | None] = (None, None),
     bend: float = 0.0,
 ) -> None:
@@ -137,7 +141,7 @@ def connect(
     style = "-" if arrow.failed else styles[arrow.heads]
     line = "dotted" if arrow.failed else arrow.line
     if line == "solid" or arrow.open_head or style == "-":
-        drawn = [(style, _DASHES[line], 1.9 if marks.on(arrow) else 1.2)]
+        drawn = [(style, _DASHES[line], 1.9 if highlights.on(arrow) else 1.2)]
     else:  # whose heads would be dashed too
         drawn = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
     for arrow_style, dashes, thick in drawn:
@@ -146,7 +150,7 @@ def connect(
         axes.add_patch(
             FancyArrowPatch(
                 start, end, arrowstyle=sized, connectionstyle=f"arc3,rad={bend}", patchA=ends[0], patchB=ends[1],
-                shrinkA=0, shrinkB=0, mutation_scale=1, color=arrow_colour(arrow, marks), linewidth=thick,
+                shrinkA=0, shrinkB=0, mutation_scale=1, color=arrow_colour(arrow, highlights), linewidth=thick,
                 linestyle=dashes, joinstyle="miter", zorder=2,
             )
         )  # fmt: skip

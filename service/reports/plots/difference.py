@@ -43,7 +43,6 @@ class Differences:
     drawn_arrows: tuple[Pair, ...] = ()
     happened_actors: tuple[str, ...] = ()
     happened_arrows: tuple[Pair, ...] = ()
-
     alike: float = 0.0
 
     def __bool__(self) -> bool:

@@ -15,7 +15,7 @@ from service.reports.plots.blocks import draw_blocks
 from service.reports.plots.confusion import draw_confusion
 from service.reports.plots.conversation import draw_conversation
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.diagram_parts import Marks
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.misread import draw_misread, misread
 from service.reports.plots.own_diagrams import draw_own, own_diagrams
 from service.reports.plots.path import Pixels, draw_path
@@ -71,7 +71,7 @@ def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
     if plot.kind == "talk":
         trial = grade.trials[plot.subject]
         told = block_diagram(talks(trial.recording))
-        return draw_blocks(told, plot.title, f"trial {trial.index + 1}; counts of texts and calls", Marks())
+        return draw_blocks(told, plot.title, f"trial {trial.index + 1}; counts of texts and calls", Highlights())
     result = grade.criteria[plot.subject]
     if plot.kind == "confusion" and result.accuracy is not None:
         return draw_confusion(result, result.accuracy, plot.title)
@@ -194,7 +194,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
         yield Plot(
             f"sensors-{name}", "sensors", index, scenario, f"{title}: sensors",
-            "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
+            "What the sensors read at every moment, whether or not the program asked. Highlights at the top: "
             "messages sent, answers received, speech, touches and faults.",
             f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
         )  # fmt: skip

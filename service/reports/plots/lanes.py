@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
-    Marks,
+    Highlights,
     arrow_colour,
     broken,
     connect,
@@ -34,7 +34,7 @@ _FOOT = 0.28
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
+class _StepRow:
     """A step with its label and note broken into lines, and its height in inches."""
 
     step: DiagramArrow | Divider
@@ -43,7 +43,7 @@ class _Row:
     height: float = _DIVIDER
 
 
-def draw_lanes(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Figure:
+def draw_lanes(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
     """The sequence diagram, as wide as its lanes need."""
     count = len(diagram.actors)
     width = max(WIDTH, 2 * _EDGE + (count - 1) * _NARROWEST)
@@ -71,44 +71,46 @@ def draw_lanes(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Fig
     for actor in diagram.actors:
         x = lanes[actor.name]
         axes.plot([x, x], [0.02, level], color=RULE, linewidth=1.0, zorder=1)
-        draw_actor(axes, actor, x, level, 2 * half, head, heads[actor.name], marks)
+        draw_actor(axes, actor, x, level, 2 * half, head, heads[actor.name], highlights)
     y = level - head / 2 - 0.06
     for row in rows:
-        _draw_row(axes, row, lanes, y, marks, width)
+        _draw_row(axes, row, lanes, y, highlights, width)
         y -= row.height
-    marks.explain(figure)
+    highlights.explain(figure)
     return figure
 
 
-def _row(step: DiagramArrow | Divider, lanes: Mapping[str, float], width: float) -> _Row:
+def _row(step: DiagramArrow | Divider, lanes: Mapping[str, float], width: float) -> _StepRow:
     if isinstance(step, Divider):
-        return _Row(step, broken(step.text, width - 0.6, 1))
+        return _StepRow(step, broken(step.text, width - 0.6, 1))
     span = abs(lanes[step.source] - lanes[step.target])
     lines = broken(step.label, max(1.3, span) - 0.06, 4)
     note = broken(step.note, 1.5, 3)
     height = LINE_HEIGHT * max(1, len(lines)) + _ARROW + (LINE_HEIGHT * len(note) + 0.12 if note else 0)
-    return _Row(step, lines, note, height + (0.1 if span == 0 else 0))
+    return _StepRow(step, lines, note, height + (0.1 if span == 0 else 0))
 
 
-def _draw_row(axes: Axes, row: _Row, lanes: Mapping[str, float], y: float, marks: Marks, width: float) -> None:
+def _draw_row(
+    axes: Axes, row: _StepRow, lanes: Mapping[str, float], y: float, highlights: Highlights, width: float
+) -> None:
     step = row.step
     if isinstance(step, Divider):
         _draw_divider(axes, row.lines, y - _DIVIDER / 2, step.delay, width)
         return
     source, target = lanes[step.source], lanes[step.target]
     baseline = y - LINE_HEIGHT * max(1, len(row.lines)) - 0.08
-    colour = arrow_colour(step, marks)
-    signed = _signed(row.lines, marks) if marks.on(step) else row.lines
+    colour = arrow_colour(step, highlights)
+    signed = highlights.signed(step, row.lines)
     if source == target:
         side = -_SELF if source > width - 1.2 else _SELF
         axes.plot([source, source + side, source + side], [baseline + 0.06, baseline + 0.06, baseline - 0.06],
                   color=colour, linewidth=1.2, zorder=2)  # fmt: skip
-        connect(axes, step, (source + side, baseline - 0.06), (source, baseline - 0.06), marks)
+        connect(axes, step, (source + side, baseline - 0.06), (source, baseline - 0.06), highlights)
         label(axes, _inside(source + side / 2, signed, width), baseline + 0.08, signed, colour)
     else:
         label(axes, _inside((source + target) / 2, signed, width), baseline + 0.05, signed, colour)
         stop = source + 0.66 * (target - source) if step.failed else target
-        connect(axes, step, (source, baseline), (stop, baseline), marks)
+        connect(axes, step, (source, baseline), (stop, baseline), highlights)
         if step.failed:
             axes.plot([stop], [baseline], "x", color=FAULT, markersize=6.5, markeredgewidth=1.9, zorder=4)
     if row.note:
@@ -122,17 +124,12 @@ def _draw_divider(axes: Axes, lines: tuple[str, ...], y: float, delay: bool, wid
     label(axes, width / 2, y, lines, FAINT, va="center")
 
 
-def _draw_note(axes: Axes, row: _Row, x: float, baseline: float, width: float) -> None:
+def _draw_note(axes: Axes, row: _StepRow, x: float, baseline: float, width: float) -> None:
     axes.text(
         _inside(x, row.note, width), baseline - 0.08, drawable("\n".join(row.note)), font=font(7.6), color=FAINT,
         ha="center", va="top", parse_math=False, linespacing=1.05, zorder=4,
         bbox={"boxstyle": "square,pad=0.2", "facecolor": "#fff7d6", "edgecolor": RULE, "linewidth": 0.6},
     )  # fmt: skip
-
-
-def _signed(lines: Sequence[str], marks: Marks) -> tuple[str, ...]:
-    """A label with the mark before it, for who does not tell the colours apart."""
-    return (f"{marks.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:])
 
 
 def _inside(x: float, lines: Sequence[str], width: float) -> float:

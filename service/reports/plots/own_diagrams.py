@@ -1,4 +1,4 @@
-"""The diagrams that a notebook draws itself, and of each kind one beside what happened, with the differences marked.
+"""The diagrams that a notebook draws itself, and of each kind one beside what happened, with what differs highlighted.
 
 Of several diagrams of a kind the one that is closest to what happened is compared. Shown, never marked.
 """
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from service.grading.grade import Grade
 from service.reports.plots.blocks import draw_blocks
-from service.reports.plots.diagram_parts import Marks
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import Differences, differences, in_words, party_of_actor
 from service.reports.plots.lanes import draw_lanes
 from service.reports.plots.plot import Plot, trial_name
@@ -49,16 +49,23 @@ def own_diagrams(grade: Grade, cells: Sequence[DiagramCell]) -> tuple[OwnDiagram
     """
     talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
     talking.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
-    compared = _closest(grade, cells, talking[0]) if talking else {}
-    return tuple(_own(grade, cell, compared.get(cell.cell), talking) for cell in cells)
+    if not talking:
+        return tuple(_alone(cell) for cell in cells)
+    compared = _closest(grade, cells, talking[0])
+    return tuple(
+        _compared(cell, compared[cell.cell], grade, talking[0]) if cell.cell in compared else _alone(cell)
+        for cell in cells
+    )
 
 
 def draw_own(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
     """One of the two plots of ``own``."""
     found = own.differences or Differences()
     if plot.kind == "own":
-        marks = Marks(frozenset(found.drawn_actors), frozenset(found.drawn_arrows), FAULT, "✗", "drawn, did not happen")
-        return draw_diagram(own.cell.diagram, plot.title, "as the notebook draws it", marks)
+        highlights = Highlights(
+            frozenset(found.drawn_actors), frozenset(found.drawn_arrows), FAULT, "✗", "drawn, did not happen"
+        )
+        return draw_diagram(own.cell.diagram, plot.title, "as the notebook draws it", highlights)
     trial = grade.trials[plot.subject]
     subtitle = f"{one_line(trial.scenario, 40)}, trial {trial.index + 1}, as it was observed"
     actors, arrows = found.happened_actors, found.happened_arrows
@@ -69,14 +76,14 @@ def draw_own(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
         happened = replace(happened, actors=_in_order(happened.actors, own.cell.diagram.actors))
         actors = tuple(map(party_of, actors))
         arrows = tuple((party_of(one), party_of(other)) for one, other in arrows)
-    marks = Marks(frozenset(actors), frozenset(arrows), _HAPPENED, "+", "happened, is not drawn")
-    return draw_diagram(happened, plot.title, subtitle, marks)
+    highlights = Highlights(frozenset(actors), frozenset(arrows), _HAPPENED, "+", "happened, is not drawn")
+    return draw_diagram(happened, plot.title, subtitle, highlights)
 
 
-def draw_diagram(diagram: Diagram, title: str, subtitle: str, marks: Marks) -> Figure:
+def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
     """A diagram of either kind."""
     draw = draw_blocks if diagram.kind == "blockdiag" else draw_lanes
-    return draw(diagram, title, subtitle, marks)
+    return draw(diagram, title, subtitle, highlights)
 
 
 def title_of_cell(cell: DiagramCell) -> str:
@@ -102,26 +109,27 @@ def _in_order(parties: Sequence[DiagramActor], drawn: Sequence[DiagramActor]) ->
     return tuple(sorted(parties, key=lambda party: order.index(party.name) if party.name in order else len(order)))
 
 
-def _own(grade: Grade, cell: DiagramCell, found: Differences | None, talking: Sequence[int]) -> OwnDiagram:
-    title = title_of_cell(cell)
-    names = ", ".join(one_line(actor.label, 30) for actor in cell.diagram.actors)
-    alt = f"{title} of {names}, with {len(cell.diagram.arrows)} arrows."
-    if found is None:
-        plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title, "As the notebook draws it.", alt)
-        return OwnDiagram(cell, None, title, "", (plot,))
-    index = talking[0]
+def _alone(cell: DiagramCell) -> OwnDiagram:
+    plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title_of_cell(cell), "As the notebook draws it.", _alt(cell))
+    return OwnDiagram(cell, None, plot.title, "", (plot,))
+
+
+def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int) -> OwnDiagram:
     trial = grade.trials[index]
-    words, name = in_words(found), f"cell-{cell.cell}-{trial_name(trial)}"
+    title, words, name = title_of_cell(cell), in_words(found), f"cell-{cell.cell}-{trial_name(trial)}"
     where = f"{one_line(trial.scenario, 60)}, trial {trial.index + 1}"
     drawn = " ✗: it did not happen." if found.drawn_actors or found.drawn_arrows else ""
     happened = " +: it is not drawn." if found.happened_actors or found.happened_arrows else ""
     plots = (
-        Plot(
-            f"own-{name}", "own", index, "", title, f"As the notebook draws it.{drawn}", f"{alt} {words}",
-        ),
+        Plot(f"own-{name}", "own", index, "", title, f"As the notebook draws it.{drawn}", f"{_alt(cell)} {words}"),
         Plot(
             f"happened-{name}", "happened", index, "", "What happened",
             f"As it was observed in {where}.{happened}", f"The same of what happened in {where}. {words}",
         ),
     )  # fmt: skip
     return OwnDiagram(cell, found, title, words, plots)
+
+
+def _alt(cell: DiagramCell) -> str:
+    names = ", ".join(one_line(actor.label, 30) for actor in cell.diagram.actors)
+    return f"{title_of_cell(cell)} of {names}, with {len(cell.diagram.arrows)} arrows."

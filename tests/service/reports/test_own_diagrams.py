@@ -14,7 +14,7 @@ from PIL import Image
 import report_builders as build
 from service.grading.grade import Grade
 from service.reports.html import report
-from service.reports.plots.diagram_parts import Marks
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import Differences, differences, in_words
 from service.reports.plots.drawn import draw_all, plots_of
 from service.reports.plots.own_diagrams import draw_diagram, draw_own, own_diagrams
@@ -222,8 +222,8 @@ HOSTILE = (
 )  # fmt: skip
 def test_whatever_is_drawn_fits_into_memory_and_repeats(kind: DiagramKind, text: str) -> None:
     diagram = read_diagram(kind, text)
-    marks = Marks(frozenset({"a"}), frozenset({("a", "b")}), words="marked")
-    first, second = (png(draw_diagram(diagram, "t", "s", marks)) for _ in range(2))
+    highlights = Highlights(frozenset({"a"}), frozenset({("a", "b")}), words="marked")
+    first, second = (png(draw_diagram(diagram, "t", "s", highlights)) for _ in range(2))
     assert first == second
     with Image.open(io.BytesIO(first)) as image:
         assert image.width * image.height <= 6_100_000
