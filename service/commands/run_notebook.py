@@ -105,7 +105,7 @@ def show_diagrams(notebook: Notebook, folder: Path | None) -> None:
         typer.echo(f"note: {readable(problem, 400)}", err=True)
     if folder is None:
         if found.cells:
-            typer.echo("note: the notebook draws diagrams; --diagrams FOLDER writes them as pictures", err=True)
+            typer.echo("note: the notebook draws diagrams; --diagrams FOLDER draws them", err=True)
         return
     for cell in found.cells:
         figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())

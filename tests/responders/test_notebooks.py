@@ -150,8 +150,8 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     assert "(says) Is that a upwards facing triangle" in done.stdout
     # The flags of the command line are those of the last run.
     assert done.stdout.count("(says) Is that a left facing triangle") == 1
-    pictures = [tmp_path / "p.png", *(tmp_path / "d" / f"cell-{number}.png" for number in (2, 7, 15, 27))]
-    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+    images = [tmp_path / "p.png", *(tmp_path / "d" / f"cell-{number}.png" for number in (2, 7, 15, 27))]
+    assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
     assert len(list((tmp_path / "d").iterdir())) == 4
 
 

@@ -97,7 +97,7 @@ def test_groups_have_all_that_is_in_them() -> None:
         ("<->", "solid", "both", False),
     ],
 )
-def test_arrows_keep_their_look(sign: str, line: str, heads: str, open_head: bool) -> None:
+def test_arrows_keep_their_style(sign: str, line: str, heads: str, open_head: bool) -> None:
     (arrow,) = read_diagram("seqdiag", f"a {sign} b").arrows
     assert (arrow.line, arrow.heads, arrow.open_head) == (line, heads, open_head)
 

@@ -1,6 +1,6 @@
 """Draws a block diagram: a box an actor, arrows between them.
 
-Which level a box stands on is told by ``block_places.py``; what it is a diagram of does not matter here.
+Which level a box stands on is told by ``block_layout.py``; what it is a diagram of does not matter here.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from matplotlib.figure import Figure
 
-from service.reports.plots.block_places import places_of
+from service.reports.plots.block_layout import layout_of
 from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
@@ -96,9 +96,9 @@ def _merged(diagram: Diagram) -> tuple[DiagramArrow, ...]:
 
 
 def _sheet(diagram: Diagram) -> _Sheet:
-    places = places_of(diagram)
-    levels = 1 + max(place.level for place in places.values())
-    rows = 1 + int(2 * max(place.row for place in places.values()))
+    layout = layout_of(diagram)
+    levels = 1 + max(position.level for position in layout.values())
+    rows = 1 + int(2 * max(position.row for position in layout.values()))
     words = max((len(line) for arrow in diagram.arrows for line in broken(arrow.label, 2.0, 3)), default=0)
     gap = max(_GAP, words / CHARACTERS + 0.26)
     down = diagram.portrait or levels > _MOST_ACROSS or _room(levels, gap) > WIDTH
@@ -111,9 +111,9 @@ def _sheet(diagram: Diagram) -> _Sheet:
     step = (_BOX + gap if down else min(_BOX + 1.4, spread), box[1] + _ROW + framed)
     height = box[1] + step[1] * (below - 1) + 2 * _MARGIN + framed
     centres = {}
-    for name, place in places.items():
-        level = place.level - (levels - 1) / 2
-        right, low = (place.row, level) if down else (level, place.row)
+    for name, position in layout.items():
+        level = position.level - (levels - 1) / 2
+        right, low = (position.row, level) if down else (level, position.row)
         centres[name] = (width / 2 + right * step[0], height / 2 - low * step[1])
     return _Sheet(box, centres, width, height)
 

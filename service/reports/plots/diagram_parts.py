@@ -55,7 +55,7 @@ class Highlights:
         return (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.on(arrow) else lines
 
     def explain(self, figure: Figure) -> None:
-        """Tell what the mark means, at the foot of the figure, if there is one in it."""
+        """Tell what the sign means, at the foot of the figure, if it is in it."""
         if self.actors or self.arrows:
             write(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
 

@@ -1,6 +1,6 @@
 """Who told whom how often in a trial: the robot, the responder, and what the responder called.
 
-What was said is ``sequence.py``'s; here it is only counted. The kit notes the first fifty of the calls that a text causes.
+What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A notebook's diagrams beside what happened: the differences, in the pictures and in words."""
+"""A notebook's diagrams beside what happened: the differences, in the drawings and in words."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def test_the_one_most_like_it_of_each_kind_is_compared() -> None:
     assert [own.words for own in own_diagrams(talk_grade(), cells(SEED))] == [""]
 
 
-def test_marks_stand_in_both_pictures() -> None:
+def test_what_differs_is_highlighted_in_both_drawings() -> None:
     grade = build.shape_grade()
     (own,) = own_diagrams(grade, cells(SEED))
     left, right = (texts(draw_own(own, grade, plot)) for plot in own.plots)
@@ -166,7 +166,7 @@ def test_what_happened_has_the_order_of_the_notebook() -> None:
     assert heads == ["logger", "network", "agent", "robot", "responder"]
 
 
-def test_the_page_has_both_pictures_and_the_sentence() -> None:
+def test_the_page_has_both_drawings_and_the_sentence() -> None:
     grade = build.shape_grade()
     grade = replace(grade, trials=grade.trials[:1], criteria=())
     notebook = Notebook("ada.ipynb", (Cell(1, "x = 1"), Cell(2, f"%%seqdiag\n{SEED}"), Cell(3, "%%seqdiag\na -> <b>")))
