@@ -1,4 +1,4 @@
-"""``robomark run`` for a notebook: every robot that its cells start, one after the other. No highlights."""
+"""``robomark run`` for a notebook: every robot that its cells start, one after the other. No marks."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def show_diagrams(notebook: Notebook, folder: Path | None) -> None:
         typer.echo(f"note: {readable(problem, 400)}", err=True)
     if folder is None:
         if found.cells:
-            typer.echo("note: the notebook draws diagrams; --diagrams FOLDER draws them", err=True)
+            typer.echo("note: the notebook has diagrams; --diagrams FOLDER draws them", err=True)
         return
     for cell in found.cells:
         figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from command import robomark
 from models import weights_bytes
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
 from service.grading.grade import Grade
@@ -153,6 +154,13 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     images = [tmp_path / "p.png", *(tmp_path / "d" / f"cell-{number}.png" for number in (2, 7, 15, 27))]
     assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
     assert len(list((tmp_path / "d").iterdir())) == 4
+
+
+def test_a_robot_program_draws_no_diagrams(tmp_path: Path) -> None:
+    (tmp_path / "robot.py").write_text("say('hello')")
+    done = robomark("run", tmp_path / "robot.py", "--diagrams", tmp_path / "d")
+    assert done.returncode == 2
+    assert "robot.py is not a notebook and draws no diagrams; leave --diagrams out" in done.stderr
 
 
 # Which run is marked.

@@ -14,6 +14,8 @@ The systems, with the sections of the notebook that they come from:
 10. sequence diagrams of the protocol (5.1.2, 5.1.3, 5.1.5)
 11. messages that get lost out of range or facing the wrong way (5.1)
 12. a convolutional network in place of the perceptron (5)
+
+Of the last two the notebook has only the words, and no program; the tests are numbered as the systems are.
 """
 
 from __future__ import annotations

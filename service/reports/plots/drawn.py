@@ -194,7 +194,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
         yield Plot(
             f"sensors-{name}", "sensors", index, scenario, f"{title}: sensors",
-            "What the sensors read at every moment, whether or not the program asked. Highlights at the top: "
+            "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
             "messages sent, answers received, speech, touches and faults.",
             f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
         )  # fmt: skip

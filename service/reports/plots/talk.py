@@ -18,10 +18,12 @@ from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
 #: Networks that are counted by the names that they are bound to; those that are called later count as one.
 _MOST_NETWORKS = 4
+_OTHERS = "other networks"
 #: Of what was said, beside a diagram whose labels are words.
 _LONGEST_LABEL = 32
-_OTHERS = "other networks"
 _NAMED = frozenset(PARTIES) - {"network"}
+
+TalkKind = Literal["message", "call", "return"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,25 +32,32 @@ class Talk:
 
     source: str
     target: str
-    kind: Literal["message", "call", "return"]
+    kind: TalkKind
     count: int
     lost: int = 0
 
 
 def talks(recording: Recording) -> tuple[Talk, ...]:
     """Everything that was told, by who told whom; messages first."""
-    sent: Counter[str] = Counter(message.sender for message in recording.messages)
-    lost: Counter[str] = Counter(message.sender for message in recording.messages if message.delivered is None)
-    between = (("robot", "responder"), ("responder", "robot"))
-    told = [Talk(one, other, "message", sent[one], lost[one]) for one, other in between if sent[one]]
+    counts: Counter[tuple[str, str, TalkKind]] = Counter()
+    lost: Counter[tuple[str, str, TalkKind]] = Counter()
+    for talk, arrived in _told(recording):
+        counts[talk] += 1
+        lost[talk] += not arrived
+    return tuple(Talk(*talk, count, lost[talk]) for talk, count in counts.items())
+
+
+def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], bool]]:
+    """Each text and each call: who told whom, and whether it arrived."""
+    for message in recording.messages:
+        other = "responder" if message.sender == "robot" else "robot"
+        yield (message.sender, other, "message"), message.delivered is not None
     names = _callees(recording)
-    calls = Counter((_name(call.caller, names), _name(call.callee, names)) for call in recording.calls)
-    given = Counter(
-        (_name(call.callee, names), _name(call.caller, names)) for call in recording.calls if call.result != "None"
-    )
-    told += [Talk(*pair, "call", count) for pair, count in calls.items()]
-    told += [Talk(*pair, "return", count) for pair, count in given.items()]
-    return tuple(told)
+    for call in recording.calls:
+        caller, callee = names.get(call.caller, "responder"), names[call.callee]
+        yield (caller, callee, "call"), True
+        if call.result != "None":  # a logger gives nothing back
+            yield (callee, caller, "return"), True
 
 
 def party_of(name: str) -> str:
@@ -75,9 +84,7 @@ def block_diagram(told: tuple[Talk, ...]) -> Diagram:
 
 def sequence_diagram(told: SequenceDiagram) -> Diagram:
     """What was told, with its words, as a sequence diagram that stands beside a notebook's own."""
-    return Diagram(
-        "seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_steps(told))
-    )  # fmt: skip
+    return Diagram("seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_steps(told)))
 
 
 def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
@@ -101,10 +108,6 @@ def _callees(recording: Recording) -> Mapping[str, str]:
     networks = dict.fromkeys(call.callee for call in recording.calls if call.callee not in _NAMED)
     shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
     return MappingProxyType(shown | {name: name for name in _NAMED})
-
-
-def _name(name: str, names: Mapping[str, str]) -> str:
-    return names.get(name, "responder")
 
 
 def _count(talk: Talk) -> str:
