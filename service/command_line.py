@@ -54,7 +54,7 @@ _COMMANDS: Mapping[str, _Entry] = MappingProxyType(
         "serve": _Entry("up:serve", "Answer on the web: health and metrics."),
         "worker": _Entry("operator:worker", "Grade what is queued until told to stop."),
         "doctor": _Entry("operator:doctor", "Look at everything that grading needs on this machine."),
-        "db": _Entry("operator:database_app", "Look after the database."),
+        "db": _Entry("database:database_app", "Look after the database."),
         "sandbox": _Entry("sandbox:sandbox_app", "Show the sandbox round student code."),
         "demo": _Entry("demo:demo", "Grade sample submissions through a real worker."),
     }
@@ -129,7 +129,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
-        ending = _command_line()(standalone_mode=False)
+        ending = _command_line()(prog_name="robomark", standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
         _end(str(error), _CALLER)
