@@ -9,7 +9,7 @@ import heapq
 from dataclasses import dataclass, replace
 
 from responders.channel import Channel, ChannelOfTrial
-from responders.link import Contact, Link
+from responders.link import ChannelLink, Contact
 from responders.message_format import queue_entry
 from sim.recording import SECOND, Fault, Message
 from sim.world import Chain
@@ -48,7 +48,7 @@ class _UnderWay:
 class Conversation:
     """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: Chain, link: Link) -> None:
+    def __init__(self, channel: Channel, seed: int, chain: Chain, link: ChannelLink) -> None:
         self._channel = ChannelOfTrial(channel, seed)
         self._chain = chain
         self._link = link

@@ -30,7 +30,7 @@ class Contact:
     angle: float | None = None
 
 
-class Link(Protocol):
+class ChannelLink(Protocol):
     """The way between a robot and its receiver."""
 
     def contact(self) -> Contact:
@@ -75,7 +75,7 @@ class InfraredLink:
         return Contact(lost, distance, angle)
 
 
-def link_of(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> Link:
+def link_of(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> ChannelLink:
     """The link of a robot whose receiver is the channel's beacon, if it has one."""
     beacon = channel.beacon
     if channel.link == "cable" or beacon is None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -15,25 +15,25 @@ from responders.channel import Channel
 from sim.errors import UsageError
 from submissions.assignment.schema import ChannelTable, read_table
 
-_PANEL = "Channel"
 _INFRARED = ("beacon", "range", "facing", "blocked_by")
 
-
-def _flag(name: str, words: str, **more: Any) -> Any:
-    return typer.Option(name, help=words, rich_help_panel=_PANEL, show_default=False, **more)
-
-
-Link = Annotated[str | None, _flag("--link", "cable or infrared.")]
-Beacon = Annotated[str | None, _flag("--beacon", "Where an infrared link's other end stands, mm.", metavar="X,Y")]
-Range = Annotated[float | None, _flag("--range", "How far an infrared link reaches, mm.")]
-Facing = Annotated[float | None, _flag("--facing", "The angle in which it does, degrees, half to either side.")]
-BlockedBy = Annotated[str | None, _flag("--blocked-by", "obstacles or nothing.")]
-Loss = Annotated[float | None, _flag("--loss", "Share of messages that is lost, each way.")]
-Delay = Annotated[float | None, _flag("--delay", "Seconds there and back.")]
-Jitter = Annotated[float | None, _flag("--jitter", "Seconds more, at most.")]
-Duplication = Annotated[float | None, _flag("--duplication", "Share that comes twice.")]
-Reordering = Annotated[float | None, _flag("--reordering", "Share that others overtake.")]
-Corruption = Annotated[float | None, _flag("--corruption", "Share that comes with other letters and digits.")]
+LinkFlag = Annotated[str | None, typer.Option("--link", help="cable or infrared.")]
+BeaconFlag = Annotated[
+    str | None, typer.Option("--beacon", help="Where an infrared link's other end stands, mm.", metavar="X,Y")
+]
+RangeFlag = Annotated[float | None, typer.Option("--range", help="How far an infrared link reaches, mm.")]
+FacingFlag = Annotated[
+    float | None, typer.Option("--facing", help="The angle in which it does, degrees, half to either side.")
+]
+BlockedByFlag = Annotated[str | None, typer.Option("--blocked-by", help="obstacles or nothing.")]
+LossFlag = Annotated[float | None, typer.Option("--loss", help="Share of messages that is lost, each way.")]
+DelayFlag = Annotated[float | None, typer.Option("--delay", help="Seconds there and back.")]
+JitterFlag = Annotated[float | None, typer.Option("--jitter", help="Seconds more, at most.")]
+DuplicationFlag = Annotated[float | None, typer.Option("--duplication", help="Share that comes twice.")]
+ReorderingFlag = Annotated[float | None, typer.Option("--reordering", help="Share that others overtake.")]
+CorruptionFlag = Annotated[
+    float | None, typer.Option("--corruption", help="Share that comes with other letters and digits.")
+]
 
 
 def given_flags(**flags: object) -> dict[str, object]:
