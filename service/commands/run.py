@@ -35,9 +35,10 @@ from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
+from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
-from service.reports.readable import befell_in_full, readable
+from service.reports.readable import readable
 from service.reports.trace import trace
 from service.reports.written import prepare_folder
 from sim.errors import UsageError

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
-from service.reports.readable import befell_in_full, message_words, number, one_line, readable
+from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words

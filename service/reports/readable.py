@@ -5,21 +5,13 @@ It does not escape for HTML, XML or a terminal's markup; whoever writes those fo
 
 from __future__ import annotations
 
-import math
 import re
 import unicodedata
-from collections.abc import Mapping
 from decimal import Decimal
-from types import MappingProxyType
-
-from sim.recording import LossReason, Message
 
 #: Joiners that emoji and several scripts need; every other invisible format character is spelled out.
 _JOINERS = "\u200c\u200d"
 _LONGEST_MARKS = 6  # combining marks on one letter; no living script needs more
-_REASONS: Mapping[LossReason, str] = MappingProxyType(
-    {"chance": "lost by chance", "out of range": "out of range", "facing away": "facing away", "blocked": "blocked"}
-)
 _HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Cn", "Zl", "Zp"})
 
 
@@ -53,28 +45,6 @@ def message_words(text: str, limit: int = 120) -> str:
     if text.startswith("IMG_DATA::{") and len(text) > 200:
         return "IMG_DATA::{left, right}"
     return one_line(text, limit)
-
-
-def befell(message: Message) -> str:
-    """What befell a message on its way, in a few words; empty if it arrived once and as it was sent."""
-    if message.arrived_as is not None:
-        words = f"corrupted to {message_words(message.arrived_as, 40)}"
-        return f"{message.note}, {words}" if message.note else words
-    return _REASONS.get(message.lost, one_line(message.note, 40))
-
-
-def out_of_reach_by(message: Message) -> str:
-    """How far away a message was lost, or how much the robot faced away; empty if that is not why."""
-    if message.lost == "out of range" and message.distance is not None:
-        return f"{math.ceil(message.distance)} mm away"
-    if message.lost == "facing away" and message.angle is not None:
-        return f"{math.ceil(abs(message.angle))}° off"
-    return ""
-
-
-def befell_in_full(message: Message) -> str:
-    """The same with how far out of reach it was."""
-    return ", ".join(filter(None, (befell(message), out_of_reach_by(message))))
 
 
 def number(value: Decimal) -> str:

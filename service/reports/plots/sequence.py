@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from service.reports.readable import befell, message_words, one_line, out_of_reach_by
+from service.reports.crossing import befell, out_of_reach_by
+from service.reports.readable import message_words, one_line
 from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
