@@ -13,7 +13,7 @@ import pytest
 from driving import along, driven, judged, rest, spin, straight
 from paths import ROOT
 from sim.floors.centrelines import centrelines
-from sim.recording import Datum, Line, Recording
+from sim.recording import Datum, Line, Message, Recording
 from submissions.criteria import SCHEMAS
 
 DOCUMENT = (ROOT / "docs" / "criteria.md").read_text()
@@ -27,7 +27,8 @@ TOLD = tuple(Line(t / 10, text) for t, text in enumerate(["3", "2", "1", "0", "O
 
 def runs() -> list[Recording]:
     log = tuple(Datum(t / 10, "Colour", 100.0, None) for t in range(1, 50))
-    square = driven(*SQUARE, spoken=TOLD, printed=TOLD, datalog=log)
+    sent = tuple(Message(float(t), "robot", f"PY::{t}", float(t)) for t in range(3))
+    square = driven(*SQUARE, spoken=TOLD, printed=TOLD, datalog=log, messages=sent)
     there = driven(straight(100), rest(), straight(-100), straight(200, 2), straight(-200), rest())
     corners = np.array(centrelines()["Thruxton_Circuit"] * 2)
     circuit = along(corners, np.zeros(len(corners)))

@@ -87,6 +87,12 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     ),
     (
         "messages",
+        {"in_order": ["PY::1", "PY::2"]},
+        {"messages": sent("PY::1", "PY::1", "PY::1", "PY::2", "PY::2", "PY::2", "PY::bye")},
+        {"messages": sent(*[f"PY::{guess}" for guess in GUESSES])},
+    ),
+    (
+        "messages",
         {"equals": "PY::17"},
         {"messages": sent("PY::hello", "PY::17")},
         {"messages": sent(*[f"PY::{guess}" for guess in GUESSES])},
