@@ -132,8 +132,8 @@ class Agents:
         sentence = f"{name} gave no answer: {why}"
         if not process.given or not process.alive:
             self.faults.append(fault)
-        elif len(self.notes) < _MOST_NOTES:
-            self.notes.append(f"the given agent {sentence}" + (f" ({fault.place})" if fault.place else ""))
+        elif len(self.notes) < _MOST_NOTES and f"the given agent {sentence}" not in self.notes:
+            self.notes.append(f"the given agent {sentence}")
         return Told("error", sentence, slept)
 
     def _refusal(self, asker: str, name: str) -> Told | None:

@@ -19,6 +19,7 @@ from sim.errors import UsageError
 from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
 from sim.recording import Pose
 from sim.robot import usual_robot
+from submissions.assignment.agents import read_agents
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
 from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.problems import Problems
@@ -39,7 +40,7 @@ from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
-_TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
+_TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 
@@ -60,10 +61,12 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
+    agents, agents_sources = read_agents(document, parts, files, problems)
     around = Surroundings(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
         without=_nobodys(parts),
+        agents=frozenset(agents),
         files=files,
         aliases=head.aliases if head else {},
     )
@@ -75,6 +78,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     check_given(document, problems)
     given_parts = sources_of(criteria, files, problems)
     given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
+    given_parts |= agents_sources
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
@@ -82,7 +86,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         id=head.id,
         title=head.title,
         world=world,
-        parts=Parts(parts.program, parts.responder, str(parts.cell)),
+        parts=Parts(parts.program, parts.responder, str(parts.cell), MappingProxyType(dict(agents))),
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),

@@ -9,11 +9,12 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from submissions.criteria.asking import BetweenAgents
 from submissions.criteria.common import SomeTextOrTexts
 from submissions.criteria.texts import TextConditions
 
 
-class Replies(TextConditions):
+class Replies(BetweenAgents, TextConditions):
     """What the responder answers, arrived in time or not.
 
     ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.

@@ -11,26 +11,28 @@ from fractions import Fraction
 
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
+from service.grading.judging.asking import Pair, pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.texts import conditions, meets, same_text
 from service.grading.judging.words import listed, quoted
 from sim.recorded import pose_at
-from sim.recording import Message, Recording
+from sim.recording import Message
 from submissions.criteria.replies import Replies
 
 
 @judges(Replies)
 def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     """Each text that is expected, or each different question that arrived, and what it was answered."""
-    recording = trial.recording
+    pair = pair_of(criterion, trial.recording)
+    recording = pair.recording
     asked = [
         (index, message)
         for index, message in enumerate(recording.messages)
         if message.sender == "robot" and message.delivered is not None
     ]
     if criterion.expect:
-        return _judge_expected(criterion, asked, recording)
+        return _judge_expected(criterion, asked, pair)
     # A message that is sent again asks nothing new.
     questions: dict[str, list[tuple[int, Message]]] = {}
     for index, message in asked:
@@ -39,21 +41,19 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     count = len(questions)
     if count < criterion.at_least:
         few = f"only {count} different reached it" if count else "none reached it"
-        return failed(
-            f"Expected the responder to be sent at least {criterion.at_least} of {_messages(criterion)}, but {few}.",
-            score=Fraction(0),
-        )
+        wanted = f"at least {criterion.at_least} of {_messages(criterion, pair)}"
+        return failed(f"Expected {pair.asked} to be sent {wanted}, but {few}.", score=Fraction(0))
     answers = Answers(recording)
     wrong: list[tuple[Message, str]] = []
     for times in questions.values():
         mistakes = ((message, _mistake(criterion, answers, index)) for index, message in times)
         wrong += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
     if not wrong:
-        return passed(f"The responder answered {count} of {count} messages as expected.")
+        return passed(f"{pair.asked.capitalize()} answered {count} of {count} messages as expected.")
     message, mistake = min(wrong, key=lambda pair: pair[0].t)
     right = count - len(wrong)
     return failed(
-        f"Expected the responder to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
+        f"Expected {pair.asked} to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
         f"({right} of {count} answered as expected).",
         message.t,
         pose_at(recording, message.t),
@@ -61,15 +61,15 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     )
 
 
-def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], recording: Recording) -> Outcome:
-    answers = Answers(recording)
+def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], pair: Pair) -> Outcome:
+    answers = Answers(pair.recording)
     right = 0
     first: Outcome | None = None
     for text, answer in criterion.expect.items():
         sent = [(index, message) for index, message in asked if same_text(message.text, text, criterion.ignore_case)]
         wanted = quoted(as_text(answer)) + (f" at {criterion.path}" if criterion.path else "")
         if not sent:
-            outcome = failed(f"Expected the responder to be sent {quoted(text)}, but it never was.")
+            outcome = failed(f"Expected {pair.asked} to be sent {quoted(text)}, but it never was.")
         else:
             mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in sent]
             place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
@@ -78,14 +78,14 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], record
                 continue
             message = sent[place][1]
             outcome = failed(
-                f"Expected the responder to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
+                f"Expected {pair.asked} to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
                 message.t,
-                pose_at(recording, message.t),
+                pose_at(pair.recording, message.t),
             )
         first = first or outcome
     count = len(criterion.expect)
     if first is None:
-        return passed(f"The responder answered {count} of {count} messages as expected.")
+        return passed(f"{pair.asked.capitalize()} answered {count} of {count} messages as expected.")
     return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
 
 
@@ -133,12 +133,12 @@ def _is_asked_about(criterion: Replies, text: str) -> bool:
     return not criterion.to_starts_with or text.startswith(criterion.to_starts_with)
 
 
-def _messages(criterion: Replies) -> str:
+def _messages(criterion: Replies, pair: Pair) -> str:
     if criterion.to:
         return f"the texts {listed(criterion.to, 'or')}"
     if criterion.to_starts_with:
         return f"the texts that start with {listed(criterion.to_starts_with, 'or')}"
-    return "the robot's messages"
+    return f"{pair.asker}'s messages"
 
 
 def _wanted(criterion: Replies) -> str:

@@ -12,6 +12,7 @@ from fractions import Fraction
 from responders.message_format import JSON, PY
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.asking import pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import listed, quoted
@@ -209,8 +210,10 @@ def _instead(lines: Sequence[Line], deed: Deed) -> str:
 
 def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
-        sent = [Line(message.t, message.text) for message in recording.messages if message.sender == "robot"]
-        return judge_sequence(criterion, sent, _SEND, recording)
+        pair = pair_of(criterion, recording)
+        sent = [Line(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"]
+        deed = Deed(pair.asker, f"ask {pair.asked}", f"asked {pair.asked}") if criterion.agents else _SEND
+        return judge_sequence(criterion, sent, deed, recording)
     queue = []
     for message in _queue(recording):
         value = parsed(message.text)

@@ -13,7 +13,7 @@ from typing import Any
 from service.grading.grade import Accuracy
 from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
-from service.reports.trace import storable
+from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
 
 SCHEMA = 1
@@ -50,6 +50,7 @@ def json_document(view: View) -> dict[str, Any]:
                     {"t": message.t, "sender": message.sender, "text": storable(message.text)}
                     for message in trial.recording.messages
                 ],
+                **agent_messages(trial.recording),
             }
             for trial in grade.trials
         ],
