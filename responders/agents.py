@@ -87,8 +87,7 @@ class Agents:
         arguments, named = _content(question["arguments"], list), _content(question["named"], dict)
         values = [*arguments, *named.values()]
         index = len(self.messages)
-        asked = _as_text(values[0] if len(values) == 1 else values)
-        self._note(AgentMessage(t / SECOND, asker, name, asked, message), t)
+        self._note(asker, name, values[0] if len(values) == 1 else values, t, message)
         told = self._refusal(asker, name)
         if told is None:
             self._waiting.append(name)
@@ -99,9 +98,7 @@ class Agents:
         if told.kind == "error":
             self.messages[index] = replace(self.messages[index], note="no answer")
         else:
-            then = t + told.slept
-            text = _as_text(_content(told.text, object))
-            self._note(AgentMessage(then / SECOND, name, asker, text, message, reply_to=index), then)
+            self._note(name, asker, _content(told.text, object), t + told.slept, message, index)
         return told
 
     def finish(self, chain: Chain, now: int) -> None:
@@ -144,10 +141,15 @@ class Agents:
             return Told("error", f"{name} cannot be asked now, as it waits for an answer itself: {way}")
         return None
 
-    def _note(self, message: AgentMessage, t: int) -> None:
-        self._meter.keep(len(message.text))
-        self.messages.append(message)
-        self._chain.add(f"{message.sender}>{message.receiver}", t, message.text.encode())
+    def _note(self, sender: str, receiver: str, value: Any, t: int, message: int, reply_to: int | None = None) -> None:
+        text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        text = text.encode("utf-8", "replace").decode("utf-8")  # no halves of characters, which nobody can store
+        self._meter.keep(len(text))
+        self.messages.append(
+            AgentMessage(t / SECOND, sender, receiver, text, message, reply_to, is_text=isinstance(value, str))
+        )
+        kind = "text" if isinstance(value, str) else "value"
+        self._chain.add(f"{sender}>{receiver} {kind}", t, text.encode())
 
 
 @contextlib.contextmanager
@@ -239,9 +241,3 @@ def _content(text: str, kind: type) -> Any:
 
 def _no_constant(name: str) -> None:
     raise ValueError(f"{name} is not JSON")
-
-
-def _as_text(value: Any) -> str:
-    """A text as it is, without halves of characters; all else as JSON."""
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return text.encode("utf-8", "replace").decode("utf-8")

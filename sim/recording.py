@@ -179,6 +179,7 @@ class AgentMessage:
     message: int
     reply_to: int | None = None
     note: str = ""
+    is_text: bool = True
 
 
 @dataclass(frozen=True, slots=True)

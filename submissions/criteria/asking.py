@@ -17,9 +17,9 @@ _RESPONDER = "responder"
 
 
 class BetweenAgents(Criterion):
-    """With ``agents = ["agent", "parser"]`` what the first asks the second stands for what the robot sends.
+    """With ``agents = ["agent", "parser"]`` what the first tells the second stands for what the robot sends.
 
-    What the second says to that stands for the responder's answers. The first may be the responder.
+    What the second answers stands for the responder's answers. Either may be the responder.
     """
 
     agents: SomeTexts = ()
@@ -28,7 +28,7 @@ class BetweenAgents(Criterion):
     @classmethod
     def _a_pair(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         if len(value) not in (0, 2) or len(set(value)) < len(value):
-            raise ValueError("is no pair, expected [who asks, who is asked]")
+            raise ValueError("is no pair, expected [who tells, who is told]")
         return value
 
     @model_validator(mode="after")
@@ -40,9 +40,9 @@ class BetweenAgents(Criterion):
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Who asks and who is asked must be there."""
+        """Both must be there."""
         yield from super().misfits(around)
-        for name, there in zip(self.agents, (around.agents | {_RESPONDER}, around.agents), strict=bool(self.agents)):
-            if name not in there:
-                known = ", ".join(sorted(there)) or "none, as there is no [agents]"
-                yield Misfit("agents", f'agents names "{name[:60]}", expected one of those there are: {known}')
+        there = {_RESPONDER, *around.agents}
+        for name in set(self.agents) - there:
+            known = ", ".join(sorted(there)) if around.agents else "an [agents] table with it"
+            yield Misfit("agents", f'agents names "{name[:60]}", expected {known}')

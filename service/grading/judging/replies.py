@@ -9,9 +9,10 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 
+from responders.message_format import JSON
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
-from service.grading.judging.asking import Pair, pair_of
+from service.grading.judging.asking import VALUE, Pair, pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.texts import conditions, meets, same_text
@@ -42,18 +43,18 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     if count < criterion.at_least:
         few = f"only {count} different reached it" if count else "none reached it"
         wanted = f"at least {criterion.at_least} of {_messages(criterion, pair)}"
-        return failed(f"Expected {pair.asked} to be sent {wanted}, but {few}.", score=Fraction(0))
+        return failed(f"Expected {pair.told} to be sent {wanted}, but {few}.", score=Fraction(0))
     answers = Answers(recording)
     wrong: list[tuple[Message, str]] = []
     for times in questions.values():
         mistakes = ((message, _mistake(criterion, answers, index)) for index, message in times)
         wrong += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
     if not wrong:
-        return passed(f"{pair.asked.capitalize()} answered {count} of {count} messages as expected.")
+        return passed(f"{pair.told.capitalize()} answered {count} of {count} messages as expected.")
     message, mistake = min(wrong, key=lambda pair: pair[0].t)
     right = count - len(wrong)
     return failed(
-        f"Expected {pair.asked} to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
+        f"Expected {pair.told} to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
         f"({right} of {count} answered as expected).",
         message.t,
         pose_at(recording, message.t),
@@ -69,7 +70,7 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], pair: 
         sent = [(index, message) for index, message in asked if same_text(message.text, text, criterion.ignore_case)]
         wanted = quoted(as_text(answer)) + (f" at {criterion.path}" if criterion.path else "")
         if not sent:
-            outcome = failed(f"Expected {pair.asked} to be sent {quoted(text)}, but it never was.")
+            outcome = failed(f"Expected {pair.told} to be sent {quoted(text)}, but it never was.")
         else:
             mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in sent]
             place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
@@ -78,14 +79,14 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], pair: 
                 continue
             message = sent[place][1]
             outcome = failed(
-                f"Expected {pair.asked} to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
+                f"Expected {pair.told} to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
                 message.t,
                 pose_at(pair.recording, message.t),
             )
         first = first or outcome
     count = len(criterion.expect)
     if first is None:
-        return passed(f"{pair.asked.capitalize()} answered {count} of {count} messages as expected.")
+        return passed(f"{pair.told.capitalize()} answered {count} of {count} messages as expected.")
     return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
 
 
@@ -96,6 +97,10 @@ def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: obje
         return answers.silence(index)
     if criterion.is_json and not is_json_answer(reply.text):
         return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
+    if criterion.agents:
+        said = parsed(JSON + reply.text) if reply.note == VALUE else reply.text
+        mistake = "it answered " + ("the text " if isinstance(said, str) else "") + quoted(reply.text)
+        return "" if same_value(said, answer) else mistake
     if criterion.path is None:
         same = same_text(reply.text, str(answer), criterion.ignore_case)
         return "" if same else f"it answered {quoted(reply.text)}"
@@ -138,7 +143,7 @@ def _messages(criterion: Replies, pair: Pair) -> str:
         return f"the texts {listed(criterion.to, 'or')}"
     if criterion.to_starts_with:
         return f"the texts that start with {listed(criterion.to_starts_with, 'or')}"
-    return f"{pair.asker}'s messages"
+    return f"{pair.teller}'s messages"
 
 
 def _wanted(criterion: Replies) -> str:

@@ -212,7 +212,7 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
         pair = pair_of(criterion, recording)
         sent = [Line(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"]
-        deed = Deed(pair.asker, f"ask {pair.asked}", f"asked {pair.asked}") if criterion.agents else _SEND
+        deed = Deed(pair.teller, f"tell {pair.told}", f"told {pair.told}") if criterion.agents else _SEND
         return judge_sequence(criterion, sent, deed, recording)
     queue = []
     for message in _queue(recording):
