@@ -105,9 +105,9 @@ class Agents:
         """End their processes, read back what they have written, and add what was said to the trial's chain."""
         for name, process in self._processes.items():
             process.close()
-            log, unread = read_log(process.folder, self._meter)
+            log, unread = read_log(process.folder, self._meter, name)
             if unread is not None:
-                self.faults.append(replace(unread, agent=name))
+                self.faults.append(unread)
             self._outputs.append(AgentOutput(name, "\n".join(process.output), log))
             self.notes += process.notes
         chain.add("agents", now, self._chain.hexdigest().encode())

@@ -17,7 +17,7 @@ _LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
 
 
-def read_log(folder: Path, meter: JobMeter) -> tuple[str, Fault | None]:
+def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str, Fault | None]:
     """The logger.txt in a process's folder, read when it is gone: a regular file only, no link, capped and paid for."""
     directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -33,5 +33,5 @@ def read_log(folder: Path, meter: JobMeter) -> tuple[str, Fault | None]:
     try:
         meter.keep(len(data))
     except ChildStopped as stop:
-        return "", stopped(stop, "responder", 0)
+        return "", stopped(stop, who, 0)
     return data.decode("utf-8", "replace"), None

@@ -33,15 +33,41 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
+COUNT = """
+import random, time
+for number in range(20):
+    print(f"PY::{number} {random.random()}")
+    time.sleep(random.uniform(0.2, 0.6))
+"""
+AGENTS = {
+    "agent": "import uuid\ndef agent(text): return [parser(text), uuid.uuid4().hex]",
+    "logger": "seen = []\ndef logger(entry):\n    seen.append(entry)\n    return len(seen)",
+    "parser": """
+import random, time
+def parser(text):
+    time.sleep(random.uniform(0, 0.05))
+    return [text, random.random(), time.time()]
+""",
+}
+ASKING = """
+import random
+def responder(text):
+    answer = agent(text)
+    return f"{answer} {logger(answer)} {random.random()}"
+"""
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 images."""
+    """The hash of one of three runs: a line follower of 60 s, a conversation of 20 images, or one of three agents."""
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
-        assert recording.verdict is Verdict.TIME_LIMIT
+        assert recording.verdict is Verdict.TIME_LIMIT, recording.faults
         assert len(recording.ticks) == 1800
+    elif name == "agents":
+        recording = run_program(runner, COUNT, responder=ASKING, agents=AGENTS)
+        assert recording.verdict is Verdict.FINISHED
+        assert len(recording.agent_messages) == 120
     else:
         recording = run_program(
             runner,
@@ -69,13 +95,13 @@ ELSEWHERE = textwrap.dedent("""
 
 
 def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    here = {name: chain(name, runner) for name in ("follower", "talk")}
+    here = {name: chain(name, runner) for name in ("follower", "talk", "agents")}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
             pair = []
             for half in range(2):
-                names = ["follower", "talk"]
+                names = ["follower", "talk", "agents"]
                 random.Random(number * 2 + half).shuffle(names)
                 command = [sys.executable, "-c", ELSEWHERE, *names]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=WITH_TESTS))
