@@ -132,10 +132,9 @@ def _written(trials: Sequence[TrialResult]) -> int:
     """How much there is to read that student code wrote; what an image is sent as is not its own."""
     recordings = [trial.recording for trial in trials]
     lines = (line.text for recording in recordings for line in (*recording.printed, *recording.spoken))
-    messages = (
-        message.text for recording in recordings for message in (*recording.messages, *recording.agent_messages)
-    )
-    texts = (*lines, *(text for text in messages if not text.startswith(_IMAGE)))
+    messages = (message.text for recording in recordings for message in recording.messages)
+    of_agents = (message.text for recording in recordings for message in recording.agent_messages)
+    texts = (*lines, *of_agents, *(text for text in messages if not text.startswith(_IMAGE)))
     return sum(map(len, texts)) + _A_TEXT * len(texts)
 
 
