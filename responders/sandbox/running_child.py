@@ -88,6 +88,7 @@ class Child:
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
+        self._queued_before = _seconds_queued()
         connection.settimeout(_POLL_SECONDS)
 
     def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
@@ -211,9 +212,10 @@ class Child:
         return used
 
     def _check_sleep(self) -> None:
-        """Time that it neither ran nor stood in the queue for a processor, while the worker waited, adds up.
+        """Time in which neither it nor the worker ran or stood in the queue for a processor adds up.
 
-        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker.
+        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker. But
+        what it has sent may lie there for as long as the worker itself stands in the queue.
         """
         slept = self._slept_seconds()
         if slept > 2 * _STALLED_SECONDS:
@@ -221,15 +223,14 @@ class Child:
         self._meter.check_sleep(slept)
 
     def _slept_seconds(self) -> float:
-        return max(0.0, self._waited - self._busy_seconds())
+        return max(0.0, self._waited - self._busy_seconds() - (_seconds_queued() - self._queued_before))
 
     def _busy_seconds(self) -> float:
         """What it has run, and waited for a processor; endless where the kernel does not say."""
         try:
-            run, queued, _ = Path(f"/proc/{self._pid}/schedstat").read_text().split()
+            return sum(_scheduled(self._pid))
         except (OSError, ValueError):
             return math.inf
-        return (int(run) + int(queued)) / 1e9
 
     def _check_folder(self) -> None:
         """One flat look: the sandbox lets no folder be made in it, and follow no link."""
@@ -341,6 +342,20 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
+
+
+def _seconds_queued() -> float:
+    """For how long this thread has stood in the queue for a processor; 0 where the kernel does not say."""
+    try:
+        return _scheduled("thread-self")[1]
+    except (OSError, ValueError):
+        return 0.0
+
+
+def _scheduled(process: int | str) -> tuple[float, float]:
+    """Seconds that a process has run, and stood in the queue for a processor, by ``/proc``."""
+    run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
+    return int(run) / 1e9, int(queued) / 1e9
 
 
 def _content(folder: Path, most: int) -> tuple[int, int]:
