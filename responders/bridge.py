@@ -7,12 +7,12 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Protocol
 
 from responders import message_format, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
-from responders.responder_process import Collected, ResponderProcess
+from responders.responder_process import Collected
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child
 from responders.trial_spec import TrialSpec
@@ -32,6 +32,14 @@ _FREE_ACTS = 100_100
 _MOST_NOTES = 200
 
 
+class Answers(Protocol):
+    """What answers the robot: a responder's process, or that as one of two robots has it."""
+
+    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
+        """As ``ResponderProcess.answer``."""
+        ...
+
+
 class _Cut(Exception):
     """The trial ends here."""
 
@@ -49,7 +57,7 @@ class Bridge:
         arena: Arena,
         camera: LightCamera,
         child: Child,
-        responder: ResponderProcess | None,
+        responder: Answers | None,
         meter: JobMeter,
     ) -> None:
         self._spec = spec
@@ -95,6 +103,7 @@ class Bridge:
                 "preamble": spec.program.preamble,
                 "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
+                "number": spec.number,
             }
         )
         while True:
@@ -177,8 +186,7 @@ class Bridge:
         due = (self.world.clock + 1) * TICK
         while due <= last:
             self.now = due
-            self._arrived += self.conversation.deliver(due)
-            self.world.tick()
+            self._tick()
             due += TICK
             if self.world.clock % 3000 == 0:
                 self._meter.heartbeat()
@@ -187,6 +195,14 @@ class Bridge:
             sentence = f"the program was still running after {self._spec.seconds:g} seconds of simulated time"
             raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
         self.now = end
+
+    def _tick(self) -> None:
+        self.take_arrivals()
+        self.world.tick()
+
+    def take_arrivals(self) -> None:
+        """What has arrived by now goes to the program with the next reply."""
+        self._arrived += self.conversation.deliver(self.now)
 
     def _reply(self, value: Any) -> None:
         self._child.send({"t": self.now, "v": value}, self._arrived)

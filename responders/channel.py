@@ -51,6 +51,10 @@ class ChannelOfTrial:
             sent + slept + self._delay(number, index + 4 * place) for place in range(self.copies(number, index + 8))
         )
 
+    def one_way(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
+        """When each copy of text ``number``, sent at ``sent`` to somebody who answers nothing, joins their queue."""
+        return tuple(sent + self._delay(number, 16 + 16 * copy) for copy in range(copies))
+
     def _delay(self, number: int, index: int) -> int:
         seconds = self._channel.delay + self._channel.jitter * self._chance.uniform(number, index)
         held_back = self._chance.uniform(number, index + 1) < self._channel.reordering

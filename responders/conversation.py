@@ -69,6 +69,19 @@ class Conversation:
             heapq.heappush(self._under_way, (due, len(self.messages), answer.entry))
             self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
 
+    def pass_on(self, sent: Sent, entry: str | None, other: Conversation) -> tuple[int, ...]:
+        """A text of this robot's sets out to the other one; the indices of its copies among the other's messages.
+
+        ``entry`` is what joins the other's queue, as JSON.
+        """
+        text = self.messages[sent.message].text
+        first = len(other.messages)
+        for copy, due in enumerate(self._channel.one_way(sent.number, sent.t, sent.copies)):
+            heapq.heappush(other._under_way, (due, len(other.messages), entry))
+            note = "duplicated" if copy else ""
+            other.messages.append(Message(sent.t / SECOND, "partner", text, None, note=note))
+        return tuple(range(first, len(other.messages)))
+
     def deliver(self, now: int) -> list[str]:
         """Everything due at the tick at ``now`` arrives, in order; what joins the robot's queue of it, as JSON."""
         arrived = []

@@ -6,12 +6,13 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
+from sim.chance import Stream
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import Pose
@@ -43,8 +44,24 @@ class ResponderSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class PartnerSpec:
+    """The second robot of a trial: its program, and where it starts. All else is as the first one has it.
+
+    With ``endless`` it is no fault of the program's to run until the time is up.
+    """
+
+    program: ProgramSpec
+    pose: Pose
+    pen_down: bool = False
+    endless: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
+    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``.
+
+    With a ``partner`` there are two robots, and without a responder each has the other to talk to.
+    """
 
     program: ProgramSpec
     responder: ResponderSpec | None
@@ -59,3 +76,18 @@ class TrialSpec:
     child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
+    partner: PartnerSpec | None = None
+    number: int = 1  # of the robot: what its program is told that it is
+
+    def of_partner(self, partner: PartnerSpec) -> TrialSpec:
+        """The same trial as the second robot has it, with chance of its own."""
+        return replace(
+            self,
+            program=partner.program,
+            pose=partner.pose,
+            pen_down=partner.pen_down,
+            seed=Stream(self.seed, "second robot").integer(0),
+            child_seed=Stream(self.child_seed, "second robot").integer(0),
+            partner=None,
+            number=2,
+        )

@@ -157,7 +157,7 @@ class Message:
     """
 
     t: float
-    sender: Literal["robot", "responder"]
+    sender: Literal["robot", "responder", "partner"]  # the partner is the other robot, where there are two
     text: str
     delivered: float | None
     reply_to: int | None = None
@@ -222,7 +222,7 @@ class Fault:
 
     t: float
     verdict: Verdict
-    who: Literal["program", "responder", "bridge", "host", "assignment"]
+    who: Literal["program", "second program", "responder", "bridge", "host", "assignment"]
     message: str
     line: int | None = None
     hint: str = ""
@@ -238,7 +238,11 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message."""
+    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message.
+
+    Of two robots each has a recording: this is the first one's, with the second's as its ``partner``. What is in it is
+    its own robot's, but for ``sha256``, which is over both, and what the responder printed and logged.
+    """
 
     background: str
     start: Pose
@@ -265,3 +269,4 @@ class Recording:
     responder_log: str = ""  # what the responder wrote to logger.txt
     sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())
+    partner: Recording | None = None

@@ -8,7 +8,7 @@ from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Preamble, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import PartnerSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
@@ -38,15 +38,21 @@ def run_program(
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
     meter: JobMeter | None = None,
+    second: str | None = None,
+    second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
 ) -> Recording:
-    """One trial; the start is the background's own unless given."""
+    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots."""
     ground = floor(background)
+    partner = None
+    if second is not None:
+        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, PROGRAM_LIMITS, output_bytes)
+        partner = PartnerSpec(program_of_second, second_start)
     spec = TrialSpec(
         program=ProgramSpec(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
         responder=None
         if responder is None
         else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
-        collaborative=responder is not None,
+        collaborative=responder is not None or second is not None,
         floor=ground,
         robot=robot(robot_name),
         pose=start or ground.default_pose,
@@ -56,5 +62,6 @@ def run_program(
         seed=seed,
         child_seed=seed,
         physics=physics,
+        partner=partner,
     )
     return runner.run(spec, obstacles, meter)
