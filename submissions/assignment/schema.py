@@ -47,6 +47,7 @@ class WorldTable(StrictTable):
     labels: bool = True
     obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
     robot: str = "Default_Robot"
+    robots: Literal[1, 2] = 1
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
     noise: Literal["course", "both directions"] = "course"
@@ -81,6 +82,7 @@ class PartsTable(StrictTable):
     """Whose program and responder are run, and which cell of a notebook is the program."""
 
     program: str = Field(default="student", min_length=1)
+    second_program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
     cell: str | int = "last"
 
@@ -131,6 +133,7 @@ class ScenarioTable(StrictTable):
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
+    second_poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
@@ -141,7 +144,7 @@ class ScenarioTable(StrictTable):
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
-    @field_validator("poses", mode="before")
+    @field_validator("poses", "second_poses", mode="before")
     @classmethod
     def _list_of_poses(cls, value: object) -> object:
         if isinstance(value, list) and value and all(isinstance(entry, int | float) for entry in value):
