@@ -74,7 +74,9 @@ class Conversation:
 
         ``entry`` is what joins the other's queue, as JSON.
         """
-        text = self.messages[sent.message].text
+        message = self.messages[sent.message]
+        self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
+        text = message.text
         first = len(other.messages)
         for copy, due in enumerate(self._channel.one_way(sent.number, sent.t, sent.copies)):
             heapq.heappush(other._under_way, (due, len(other.messages), entry))

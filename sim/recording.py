@@ -162,6 +162,7 @@ class Message:
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
+    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
 
 
 @dataclass(frozen=True, slots=True)

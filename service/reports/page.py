@@ -13,6 +13,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import Plot, plots_of
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, cost_words, grade_words, verdict_words
 from sim.recording import Fault, Message, Recording, Verdict
@@ -147,10 +148,13 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
 
 def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
     """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
-    moments = [(line.t, "printed", line.text) for line in recording.printed]
-    moments += [(line.t, "said", line.text) for line in recording.spoken]
-    moments += [(touch.t, "touched", touch.what) for touch in recording.touches]
-    moments += [(fault.t, _kind(fault), fault.message) for fault in recording.faults]
+    moments: list[tuple[float, str, str]] = []
+    for robot, own in robots_of(recording):
+        whose = "" if own is recording else f"{robot}: "
+        moments += [(line.t, "printed", whose + line.text) for line in own.printed]
+        moments += [(line.t, "said", whose + line.text) for line in own.spoken]
+        moments += [(touch.t, "touched", whose + touch.what) for touch in own.touches]
+        moments += [(fault.t, _kind(fault), whose + fault.message) for fault in own.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
     if omitted <= 1:
@@ -205,6 +209,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
+    messages = messages_of(recording)
     of = sum(other.scenario == scenario for other in grade.trials)
     which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
     if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
@@ -215,21 +220,21 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
         words=verdict_words(trial.verdict),
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
-        messages=tuple(_message_lines(recording.messages[:_MOST_MESSAGES])),
-        more_messages=max(0, len(recording.messages) - _MOST_MESSAGES),
+        messages=tuple(_message_lines(messages[:_MOST_MESSAGES])),
+        more_messages=max(0, len(messages) - _MOST_MESSAGES),
         responder_output=readable(recording.responder_output, 4000),
         responder_log=readable(recording.responder_log, 4000),
         notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
     )
 
 
-def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
-    for message in messages:
+def _message_lines(messages: list[tuple[str, Message]]) -> Iterator[MessageLine]:
+    for sender, message in messages:
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
         if message.note:
             arrived += f" ({one_line(message.note, 40)})"
         wrong = message.delivered is None or bool(message.note)
-        yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, wrong)
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:

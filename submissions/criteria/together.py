@@ -36,6 +36,8 @@ class Apart(Criterion):
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """It takes two."""
+        """It takes two, and looks at both."""
+        if self.robot != 1:
+            yield Misfit("robot", "robot is 2, but check looks at both robots, expected it without robot")
         if around.robots < 2:
             yield Misfit("check", "check is about two robots, but there is one, expected robots = 2 in world")

@@ -15,6 +15,7 @@ from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
 from service.reports.trace import storable
 from service.reports.view import View, staff_view
+from sim.recording import Recording
 
 SCHEMA = 1
 
@@ -45,11 +46,8 @@ def json_document(view: View) -> dict[str, Any]:
                 "seed": trial.seed,
                 "verdict": trial.verdict.value,
                 "sha256": trial.recording.sha256,
-                "spoken": [storable(line.text) for line in trial.recording.spoken],
-                "messages": [
-                    {"t": message.t, "sender": message.sender, "text": storable(message.text)}
-                    for message in trial.recording.messages
-                ],
+                **_said(trial.recording),
+                **({"partner": _said(trial.recording.partner)} if trial.recording.partner is not None else {}),
             }
             for trial in grade.trials
         ],
@@ -68,6 +66,15 @@ def json_text(view: View) -> str:
 def json_list(views: Sequence[View]) -> str:
     """The documents of a batch, each with its student."""
     return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+
+
+def _said(recording: Recording) -> dict[str, Any]:
+    return {
+        "spoken": [storable(line.text) for line in recording.spoken],
+        "messages": [
+            {"t": message.t, "sender": message.sender, "text": storable(message.text)} for message in recording.messages
+        ],
+    }
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

@@ -6,6 +6,7 @@ The drawing is in one module a plot; nothing here is random, timed or kept betwe
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -24,6 +25,7 @@ from service.reports.plots.sensor import draw_sensors
 from service.reports.plots.style import png
 from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
+from service.reports.robots import SECOND, messages_of
 from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.recorded import floor_of
 from sim.recording import Recording
@@ -207,20 +209,21 @@ def _trials(grade: Grade) -> Iterator[Plot]:
 
 def _conversations(grade: Grade) -> Iterator[Plot]:
     """Of the first trial in which anything was sent, and of every scenario's worst."""
-    talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
+    talking = [index for index, trial in enumerate(grade.trials) if messages_of(trial.recording)]
     worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
     for index in dict.fromkeys([*talking[:1], *(index for index in worst if index in talking)]):
         trial = grade.trials[index]
-        messages = trial.recording.messages
-        sent = sum(message.sender == "robot" for message in messages)
-        lost = sum(message.delivered is None for message in messages)
+        messages = messages_of(trial.recording)
+        counts = Counter(sender.partition(" to ")[0] for sender, _ in messages)
+        second = f", {SECOND} {counts[SECOND]}" if trial.recording.partner is not None else ""
+        lost = sum(message.delivered is None for _, message in messages)
         suffix = _suffix(is_for_staff(trial.visibility))
         yield Plot(
             f"conversation-{_slug(trial.scenario)}-{trial.index + 1}{suffix}", "conversation", index, trial.scenario,
             f"{_title(grade, trial.scenario)}: conversation",
             f"Who told whom what in trial {trial.index + 1}; time goes down.",
-            f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
-            f"{lost} never arrived.",
+            f"Sequence diagram: the robot sent {counts['robot']} messages{second}, the responder "
+            f"{counts['responder']}; {lost} never arrived.",
         )  # fmt: skip
 
 
