@@ -81,9 +81,9 @@ def _in_order(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
 
 
 def _of_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
-    """A fault of the second program by that name; None for one that is none of an endless program."""
+    """A fault of the second program by that name; None for one that is none of a given program."""
     if fault.who != "program":
         return fault
-    if partner.endless and fault.verdict is Verdict.TIME_LIMIT:
+    if partner.given and fault.verdict is Verdict.TIME_LIMIT:
         return None
     return replace(fault, who="second program")

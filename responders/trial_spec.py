@@ -47,13 +47,14 @@ class ResponderSpec:
 class PartnerSpec:
     """The second robot of a trial: its program, and where it starts. All else is as the first one has it.
 
-    With ``endless`` it is no fault of the program's to run until the time is up.
+    A program that the assignment has ``given`` may run until the time is up, and its chance is the world's: the same
+    for every submission.
     """
 
     program: ProgramSpec
     pose: Pose
     pen_down: bool = False
-    endless: bool = False
+    given: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,7 @@ class TrialSpec:
             pose=partner.pose,
             pen_down=partner.pen_down,
             seed=Stream(self.seed, "second robot").integer(0),
-            child_seed=Stream(self.child_seed, "second robot").integer(0),
+            child_seed=Stream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
             partner=None,
             number=2,
         )
