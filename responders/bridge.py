@@ -7,12 +7,12 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 from responders import message_format, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
-from responders.responder_process import Collected
+from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child
 from responders.trial_spec import TrialSpec
@@ -32,14 +32,6 @@ _FREE_ACTS = 100_100
 _MOST_NOTES = 200
 
 
-class Answers(Protocol):
-    """What answers the robot: a responder's process, or that as one of two robots has it."""
-
-    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
-        """As ``ResponderProcess.answer``."""
-        ...
-
-
 class _Cut(Exception):
     """The trial ends here."""
 
@@ -57,7 +49,7 @@ class Bridge:
         arena: Arena,
         camera: LightCamera,
         child: Child,
-        responder: Answers | None,
+        responder: ResponderProcess | None,
         meter: JobMeter,
     ) -> None:
         self._spec = spec

@@ -5,13 +5,14 @@ What one program may ask is ``bridge.py``'s; children are set up and recordings 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from greenlet import getcurrent, greenlet
 
 from responders import message_format
 from responders.bridge import Bridge
-from responders.conversation import Answer
+from responders.conversation import Sent
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import Child
@@ -21,37 +22,28 @@ from sim.recording import SECOND, Call, Fault, Verdict
 from sim.shared_arena import SharedArena
 
 
-class AskedBy:
-    """A responder as one of two robots has it: it is told who speaks, and what it calls then is that robot's."""
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A text for the responder, with what its robot had logged when it was sent."""
 
-    def __init__(self, responder: ResponderProcess, number: int) -> None:
-        self._responder = responder
-        self._number = number
-        self.calls: list[Call] = []
-
-    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
-        """As ``ResponderProcess.answer``."""
-        before = len(self._responder.calls)
-        answer = self._responder.answer(text, t, message, collected, self._number)
-        self.calls += self._responder.calls[before:]
-        return answer
+    text: str
+    sent: Sent
+    collected: Collected
 
 
 class PairedBridge(Bridge):
-    """Serves one of two programs, and at each tick waits for the other; without a responder they talk to each other."""
+    """Serves one of two programs, and at each tick waits for the other one to come as far.
 
-    def __init__(
-        self,
-        spec: TrialSpec,
-        arena: SharedArena,
-        camera: LightCamera,
-        child: Child,
-        responder: AskedBy | None,
-        meter: JobMeter,
-    ) -> None:
-        super().__init__(spec, arena, camera, child, responder, meter)
+    What it says to the responder is kept until then, as the other may have said something before; where there is
+    none, it goes to the other robot.
+    """
+
+    def __init__(self, spec: TrialSpec, arena: SharedArena, camera: LightCamera, child: Child, meter: JobMeter) -> None:
+        super().__init__(spec, arena, camera, child, None, meter)
         self.arena = arena
-        self.calls = responder.calls if responder is not None else []
+        self.number = spec.number
+        self.questions: list[Question] = []
+        self.calls: list[Call] = []
         self._passed_on: list[tuple[int, tuple[int, ...]]] = []  # a text, and its copies among the partner's messages
 
     def meet(self, partner: PairedBridge) -> None:
@@ -71,9 +63,14 @@ class PairedBridge(Bridge):
         getcurrent().parent.switch()
 
     def _send(self, text: str) -> int:
-        if self._responder is not None:
-            return super()._send(text)
         sent = self.conversation.send(text, self.now)
+        if self._spec.responder is None:
+            self._pass_on(text, sent)
+        elif sent.copies:
+            self.questions.append(Question(text, sent, self.collected()))
+        return sent.message
+
+    def _pass_on(self, text: str, sent: Sent) -> None:
         entry = None
         try:
             entry = message_format.passed_on(text)
@@ -82,10 +79,12 @@ class PairedBridge(Bridge):
             self.conversation.faults.append(Fault(self.now / SECOND, Verdict.PROTOCOL_ERROR, "program", sentence))
         self._meter.keep(sent.copies * (len(text) + len(entry or "")))
         self._passed_on.append((sent.message, self.conversation.pass_on(sent, entry, self.partner.conversation)))
-        return sent.message
 
 
-def serve_both(first: PairedBridge, second: PairedBridge) -> tuple[Fault | None, Fault | None]:
+Faults = tuple[Fault | None, Fault | None]
+
+
+def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderProcess | None) -> Faults:
     """Serve both programs until they have ended; what cut each short or went wrong, if anything.
 
     One that has ended leaves its robot standing, and the other goes on. Whatever is raised for the machine's sake, or
@@ -100,11 +99,12 @@ def serve_both(first: PairedBridge, second: PairedBridge) -> tuple[Fault | None,
     try:
         while len(faults) < len(turns):
             for number, turn in enumerate(turns):
-                if number in faults:
-                    continue
-                result = turn.switch()
-                if turn.dead:
-                    faults[number] = result
+                if number not in faults:
+                    result = turn.switch()
+                    if turn.dead:
+                        faults[number] = result
+            if responder is not None:
+                _ask(responder, bridges)
             _tick([bridge for number, bridge in enumerate(bridges) if number not in faults])
     finally:
         for turn in turns:
@@ -112,7 +112,22 @@ def serve_both(first: PairedBridge, second: PairedBridge) -> tuple[Fault | None,
     return faults[0], faults[1]
 
 
-def _tick(waiting: list[PairedBridge]) -> None:
+def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
+    """What both robots have said since the last tick is answered, in the order in which it was said."""
+    asked = [(bridge, question) for bridge in bridges for question in bridge.questions]
+    for bridge, question in sorted(asked, key=lambda each: each[1].sent.t):
+        sent, logged = question.sent, question.collected
+        for copy in range(sent.copies):
+            before = len(responder.calls)
+            answer = responder.answer(question.text, sent.t, sent.message, logged, bridge.number)
+            bridge.calls += responder.calls[before:]
+            bridge.conversation.answer(sent, copy, answer)
+            logged = Collected()
+    for bridge in bridges:
+        bridge.questions.clear()
+
+
+def _tick(waiting: Sequence[PairedBridge]) -> None:
     """All that has arrived is taken, then all robots move, then all look round."""
     for bridge in waiting:
         bridge.take_arrivals()

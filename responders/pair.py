@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
 
-from responders.lockstep import AskedBy, PairedBridge, serve_both
+from responders.lockstep import PairedBridge, serve_both
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
@@ -46,12 +46,11 @@ def run_pair(
             for each, arena in zip(specs, arenas, strict=True):
                 program = sandboxes.spawn("robot", each.program.limits, meter=meter)
                 children.callback(program.close)
-                asked = AskedBy(responder, each.number) if responder is not None else None
-                bridges.append(PairedBridge(each, arena, camera, program, asked, meter))
+                bridges.append(PairedBridge(each, arena, camera, program, meter))
                 layers.append(program.sandbox)
             unloadable = responder.load() if responder is not None else None
             first, second = bridges
-            cut, partner_cut = serve_both(first, second)
+            cut, partner_cut = serve_both(first, second, responder)
         log, unread = read_log(folder, meter) if responder is not None else ("", None)
     for bridge in bridges:
         bridge.conversation.finish()

@@ -194,7 +194,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
             "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
             f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
             f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
-            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches.",
+            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches." + _partners_way(recording.partner),
         )  # fmt: skip
         light = recording.ticks.left_rgb[:, 0]
         heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
@@ -205,6 +205,15 @@ def _trials(grade: Grade) -> Iterator[Plot]:
             f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
         )  # fmt: skip
     yield from _conversations(grade)
+
+
+def _partners_way(partner: Recording | None) -> str:
+    if partner is None:
+        return ""
+    return (
+        f" The second robot's from ({partner.start.x:.0f}, {partner.start.y:.0f}) mm to "
+        f"({partner.end.x:.0f}, {partner.end.y:.0f}) mm."
+    )
 
 
 def _conversations(grade: Grade) -> Iterator[Plot]:

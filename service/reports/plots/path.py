@@ -278,9 +278,11 @@ def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], p
         if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
             continue
         taken.append((x, y))
-        angle = math.radians(float(points[row, 2]) - 90)
+        # To the robot's right, and the second one's to its left: two may drive the same way.
+        angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
         axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
-        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6)
+        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6,
+             colour if colour == SECOND_ROBOT else INK)  # fmt: skip
 
 
 def _draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
@@ -309,9 +311,9 @@ def _draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) 
     )
 
 
-def _tag(axes: Axes, x: float, y: float, text: str, size: float) -> None:
+def _tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
     axes.text(
-        x, y, drawable(text), font=font(size), color=INK, ha="center", va="center", parse_math=False, zorder=9,
+        x, y, drawable(text), font=font(size), color=colour, ha="center", va="center", parse_math=False, zorder=9,
         clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
     )  # fmt: skip
 

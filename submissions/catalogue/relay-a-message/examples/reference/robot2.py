@@ -6,6 +6,6 @@ while news is None:
     asked = len(glue.pyState()["messages"])
     print("PY::What does it see?")
     while len(glue.pyState()["messages"]) == asked:
-        time.sleep(0.1)
+        time.sleep(0.5)
     news = glue.pyState()["messages"][-1]["news"]
 say(news)
