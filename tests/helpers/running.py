@@ -40,15 +40,21 @@ def run_program(
     meter: JobMeter | None = None,
     second: str | None = None,
     second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
+    given: bool = False,
+    program_limits: ChildLimits = PROGRAM_LIMITS,
+    child_seed: int | None = None,
 ) -> Recording:
-    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots."""
+    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots.
+
+    ``given`` is whether the assignment brings that one.
+    """
     ground = floor(background)
     partner = None
     if second is not None:
-        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, PROGRAM_LIMITS, output_bytes)
-        partner = PartnerSpec(program_of_second, second_start)
+        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, program_limits, output_bytes)
+        partner = PartnerSpec(program_of_second, second_start, given=given)
     spec = TrialSpec(
-        program=ProgramSpec(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
+        program=ProgramSpec(Code("robot.py", program), preamble, program_limits, output_bytes),
         responder=None
         if responder is None
         else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
@@ -60,7 +66,7 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
-        child_seed=seed,
+        child_seed=seed if child_seed is None else child_seed,
         physics=physics,
         partner=partner,
     )

@@ -13,8 +13,10 @@ import pytest
 
 from models import weights_bytes
 from paths import HELPERS
+from responders.channel import Channel
 from running import run_program
 from service.grading.trial_runner import TrialRunner
+from sim.motion import Physics
 from sim.recording import Pose, Verdict
 from sim.world import Noise
 from submissions.assignment.examples import examples
@@ -33,11 +35,39 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
+WANDERER = """
+import random
+import ev3dev2_glue as glue
+while True:
+    print("PY::" + str(ultrasonic.distance_centimeters))
+    tank_drive.on_for_seconds(random.randint(10, 50), 30, random.uniform(0.1, 1))
+    print(len(glue.pyState()["messages"]))
+"""
+NAMES = ("follower", "talk", "pair")
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 images."""
+    """The hash of one of three runs: a noisy line follower of 60 s, a conversation of 20 images, or two robots.
+
+    These two bump into each other, ask one responder, and draw chance of their own.
+    """
+    if name == "pair":
+        recording = run_program(
+            runner,
+            WANDERER,
+            Pose(400, 500, 0),
+            second=WANDERER,
+            noise=Noise(10, 20),
+            responder="def responder(text):\n    return f'JSON::[{sender}, \"{text}\"]'",
+            channel=Channel(jitter=0.1, loss=0.1),
+            physics=Physics(solid=True),
+            seconds=20,
+        )
+        assert recording.partner is not None
+        assert {recording.verdict, recording.partner.verdict} == {Verdict.TIME_LIMIT}
+        assert recording.touches
+        return f"{recording.sha256}{recording.partner.sha256}"
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT
@@ -69,13 +99,13 @@ ELSEWHERE = textwrap.dedent("""
 
 
 def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    here = {name: chain(name, runner) for name in ("follower", "talk")}
+    here = {name: chain(name, runner) for name in NAMES}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
             pair = []
             for half in range(2):
-                names = ["follower", "talk"]
+                names = list(NAMES)
                 random.Random(number * 2 + half).shuffle(names)
                 command = [sys.executable, "-c", ELSEWHERE, *names]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=WITH_TESTS))
