@@ -5,12 +5,15 @@ With one robot it is that robot's recording as it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 from sim.recording import Message, Recording
 
 #: What the second robot is called.
 SECOND = "robot 2"
+#: Whom each robot talks to where there is no responder.
+PARTNER_OF: Mapping[str, str] = MappingProxyType({"robot": SECOND, SECOND: "robot"})
 
 
 def robots_of(recording: Recording) -> Iterator[tuple[str, Recording]]:

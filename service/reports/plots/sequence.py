@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from service.reports.readable import message_words, one_line
-from service.reports.robots import SECOND, robots_of
+from service.reports.robots import PARTNER_OF, SECOND, robots_of
 from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
@@ -167,9 +167,7 @@ def _told(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
 
 def _crossing(message: Message, robot: str) -> Step:
     sent = message.sender == "robot"
-    other = "responder"
-    if message.to_partner:
-        other = SECOND if robot == "robot" else "robot"
+    other = PARTNER_OF[robot] if message.to_partner else "responder"
     source, target = (robot, other) if sent else (other, robot)
     label, note = message_words(message.text, 90), one_line(message.note, 30)
     if message.delivered is None:

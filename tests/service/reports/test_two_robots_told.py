@@ -94,7 +94,7 @@ def test_a_fault_of_the_second_program_is_called_so(crashed: Grade) -> None:
 
 def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
     drawn = draw_all(relayed)
-    assert len(drawn) == 3
+    assert len(drawn) == 4
     told = {plot.kind: plot.alt for plot in plots_of(relayed)}
     assert "The second robot's from (2000, 200) mm to (2000, 200) mm." in told["path"]
     assert "the robot sent 1 messages, robot 2 4, the responder 5" in told["conversation"]
