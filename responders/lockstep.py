@@ -60,7 +60,14 @@ class PairedBridge(Bridge):
             messages[index] = replace(messages[index], delivered=delivered, note=note)
 
     def _tick(self) -> None:
-        getcurrent().parent.switch()
+        """Whatever a program makes our own code stumble over, it does in its own turn, and is its own fault."""
+        _wait_for_partner()
+        self.take_arrivals()
+        moved = self.world.move()
+        drive = self.world.drive
+        self.partner.arena.place_partner(drive.x, drive.y, drive.heading)
+        _wait_for_partner()
+        self.world.sense(moved)
 
     def _send(self, text: str) -> int:
         sent = self.conversation.send(text, self.now)
@@ -98,18 +105,27 @@ def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderPr
     faults: dict[int, Fault | None] = {}
     try:
         while len(faults) < len(turns):
-            for number, turn in enumerate(turns):
-                if number not in faults:
-                    result = turn.switch()
-                    if turn.dead:
-                        faults[number] = result
+            _take_turns(turns, faults)  # both look round, and their programs are served until the next tick
             if responder is not None:
                 _ask(responder, bridges)
-            _tick([bridge for number, bridge in enumerate(bridges) if number not in faults])
+            _take_turns(turns, faults)  # both take what has arrived, and move
     finally:
         for turn in turns:
             turn.throw()
     return faults[0], faults[1]
+
+
+def _take_turns(turns: Sequence[greenlet], faults: dict[int, Fault | None]) -> None:
+    """Each goes on until it waits for the other; one that has ended leaves what was its fault."""
+    for number, turn in enumerate(turns):
+        if number not in faults:
+            fault = turn.switch()
+            if turn.dead:
+                faults[number] = fault
+
+
+def _wait_for_partner() -> None:
+    getcurrent().parent.switch()
 
 
 def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
@@ -125,16 +141,3 @@ def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
             logged = Collected()
     for bridge in bridges:
         bridge.questions.clear()
-
-
-def _tick(waiting: Sequence[PairedBridge]) -> None:
-    """All that has arrived is taken, then all robots move, then all look round."""
-    for bridge in waiting:
-        bridge.take_arrivals()
-    moved = []
-    for bridge in waiting:
-        moved.append(bridge.world.move())
-        drive = bridge.world.drive
-        bridge.partner.arena.place_partner(drive.x, drive.y, drive.heading)
-    for bridge, elsewhere in zip(waiting, moved, strict=True):
-        bridge.world.sense(elsewhere)

@@ -16,6 +16,7 @@ from sim.errors import Cancelled
 from sim.motion import Physics
 from sim.recorded import faults_of, verdict_of
 from sim.recording import Message, Pose, Recording, Verdict
+from sim.world import World
 
 LEFT, RIGHT = Pose(500, 500, 0), Pose(1500, 500, 180)
 GLUE = "import time, ev3dev2_glue as glue\n"
@@ -293,3 +294,22 @@ def test_children_that_live_beside_each_other_outlive_the_turn_of_their_zygote(
         for _ in range(3):
             first, second = run_both(fresh, AHEAD, AHEAD)
             assert (first.verdict, second.verdict) == (Verdict.FINISHED, Verdict.FINISHED)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_what_our_own_code_stumbles_over_is_held_against_the_one_that_caused_it(
+    runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    move = World.move
+
+    def stumbles(world: World) -> bool:
+        if world.clock == 20 and (world.pose.x < 1000) == (number == 1):
+            raise ZeroDivisionError("oops")
+        return move(world)
+
+    monkeypatch.setattr(World, "move", stumbles)
+    both = run_both(runner, AHEAD, AHEAD)
+    stumbled, other = both if number == 1 else reversed(both)
+    assert stumbled.verdict is Verdict.SANDBOX_VIOLATION
+    assert "ZeroDivisionError" in stumbled.faults[0].staff
+    assert (other.verdict, other.end_t) == (Verdict.FINISHED, pytest.approx(2.1, abs=0.05))

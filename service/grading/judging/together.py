@@ -62,7 +62,7 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
 
 
 def _distances(recording: Recording) -> Floats | None:
-    """Mm at the start and after each tick."""
+    """How far apart at the start and after each tick, mm."""
     if recording.partner is None:
         return None
     ways = [_way(recording), _way(recording.partner)]
