@@ -13,6 +13,7 @@ from greenlet import getcurrent, greenlet
 from responders import message_format
 from responders.bridge import Bridge
 from responders.conversation import Sent
+from responders.link import InfraredLink
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import Child
@@ -26,7 +27,6 @@ from sim.shared_arena import SharedArena
 class Question:
     """A text for the responder, with what its robot had logged when it was sent."""
 
-    text: str
     sent: Sent
     collected: Collected
 
@@ -49,15 +49,25 @@ class PairedBridge(Bridge):
     def meet(self, partner: PairedBridge) -> None:
         """From now on this robot and ``partner`` know of each other."""
         self.partner = partner
+        channel = self._spec.channel
+        if channel.link == "between robots":
+
+            def there() -> tuple[float, float]:
+                pose = partner.world.pose
+                return pose.x, pose.y
+
+            self.conversation.link = InfraredLink(channel, self.arena, lambda: self.world.pose, there)
 
     def settle(self) -> None:
         """Both programs have ended: when did the partner hear each text, if it did?"""
         messages = self.conversation.messages
         for index, copies in self._passed_on:
-            heard = [self.partner.conversation.messages[copy].delivered for copy in copies]
-            delivered = min((t for t in heard if t is not None), default=None)
-            note = messages[index].note or ("" if delivered is not None else "undelivered")
-            messages[index] = replace(messages[index], delivered=delivered, note=note)
+            heard = [self.partner.conversation.messages[copy] for copy in copies]
+            delivered = min((copy.delivered for copy in heard if copy.delivered is not None), default=None)
+            message = replace(messages[index], delivered=delivered)
+            if delivered is None and heard:
+                message = replace(message, note=message.note or heard[0].note, lost=heard[0].lost)
+            messages[index] = message
 
     def _tick(self) -> None:
         """Whatever a program makes our own code stumble over, it does in its own turn, and is its own fault."""
@@ -74,7 +84,7 @@ class PairedBridge(Bridge):
         if self._spec.responder is None:
             self._pass_on(text, sent)
         elif sent.copies:
-            self.questions.append(Question(text, sent, self.collected()))
+            self.questions.append(Question(sent, self.collected()))
         return sent.message
 
     def _pass_on(self, text: str, sent: Sent) -> None:
@@ -84,6 +94,8 @@ class PairedBridge(Bridge):
         except ValueError as error:
             sentence = f"the text begins with PY::JSON:: but is not JSON: {error}"
             self.conversation.faults.append(Fault(self.now / SECOND, Verdict.PROTOCOL_ERROR, "program", sentence))
+        if entry is not None and sent.text != text:
+            entry = _entry_of(sent.text)
         self._meter.keep(sent.copies * (len(text) + len(entry or "")))
         self._passed_on.append((sent.message, self.conversation.pass_on(sent, entry, self.partner.conversation)))
 
@@ -128,6 +140,14 @@ def _wait_for_partner() -> None:
     getcurrent().parent.switch()
 
 
+def _entry_of(corrupted: str) -> str | None:
+    """Nothing joins a queue of what was JSON before the channel corrupted it, and no longer is."""
+    try:
+        return message_format.passed_on(corrupted)
+    except ValueError:
+        return None
+
+
 def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
     """What both robots have said since the last tick is answered, in the order in which it was said."""
     asked = [(bridge, question) for bridge in bridges for question in bridge.questions]
@@ -135,7 +155,7 @@ def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
         sent, logged = question.sent, question.collected
         for copy in range(sent.copies):
             before = len(responder.calls)
-            answer = responder.answer(question.text, sent.t, sent.message, logged, bridge.number)
+            answer = responder.answer(sent.text, sent.t, sent.message, logged, bridge.number)
             bridge.calls += responder.calls[before:]
             bridge.conversation.answer(sent, copy, answer)
             logged = Collected()

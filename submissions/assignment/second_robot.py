@@ -34,6 +34,16 @@ def second_program_of(submission: Submission) -> Code | None:
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
     """Each robot has a program and a place to start from, and nobody has those of a robot that is not there."""
     scenarios = list(list_of_tables(document.get("scenario")))
+    linked = world.robots == 2 and parts.responder == "none"
+    for number, raw in enumerate(scenarios):
+        channel = raw.get("channel")
+        link = channel.get("link") if isinstance(channel, dict) else None
+        if link == "between robots" and not linked:
+            sentence = 'link is "between robots", expected robots = 2 in world and responder = "none" in parts with it'
+            problems.add(("scenario", number, "channel", "link"), sentence)
+        if link == "infrared" and linked:
+            sentence = 'link is "infrared", to a beacon, but the robots talk to each other, expected "between robots"'
+            problems.add(("scenario", number, "channel", "link"), sentence)
     if world.robots == 1:
         if "second_program" in parts.model_fields_set:
             problems.add(("parts", "second_program"), "second_program is given, expected robots = 2 in world with it")

@@ -121,6 +121,49 @@ def test_what_befalls_a_text_on_its_way_is_told_to_both(
     assert len(second.messages) == heard
 
 
+BETWEEN = Channel(link="between robots", range=1100.0, facing=90.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "lost"),
+    [
+        (LEFT, RIGHT, ""),
+        (LEFT, Pose(1700, 500, 180), "out of range"),
+        (Pose(500, 500, 90), RIGHT, "facing away"),
+        (LEFT, Pose(1500, 500, 0), "facing away"),
+    ],
+)
+def test_between_robots_both_must_be_in_reach_and_face_each_other(
+    runner: TrialRunner, first: Pose, second: Pose, lost: str
+) -> None:
+    recording = run_program(
+        runner, TELL, first, second=GLUE + "time.sleep(1)\nprint(glue.pyState()['messages'])", second_start=second,
+        channel=BETWEEN,
+    )  # fmt: skip
+    assert recording.partner is not None
+    (message,) = recording.messages
+    assert (message.lost, message.delivered is None) == (lost, bool(lost))
+    assert printed(recording.partner) == ["[]" if lost else "['hello']"]
+
+
+def test_an_obstacle_between_robots_blocks(runner: TrialRunner) -> None:
+    first, second = run_both(
+        runner, TELL, "import time\ntime.sleep(1)", channel=BETWEEN, obstacles=((900, 400, 50, 200),)
+    )
+    assert [message.lost for message in first.messages] == ["blocked"]
+    assert second.messages == ()
+
+
+def test_what_the_channel_corrupts_is_heard_so_and_is_no_fault(runner: TrialRunner) -> None:
+    said = "print('PY::JSON::[true]')\nprint('PY::abc')"
+    first, second = run_both(
+        runner, said, GLUE + "time.sleep(1)\nprint(glue.pyState())", channel=Channel(corruption=1.0)
+    )
+    assert first.faults == second.faults == ()
+    assert all(message.arrived_as not in (None, message.text) for message in (*first.messages, *second.messages))
+    assert "abc" not in printed(second)[0]
+
+
 def test_one_responder_knows_who_speaks_and_answers_who_has_asked(runner: TrialRunner) -> None:
     ask = GLUE + "print('PY::who?')\n" + WAIT + "print(glue.pyState()['messages'])"
     first, second = run_both(runner, ask, ask, responder=NAMES_SENDER)

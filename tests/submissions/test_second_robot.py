@@ -59,6 +59,9 @@ def test_a_second_pose_stands_for_all_and_has_a_jitter_of_its_own(tmp_path: Path
         (HEAD + SCENARIO + APART, "check is about two robots, but there is one"),
         (HEAD + WORLD + SCENARIO + SECOND + APART + "robot = 2\n", "check looks at both robots"),
         (HEAD + WORLD + SCENARIO + SECOND + APART + "at_least = 300\n", "has an at_most below at_least"),
+        (HEAD + SCENARIO + 'channel = { link = "between robots" }\n' + CRITERION, 'expected robots = 2 in world'),
+        (HEAD + WORLD + '[parts]\nresponder = "none"\n' + SCENARIO + SECOND +
+         'channel = { link = "infrared", beacon = [9, 9] }\n' + CRITERION, 'expected "between robots"'),
         (HEAD + WORLD + SCENARIO + SECOND + APART.replace("at_most = 200\n", ""), "asks for nothing"),
     ],
 )  # fmt: skip

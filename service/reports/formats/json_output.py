@@ -15,7 +15,7 @@ from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
 from service.reports.trace import storable
 from service.reports.view import View, staff_view
-from sim.recording import Recording
+from sim.recording import Message, Recording
 
 SCHEMA = 1
 
@@ -71,10 +71,20 @@ def json_list(views: Sequence[View]) -> str:
 def _said(recording: Recording) -> dict[str, Any]:
     return {
         "spoken": [storable(line.text) for line in recording.spoken],
-        "messages": [
-            {"t": message.t, "sender": message.sender, "text": storable(message.text)} for message in recording.messages
-        ],
+        "messages": [_message(message) for message in recording.messages],
     }
+
+
+def _message(message: Message) -> dict[str, Any]:
+    """A text with its time; where the channel lost or corrupted it, what it did and where the robot was."""
+    words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": storable(message.text)}
+    if message.lost:
+        words["lost"] = message.lost
+        if message.distance is not None:
+            words |= {"distance": message.distance, "angle": message.angle}
+    if message.arrived_as is not None:
+        words["arrived_as"] = storable(message.arrived_as)
+    return words
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

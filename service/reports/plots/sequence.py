@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.reports.crossing import befell, out_of_reach_by
 from service.reports.readable import message_words, one_line
 from service.reports.robots import PARTNER_OF, SECOND, robots_of
 from sim.recording import Call, Message, Recording
@@ -80,7 +81,8 @@ def conversation(
 ) -> SequenceDiagram:
     """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
 
-    Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
+    Kept are the first exchanges and, of the later ones, those in which what was sent again got through, or something
+    was lost or wrong.
     """
     exchanges = [exchange for robot, own in robots_of(recording) for exchange in _exchanges(own, robot)]
     if recording.partner is not None:
@@ -107,7 +109,7 @@ def conversation(
 
 def troubled(message: Message) -> bool:
     """Whether a message was lost, never arrived, or could not be read."""
-    return message.delivered is None or bool(message.note)
+    return message.delivered is None or bool(befell(message))
 
 
 def _exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
@@ -130,7 +132,8 @@ def _exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
 def _chosen(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
     wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(exchange)]
     half = most_exchanges - most_exchanges // 2
-    order = dict.fromkeys([*range(min(half, len(exchanges))), *wrong, *range(len(exchanges))])
+    first = range(min(half, len(exchanges)))
+    order = dict.fromkeys([*first, *_got_through(exchanges, wrong), *wrong, *range(len(exchanges))])
     kept: set[int] = set()
     steps = 0
     for number in list(order)[:most_exchanges]:
@@ -139,6 +142,19 @@ def _chosen(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int
             break
         kept.add(number)
     return kept
+
+
+def _got_through(exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
+    """The exchanges in which a text that was sent before, and went astray, got through."""
+    astray: set[str] = set()
+    failed = set(wrong)
+    for number, exchange in enumerate(exchanges):
+        text = next(exchange.messages).text if exchange.sent is not None else ""
+        if number in failed:
+            astray.add(text)
+        elif text in astray:
+            astray.discard(text)
+            yield number
 
 
 def _went_wrong(exchange: _Exchange) -> bool:
@@ -169,7 +185,9 @@ def _crossing(message: Message, robot: str) -> Step:
     sent = message.sender == "robot"
     other = PARTNER_OF[robot] if message.to_partner else "responder"
     source, target = (robot, other) if sent else (other, robot)
-    label, note = message_words(message.text, 90), one_line(message.note, 30)
+    label, note = message_words(message.text, 90), befell(message)
+    reach = out_of_reach_by(message)
+    label = f"{label} ({reach})" if reach else label
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
     return Step("message", source, target, label, message.t if sent else message.delivered, note)
