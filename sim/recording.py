@@ -168,11 +168,11 @@ class Message:
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
-    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
     lost: LossReason = ""  # recordings of earlier releases say so in their note alone
     distance: float | None = None
     angle: float | None = None
     arrived_as: str | None = None  # where the channel corrupted it
+    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
 
     @property
     def received(self) -> str:
