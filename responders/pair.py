@@ -11,10 +11,11 @@ from contextlib import ExitStack
 from dataclasses import replace
 
 from responders.lockstep import PairedBridge, serve_both
+from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, read_log, recording_of
+from responders.trial import MOST_NOTES, recording_of
 from responders.trial_spec import PartnerSpec, TrialSpec
 from sim.camera import LightCamera
 from sim.recording import Fault, Recording, Verdict

@@ -145,9 +145,26 @@ _NO_ROBOT = VerdictWords(
 )
 
 
+#: Where an agent of the responder's failed.
+_AGENT_ERROR = VerdictWords(
+    "error in an agent",
+    "An agent of yours raised an error, so whoever asked it got no answer.",
+    "The error is in the agent that is named below, or in a function that it calls.",
+    "Call the agent's function yourself with the message that it was sent, and mend the line that is named.",
+    "bad",
+)
+
+
 def grade_words(grade: Grade) -> VerdictWords:
     """The words for a grade's verdict, or that there was nothing to run."""
+    if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
+        return _AGENT_ERROR
     return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+
+
+def _is_of_an_agent(grade: Grade) -> bool:
+    faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
+    return bool(faults and faults[0].agent)
 
 
 def accuracy_words(grade: Grade) -> str:

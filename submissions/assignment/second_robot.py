@@ -52,6 +52,8 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
                 sentence = "second_poses is given, expected robots = 2 in world with it"
                 problems.add(("scenario", number, "second_poses"), sentence)
         return
+    if "agents" in document:
+        problems.add(("world", "robots"), "robots is 2, but agents are asked for one robot alone, expected robots = 1")
     if "training" in document:
         problems.add(("world", "robots"), "robots is 2, but what is trained answers no robot, expected robots = 1")
     for number, raw in enumerate(scenarios):

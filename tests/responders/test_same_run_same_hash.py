@@ -43,6 +43,28 @@ while True:
     tank_drive.on_for_seconds(random.randint(10, 50), 30, random.uniform(0.1, 1))
     print(len(glue.pyState()["messages"]))
 """
+COUNT = """
+import random, time
+for number in range(20):
+    print(f"PY::{number} {random.random()}")
+    time.sleep(random.uniform(0.2, 0.6))
+"""
+AGENTS = {
+    "agent": "import uuid\ndef agent(text): return [parser(text), uuid.uuid4().hex]",
+    "logger": "seen = []\ndef logger(entry):\n    seen.append(entry)\n    return len(seen)",
+    "parser": """
+import random, time
+def parser(text):
+    time.sleep(random.uniform(0, 0.05))
+    return [text, random.random(), time.time()]
+""",
+}
+ASKING = """
+import random
+def responder(text):
+    answer = agent(text)
+    return f"{answer} {logger(answer)} {random.random()}"
+"""
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
@@ -60,7 +82,7 @@ INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 60
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of four runs: a noisy line follower of 60 s, a talk of 20 images, one by infrared, two robots.
+    """The hash of one run: a follower of 60 s, a talk of 20 images, one by infrared, three agents, or two robots.
 
     The two bump into each other, ask one responder, and draw chance of their own.
     """
@@ -82,8 +104,12 @@ def chain(name: str, runner: TrialRunner) -> str:
         return f"{recording.sha256}{recording.partner.sha256}"
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
-        assert recording.verdict is Verdict.TIME_LIMIT
+        assert recording.verdict is Verdict.TIME_LIMIT, recording.faults
         assert len(recording.ticks) == 1800
+    elif name == "agents":
+        recording = run_program(runner, COUNT, responder=ASKING, agents=AGENTS)
+        assert recording.verdict is Verdict.FINISHED
+        assert len(recording.agent_messages) == 120
     elif name == "infrared":
         start = Pose(1100, 571, 0)
         recording = run_program(runner, CALL_ROUND, start, noise=Noise(motor=20), responder=ANSWER, channel=INFRARED)
@@ -104,7 +130,7 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
-RUNS = ("follower", "talk", "infrared", "pair")
+RUNS = ("follower", "talk", "infrared", "agents", "pair")
 WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys

@@ -13,7 +13,7 @@ from typing import Any
 from service.grading.grade import Accuracy
 from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
-from service.reports.trace import storable
+from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
 from sim.recording import Message, Recording
 
@@ -48,6 +48,7 @@ def json_document(view: View) -> dict[str, Any]:
                 "sha256": trial.recording.sha256,
                 **_said(trial.recording),
                 **({"partner": _said(trial.recording.partner)} if trial.recording.partner is not None else {}),
+                **agent_messages(trial.recording),
             }
             for trial in grade.trials
         ],

@@ -1,4 +1,4 @@
-"""Who told whom how often in a trial: the robot, the responder, and what the responder called.
+"""Who told whom how often in a trial: the robot, the responder, its agents, and what these called.
 
 What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
 """
@@ -6,7 +6,7 @@ What was said is ``sequence.py``'s; here it is only counted, and of the calls th
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -57,12 +57,14 @@ def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], boo
                 way = (robot, other) if message.sender == "robot" else (other, robot)
                 yield (*way, "message"), message.delivered is not None
     calls = [call for _, own in robots_of(recording) for call in own.calls]
-    names = _callees(calls)
+    names = _callees(calls, (each.agent for each in recording.agent_outputs))
     for call in calls:
         caller, callee = names.get(call.caller, "responder"), names[call.callee]
         yield (caller, callee, "call"), True
         if call.result != "None":  # a logger gives nothing back
             yield (callee, caller, "return"), True
+    for each in recording.agent_messages:
+        yield (each.sender, each.receiver, "call" if each.reply_to is None else "return"), True
 
 
 def party_of(name: str) -> str:
@@ -110,11 +112,11 @@ def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
             )
 
 
-def _callees(calls: Sequence[Call]) -> Mapping[str, str]:
+def _callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, str]:
     """What each name that was called is shown as."""
     networks = dict.fromkeys(call.callee for call in calls if call.callee not in _NAMED)
     shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
-    return MappingProxyType(shown | {name: name for name in _NAMED})
+    return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})
 
 
 def _count(talk: Talk) -> str:
