@@ -97,6 +97,7 @@ class Bridge:
                 "preamble": spec.program.preamble,
                 "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
+                "number": spec.number,
             }
         )
         while True:
@@ -179,8 +180,7 @@ class Bridge:
         due = (self.world.clock + 1) * TICK
         while due <= last:
             self.now = due
-            self._arrived += self.conversation.deliver(due)
-            self.world.tick()
+            self._tick()
             due += TICK
             if self.world.clock % 3000 == 0:
                 self._meter.heartbeat()
@@ -189,6 +189,14 @@ class Bridge:
             sentence = f"the program was still running after {self._spec.seconds:g} seconds of simulated time"
             raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
         self.now = end
+
+    def _tick(self) -> None:
+        self.take_arrivals()
+        self.world.tick()
+
+    def take_arrivals(self) -> None:
+        """What has arrived by now goes to the program with the next reply."""
+        self._arrived += self.conversation.deliver(self.now)
 
     def _reply(self, value: Any) -> None:
         self._child.send({"t": self.now, "v": value}, self._arrived)

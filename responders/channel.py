@@ -22,7 +22,8 @@ _ALPHABETS = (digits, ascii_lowercase, ascii_uppercase)
 class Channel:
     """Seconds, and chances between 0 and 1. The delay is of the whole way there and back.
 
-    An infrared link reaches ``range`` mm, and ``facing`` / 2 degrees to either side of where the robot faces.
+    An infrared link, to a beacon or between robots, reaches ``range`` mm, and ``facing`` / 2 degrees to either side of
+    where the robot faces.
     """
 
     delay: float = 0.1
@@ -31,7 +32,7 @@ class Channel:
     duplication: float = 0.0
     reordering: float = 0.0
     corruption: float = 0.0
-    link: Literal["cable", "infrared"] = "cable"
+    link: Literal["cable", "infrared", "between robots"] = "cable"
     beacon: tuple[float, float] | None = None  # where the responder's end of an infrared link stands
     range: float = 600.0
     facing: float = 90.0
@@ -64,6 +65,10 @@ class ChannelOfTrial:
         return tuple(
             sent + slept + self._delay(number, index + 4 * place) for place in range(self.copies(number, index + 8))
         )
+
+    def one_way(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
+        """When each copy of text ``number``, sent at ``sent`` to somebody who answers nothing, joins their queue."""
+        return tuple(sent + self._delay(number, 16 + 16 * copy) for copy in range(copies))
 
     def corrupted(self, text: str, number: int, index: int = 0) -> str | None:
         """As what ``text`` arrives where it is corrupted, None where it is not.

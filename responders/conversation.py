@@ -51,7 +51,7 @@ class Conversation:
     def __init__(self, channel: Channel, seed: int, chain: Chain, link: ChannelLink) -> None:
         self._channel = ChannelOfTrial(channel, seed)
         self._chain = chain
-        self._link = link
+        self.link = link
         self._under_way: list[tuple[int, int, _UnderWay]] = []  # due, index of the message
         self._texts = 0
         self.messages: list[Message] = []
@@ -59,7 +59,7 @@ class Conversation:
 
     def send(self, text: str, now: int) -> Sent:
         """The robot says ``text``; it reaches the responder at once, as often as it is copied on its way."""
-        contact = self._link.contact()
+        contact = self.link.contact()
         copies = 0 if contact.lost else self._channel.copies(self._texts)
         corrupted = self._channel.corrupted(text, self._texts) if copies else None
         message = Message(
@@ -96,6 +96,20 @@ class Conversation:
             heapq.heappush(self._under_way, (due, len(self.messages), _UnderWay(entry, corrupted)))
             self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
 
+    def pass_on(self, sent: Sent, entry: str | None, other: Conversation) -> tuple[int, ...]:
+        """A text of this robot's sets out to the other one; the indices of its copies among the other's messages.
+
+        ``entry`` is what joins the other's queue, as JSON.
+        """
+        message = self.messages[sent.message]
+        self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
+        first = len(other.messages)
+        for copy, due in enumerate(self._channel.one_way(sent.number, sent.t, sent.copies)):
+            heapq.heappush(other._under_way, (due, len(other.messages), _UnderWay(entry, message.arrived_as)))
+            note = "duplicated" if copy else ""
+            other.messages.append(Message(sent.t / SECOND, "partner", message.text, None, note=note))
+        return tuple(range(first, len(other.messages)))
+
     def deliver(self, now: int) -> list[str]:
         """Everything due at the tick at ``now`` arrives, in order; what joins the robot's queue of it, as JSON.
 
@@ -115,7 +129,7 @@ class Conversation:
         self._under_way.clear()
 
     def _arrives(self, index: int, now: int, corrupted: str | None) -> bool:
-        contact = self._link.contact()
+        contact = self.link.contact()
         message = replace(self.messages[index], distance=contact.distance, angle=contact.angle)
         if contact.lost:
             self.messages[index] = replace(message, note=message.note or "lost", lost=contact.lost)

@@ -104,15 +104,17 @@ class ResponderProcess:
         """Whether there is a child that can answer."""
         return self._child is not None
 
-    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
-        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one."""
+    def answer(self, text: str, t: int, message: int, collected: Collected, sender: int | None = None) -> Answer:
+        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one.
+
+        ``sender`` is the number of the robot that says it, where there are two.
+        """
         if self._child is None:
             return Answer()
         self._message, self._asked_at, self._slept = message, t, 0
         try:
-            self._child.send(
-                {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
-            )
+            frame = {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
+            self._child.send(frame if sender is None else {**frame, "sender": sender})
             return self._answer(self._until("answer"), t)
         except ChildStopped as stop:
             return Answer(fault=self._stopped(stop, t))

@@ -6,13 +6,14 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
+from sim.chance import Stream
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import Pose
@@ -51,8 +52,25 @@ class AgentSpec(ResponderSpec):
 
 
 @dataclass(frozen=True, slots=True)
+class PartnerSpec:
+    """The second robot of a trial: its program, and where it starts. All else is as the first one has it.
+
+    A program that the assignment has ``given`` may run until the time is up, and its chance is the world's: the same
+    for every submission.
+    """
+
+    program: ProgramSpec
+    pose: Pose
+    pen_down: bool = False
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
+    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``.
+
+    With a ``partner`` there are two robots, and without a responder each has the other to talk to.
+    """
 
     program: ProgramSpec
     responder: ResponderSpec | None
@@ -68,3 +86,18 @@ class TrialSpec:
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name
+    partner: PartnerSpec | None = None
+    number: int = 1  # of the robot: what its program is told that it is
+
+    def of_partner(self, partner: PartnerSpec) -> TrialSpec:
+        """The same trial as the second robot has it, with chance of its own."""
+        return replace(
+            self,
+            program=partner.program,
+            pose=partner.pose,
+            pen_down=partner.pen_down,
+            seed=Stream(self.seed, "second robot").integer(0),
+            child_seed=Stream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
+            partner=None,
+            number=2,
+        )

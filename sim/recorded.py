@@ -6,7 +6,7 @@ Whatever is drawn or judged of it is the service's.
 from __future__ import annotations
 
 from sim.floors import Floor, floor, names
-from sim.recording import Pose, Recording
+from sim.recording import Fault, Pose, Recording, Verdict
 from sim.robot import ROBOTS, Robot
 
 TICKS_PER_SECOND = 30
@@ -22,6 +22,19 @@ def floor_of(recording: Recording) -> Floor | None:
 def robot_of(recording: Recording) -> Robot:
     """The robot that was driven; the default one if its name is not known any more."""
     return ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
+
+
+def faults_of(recording: Recording) -> tuple[Fault, ...]:
+    """The faults of all robots, the earliest first; of the same moment, the first robot's."""
+    partners = recording.partner.faults if recording.partner is not None else ()
+    return tuple(sorted((*recording.faults, *partners), key=lambda fault: fault.t))
+
+
+def verdict_of(recording: Recording) -> Verdict:
+    """How the trial ended: by the earliest fault of any robot."""
+    if recording.partner is None:
+        return recording.verdict
+    return next((fault.verdict for fault in faults_of(recording)), Verdict.FINISHED)
 
 
 def seconds_at(tick: float) -> float:

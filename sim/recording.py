@@ -163,7 +163,7 @@ class Message:
     """
 
     t: float
-    sender: Literal["robot", "responder"]
+    sender: Literal["robot", "responder", "partner"]  # the partner is the other robot, where there are two
     text: str
     delivered: float | None
     reply_to: int | None = None
@@ -172,6 +172,7 @@ class Message:
     distance: float | None = None
     angle: float | None = None
     arrived_as: str | None = None  # where the channel corrupted it
+    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
 
     @property
     def received(self) -> str:
@@ -265,7 +266,7 @@ class Fault:
 
     t: float
     verdict: Verdict
-    who: Literal["program", "responder", "bridge", "host", "assignment"]
+    who: Literal["program", "second program", "responder", "bridge", "host", "assignment"]
     message: str
     line: int | None = None
     hint: str = ""
@@ -283,7 +284,11 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message."""
+    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message.
+
+    Of two robots each has a recording: this is the first one's, with the second's as its ``partner``. What is in it is
+    its own robot's, but for ``sha256``, which is over both, and what the responder printed and logged.
+    """
 
     background: str
     start: Pose
@@ -313,3 +318,4 @@ class Recording:
     notes: tuple[str, ...] = field(default=())
     agent_messages: tuple[AgentMessage, ...] = ()
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
+    partner: Recording | None = None

@@ -116,11 +116,18 @@ class World:
 
     def tick(self) -> None:
         """Advance a thirtieth of a second."""
+        self.sense(self.move())
+
+    def move(self) -> bool:
+        """The first half of a tick: the wheels turn. Whether the robot is elsewhere, or stands otherwise, then."""
         self.clock += 1
         drive = self.drive
         x, y, heading = drive.x, drive.y, drive.heading
         drive.tick(self.clock)
-        moved = x != drive.x or y != drive.y or heading != drive.heading
+        return x != drive.x or y != drive.y or heading != drive.heading
+
+    def sense(self, moved: bool) -> None:
+        """The second half, once all that shares the floor has moved: the sensors look, and the row is written."""
         self._sense(moved, listen=self.clock % 3 == 0)
         row = _row_of(self)
         self._rows.append(row)

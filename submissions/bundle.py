@@ -21,6 +21,7 @@ from responders.code import Code
 from sim.errors import UsageError
 from submissions.agent_files import with_agents
 from submissions.assignment.definition import Parts
+from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
@@ -110,10 +111,13 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             parts = {submitted[0]: None, wanted[0]: lone}
             notes = [note for note in notes if not note.startswith(f"{shown(lone.name)} was taken for")]
             notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
-    missing = [part for part in wanted if parts.get(part) is None]
+    missing = [_CANONICAL[part] for part in wanted if parts.get(part) is None]
+    needed = [f"{_CANONICAL[part]} ({_WORDS[part]})" for part in wanted]
+    if asked.second_program == "student":
+        needed.append(f"{SECOND_PROGRAM} (the second robot's program)")
+        missing += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
     if missing:
-        names = " and ".join(_CANONICAL[part] for part in missing)
-        expected = " and ".join(f"{_CANONICAL[part]} ({_WORDS[part]})" for part in wanted)
+        names, expected = " and ".join(missing), " and ".join(needed)
         raise UsageError(f"{where}: has no {names}, expected {expected}.")
     for part, source in parts.items():
         if source is not None and part not in wanted:

@@ -14,7 +14,7 @@ from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
-from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import PartnerSpec, ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.channel_flags import (
     BeaconFlag,
     BlockedByFlag,
@@ -39,11 +39,12 @@ from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
+from service.reports.robots import robots_of
 from service.reports.trace import trace
 from service.reports.written import prepare_folder
 from sim.errors import UsageError
 from sim.floors import floor
-from sim.recorded import floor_of
+from sim.recorded import faults_of, floor_of
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
@@ -56,6 +57,7 @@ _PROGRAM = ChildLimits(5.0, 128 << 20)
 _RESPONDER = ChildLimits(10.0, 512 << 20)
 _OUTPUT_BYTES = 1_000_000
 _FILES_BYTES = 16 << 20
+_ARRIVED = {"responder": "answer", "partner": "heard"}
 _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 
@@ -92,6 +94,9 @@ def run(
     move: Annotated[bool, typer.Option("-m", "--move", hidden=True)] = False,
     refresh: Annotated[bool, typer.Option("-F", "--refresh", hidden=True)] = False,
     responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None,
+    second: Annotated[
+        Path | None, typer.Option(help="A second robot's program; -x and -y in its first line say where it starts.")
+    ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
@@ -155,6 +160,8 @@ def run(
     if notebook is not None:
         if responder is not None:
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
+        if second is not None:
+            raise UsageError(f"{program.name} is a notebook and starts its robots itself; leave --second out")
         last = LastRun(wanted, seed, seed if sheet is None else sheet, channel)
         limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
@@ -172,7 +179,7 @@ def run(
     spec = TrialSpec(
         program=ProgramSpec(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
         responder=_responder(responder),
-        collaborative=chosen.collaborative or responder is not None,
+        collaborative=chosen.collaborative or responder is not None or second is not None,
         floor=floor(chosen.background, seed=seed if sheet is None else sheet),
         robot=robot(chosen.robot),
         pose=chosen.pose,
@@ -182,6 +189,7 @@ def run(
         seed=seed,
         child_seed=seed,
         pen_down=chosen.pen_down,
+        partner=_partner(second),
     )
     for note in chosen.notes:
         typer.echo(f"note: {note}", err=True)
@@ -189,6 +197,18 @@ def run(
         recording = runner.run(spec, chosen.obstacles)
     _show(recording)
     _keep(recording, program.name, seed, trace_file, image)
+
+
+def _partner(second: Path | None) -> PartnerSpec | None:
+    """The second robot, as the first line of its program says."""
+    if second is None:
+        return None
+    flags, text = _program(second)
+    if not {"x", "y"} <= flags.values.keys():
+        raise UsageError(f"{second.name}: does not say where the second robot starts; expected -x and -y in line 1")
+    chosen = setup(flags)
+    program = ProgramSpec(Code(second.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES)
+    return PartnerSpec(program, chosen.pose, chosen.pen_down)
 
 
 def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, image: Path | None) -> None:
@@ -262,24 +282,28 @@ def _files_beside(path: Path) -> dict[str, bytes]:
 
 
 def _show(recording: Recording) -> None:
-    """What was printed, spoken and answered, in order, and how it ended."""
-    shown = [(line.t, 0, line.text) for line in recording.printed]
-    shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
-    lost = [message for message in recording.messages if message.lost]
-    shown += [(message.t, 2, f"(lost) {message.text}: {befell_in_full(message)}") for message in lost]
-    shown += [
-        (message.delivered, 2, f"(answer) {message.received}")
-        for message in recording.messages
-        if message.sender == "responder" and message.delivered is not None
-    ]
+    """What was printed, spoken, answered and heard, in order, and how it ended."""
+    shown: list[tuple[float, int, str]] = []
+    for which, own in robots_of(recording):
+        whose = "" if own is recording else f"{which}: "
+        shown += [(line.t, 0, whose + line.text) for line in own.printed]
+        shown += [(line.t, 1, f"{whose}(says) {line.text}") for line in own.spoken]
+        lost = [message for message in own.messages if message.lost and message.sender != "partner"]
+        shown += [(message.t, 2, f"{whose}(lost) {message.text}: {befell_in_full(message)}") for message in lost]
+        shown += [
+            (message.delivered, 2, f"{whose}({_ARRIVED[message.sender]}) {message.received}")
+            for message in own.messages
+            if message.sender in _ARRIVED and message.delivered is not None
+        ]
     for t, _, text in sorted(shown, key=lambda each: (each[0], each[1])):
         typer.echo(f"{t:8.2f} s  {readable(text, 400)}")
-    end = recording.end
-    typer.echo(
-        f"{recording.end_t:8.2f} s  end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading {end.heading:.1f} degrees; "
-        f"{recording.verdict}"
-    )
-    for fault in recording.faults:
+    for which, own in robots_of(recording):
+        end, whose = own.end, "" if own is recording else f"{which}: "
+        typer.echo(
+            f"{own.end_t:8.2f} s  {whose}end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading {end.heading:.1f} degrees; "
+            f"{own.verdict}"
+        )
+    for fault in faults_of(recording):
         where = f" ({fault.place} of the {fault.who})" if fault.line is not None else ""
         typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
         if fault.hint:

@@ -16,6 +16,7 @@ from service.grading.grader import grade
 from service.grading.judging.words import fault_words
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
+from sim.recorded import faults_of
 from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import EXPECTED, REFERENCE, Expectation, OriginalMeasure, examples, expected
 from submissions.assignment.reader import find_assignment
@@ -178,7 +179,7 @@ def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | Non
 
 def _fault(graded: Grade) -> str:
     """What went wrong first, as far as somebody said."""
-    faults = [fault for trial in graded.trials for fault in trial.recording.faults]
+    faults = [fault for trial in graded.trials for fault in faults_of(trial.recording)]
     return f"; {fault_words(faults[0])}" if faults else ""
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from responders.sandbox.meter import JobLimits, JobMeter
-from responders.trial_spec import TrialSpec
+from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.run_plan import RunPlan, plan_run
@@ -195,4 +195,13 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
         child_seed=child_seed(trial.seed, plan.submission),
         pen_down="p" in plan.flags.switches,
         physics=Physics(world.solid, world.drive),
+        partner=_partner(trial, plan),
     )
+
+
+def _partner(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
+    """The second robot; a program of the assignment's own may run until the time is up."""
+    if plan.second_program is None or trial.second_pose is None:
+        return None
+    given = plan.assignment.parts.second_program in plan.assignment.given_parts
+    return PartnerSpec(plan.second_program, trial.second_pose, "p" in plan.second_flags.switches, given)

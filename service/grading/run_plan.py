@@ -23,6 +23,7 @@ from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
+from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.magics import Flags, setup, split_program, without_magic
@@ -80,6 +81,8 @@ class RunPlan:
     submission: str = ""  # content hash
     child_seed: int = 0  # of the chance that is the submission's own, and no trial's
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
+    second_program: ProgramSpec | None = None  # where there are two robots
+    second_flags: Flags = field(default_factory=Flags)
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
@@ -99,6 +102,8 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     else:
         plan = _of_files(submission, assignment)
     seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    if assignment.world.robots == 2:
+        plan = _with_second_program(plan, submission)
     plan = replace(plan, notes=(*plan.notes, *diagrams_in(notebook).problems))
     return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
 
@@ -202,6 +207,21 @@ def _executed(
         MappingProxyType(read_as),
         notes=notes,
     )
+
+
+def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
+    """The plan with what runs on the second robot. Robots that nobody answers talk to each other."""
+    assignment = plan.assignment
+    who = assignment.parts.second_program
+    if plan.program is None or isinstance(plan.trial, NotebookTrial):
+        raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
+    if who == SAME:
+        return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
+    code = _part("second robot program", SECOND_PROGRAM, who, second_program_of(submission), assignment)
+    assert code is not None
+    flags, text, notes = _flags(code.text, assignment)
+    program = _program(Code(code.name, text), flags, assignment)
+    return replace(plan, second_program=program, second_flags=flags, collaborative=True, notes=(*plan.notes, *notes))
 
 
 def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: Assignment) -> Code | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from responders.code import Code
@@ -15,7 +16,7 @@ from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import ResponderSpec
 from service.grading.grade import TrialResult
-from service.grading.judging.case import StaticAnalysis
+from service.grading.judging.case import StaticAnalysis, as_had_by
 from service.grading.judging.code import calls_of
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
@@ -59,7 +60,8 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter:
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, own)
+                    had = as_had_by(criterion.robot, trial)
+                    checks[criterion.id, place] = _check(criterion, had, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
     return StaticAnalysis(answers, plan.flags, called, checks, sandbox)
 
@@ -94,6 +96,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
         "images": [{"t": each.t, "pose": _pose(each.pose), "truth": each.truth} for each in recording.images],
         "image_log": [[side, tick / 30] for side, _, tick in recording.image_log],
         "touches": [[each.t, each.what] for each in recording.touches],
+        **({"partner": plain_trial(replace(trial, recording=recording.partner))} if recording.partner else {}),
     }
 
 

@@ -12,13 +12,16 @@ from types import MappingProxyType
 from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
+from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
+from submissions.assignment.second_robot import second_program_of
 from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {
         "program": "Robot program",
+        "second program": "Program of the second robot",
         "responder": "Responder",
         "bridge": "Bridge",
         "host": "Grading machine",
@@ -52,7 +55,7 @@ def fault_groups(grade: Grade, submission: Submission | None = None, limit: int 
     """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
     found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
-        for fault in trial.recording.faults:
+        for fault in faults_of(trial.recording):
             found.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
     return tuple(_group(grade, places, submission) for places in list(found.values())[:limit])
 
@@ -84,7 +87,10 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
     if fault.agent:
         return code_of(fault.agent, submission.files)
-    return {"program": submission.program, "responder": submission.responder}.get(fault.who)
+    parts = {"program": submission.program, "responder": submission.responder}
+    if fault.who == "second program":
+        parts[fault.who] = second_program_of(submission)
+    return parts.get(fault.who)
 
 
 def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:

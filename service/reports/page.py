@@ -17,6 +17,7 @@ from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
 from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
@@ -157,10 +158,13 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
 
 def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
     """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
-    moments = [(line.t, "printed", line.text) for line in recording.printed]
-    moments += [(line.t, "said", line.text) for line in recording.spoken]
-    moments += [(touch.t, "touched", touch.what) for touch in recording.touches]
-    moments += [(fault.t, _kind(fault), fault.message) for fault in recording.faults]
+    moments: list[tuple[float, str, str]] = []
+    for robot, own in robots_of(recording):
+        whose = "" if own is recording else f"{robot}: "
+        moments += [(line.t, "printed", whose + line.text) for line in own.printed]
+        moments += [(line.t, "said", whose + line.text) for line in own.spoken]
+        moments += [(touch.t, "touched", whose + touch.what) for touch in own.touches]
+        moments += [(fault.t, _kind(fault), whose + fault.message) for fault in own.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
     if omitted <= 1:
@@ -215,6 +219,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
+    messages = messages_of(recording)
     of = sum(other.scenario == scenario for other in grade.trials)
     which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
     if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
@@ -226,7 +231,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
         messages=tuple(itertools.islice(_message_lines(recording), _MOST_MESSAGES)),
-        more_messages=max(0, len(recording.messages) + len(recording.agent_messages) - _MOST_MESSAGES),
+        more_messages=max(0, len(messages) + len(recording.agent_messages) - _MOST_MESSAGES),
         responder_output=readable(recording.responder_output, 4000),
         responder_log=readable(recording.responder_log, 4000),
         agents=tuple(
@@ -238,18 +243,21 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
 
 
 def _message_lines(recording: Recording) -> Iterator[MessageLine]:
-    """Each message of the robot's is followed by what the agents said until it was answered."""
+    """Each message of the robot's is followed by what the agents said until it was answered.
+
+    Two robots have no agents, so the index of a message among those told is its index in the recording.
+    """
     inner: dict[int, list[AgentMessage]] = {}
     for each in recording.agent_messages:
         inner.setdefault(each.message, []).append(each)
     yield from map(_agent_line, inner.get(-1, ()))
-    for index, message in enumerate(recording.messages):
+    for index, (sender, message) in enumerate(messages_of(recording)):
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
         happened = befell_in_full(message)
         if happened:
             arrived += f" ({happened})"
         wrong = message.delivered is None or bool(happened)
-        yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, wrong)
         yield from map(_agent_line, inner.get(index, ()))
 
 

@@ -16,7 +16,8 @@ def trace(recording: Recording) -> dict[str, Any]:
     """``recording`` as a JSON-serialisable dict: one row a tick under ``ticks``, then what was said and sent.
 
     Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees
-    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists.
+    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists. Of two
+    robots this is the first; the second is its ``partner``.
     """
     return {
         "ticks": {name: _numbers(column.tolist()) for name, column in recording.ticks.told().items()},
@@ -53,6 +54,7 @@ def trace(recording: Recording) -> dict[str, Any]:
         "end": {"t": _finite(recording.end_t), **_pose(recording.end)},
         "sha256": recording.sha256,
         "sandbox": recording.sandbox,
+        **({"partner": trace(recording.partner)} if recording.partner is not None else {}),
     }
 
 

@@ -56,6 +56,8 @@ def keep(recording: Recording, cap: int) -> Kept:
     for trim in (_without_floods, _without_words, _without_ticks):
         if len(data) <= cap:
             break
+        if recording.partner is not None:
+            recording = replace(recording, partner=trim(recording.partner))
         recording = trim(recording)
         data = to_bytes(recording)
     return Kept(recording, data)
@@ -67,7 +69,7 @@ def to_bytes(recording: Recording) -> bytes:
     words: dict[str, Any] = {
         field.name: encode(getattr(recording, field.name))
         for field in fields(recording)
-        if field.name not in ("ticks", "images")
+        if field.name not in ("ticks", "images", "partner")
     }
     words["ticks"] = {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels}
     words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
@@ -79,6 +81,8 @@ def to_bytes(recording: Recording) -> bytes:
     for column in COLUMNS:
         values = np.asarray(getattr(ticks, column.name), column.dtype)
         arrays[column.name] = _shuffled(values.reshape(-1, column.width))
+    if recording.partner is not None:
+        arrays["partner"] = _bytes_array(to_bytes(recording.partner))
     buffer = io.BytesIO()
     np.savez(buffer, **cast(dict[str, Any], arrays))
     return zlib.compress(buffer.getvalue(), 6)
@@ -90,6 +94,7 @@ def from_bytes(data: bytes) -> Recording:
         with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
             words = json.loads(bytes(arrays["words"]))
             pixels = bytes(arrays["pictures"])
+            partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
             # A recording may be older than a column.
             columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
@@ -99,7 +104,7 @@ def from_bytes(data: bytes) -> Recording:
         for message in words.get("messages", ()):
             if message.get("note") == "lost":  # earlier releases knew no other reason
                 message.setdefault("lost", "chance")
-        return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
+        return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images, partner=partner)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
 

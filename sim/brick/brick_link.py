@@ -27,6 +27,7 @@ class Link:
 
     def __init__(self) -> None:
         self.units = 0
+        self.number = 1  # of the robot, where there are two
         self.state: dict[str, list[Any]] = {"messages": []}
         self._send: Callable[[Frame], None] = _unconnected
         self._send_later: Callable[[Frame], None] = _unconnected

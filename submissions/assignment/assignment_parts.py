@@ -34,6 +34,7 @@ from submissions.assignment.schema import (
     did_you_mean,
     listed,
 )
+from submissions.assignment.second_robot import SAME, check_robots, second_poses_of
 from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria.common import Surroundings
 from submissions.document import checked_table, no_double, tables_of, texts_in
@@ -62,6 +63,8 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
+    if world_table and parts:
+        check_robots(document, world_table, parts, problems)
     agents, agents_sources = read_agents(document, parts, files, problems)
     _clear_beacons(scenarios, world, problems)
     around = Surroundings(
@@ -69,6 +72,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         ground=ground,
         without=_nobodys(parts),
         agents=frozenset(agents),
+        robots=world_table.robots if world_table else 1,
         files=files,
         aliases=head.aliases if head else {},
     )
@@ -88,7 +92,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         id=head.id,
         title=head.title,
         world=world,
-        parts=Parts(parts.program, parts.responder, str(parts.cell), MappingProxyType(dict(agents))),
+        parts=Parts(
+            parts.program,
+            parts.responder,
+            str(parts.cell),
+            parts.second_program if world.robots == 2 else "none",
+            MappingProxyType(dict(agents)),
+        ),
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),
@@ -163,6 +173,7 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
         labels=table.labels,
         obstacles=obstacles,
         robot=robot,
+        robots=table.robots,
         solid=table.solid,
         drive=table.drive,
         noise=table.noise,
@@ -190,15 +201,17 @@ def _scenarios(document: Mapping[str, object], ground: Floor | None, problems: P
 
 
 def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems: Problems) -> Scenario | None:
-    for number, (x, y, _) in enumerate(table.poses):
-        if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
-            problems.add(
-                (*place, "poses", number),
-                f"poses[{number}] is off the floor, expected x from 0 to {WIDTH} and y from 0 to {HEIGHT}",
-            )
+    for key in ("poses", "second_poses"):
+        for number, (x, y, _) in enumerate(getattr(table, key)):
+            if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
+                problems.add(
+                    (*place, key, number),
+                    f"{key}[{number}] is off the floor, expected x from 0 to {WIDTH} and y from 0 to {HEIGHT}",
+                )
     poses = tuple(Pose(*pose) for pose in table.poses)
     if not poses:
         poses = (ground.default_pose if ground else Pose(100, 800, 0),)
+    second_poses = second_poses_of(table, len(poses), place, problems)
     return Scenario(
         id=table.id,
         poses=poses,
@@ -212,6 +225,7 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         visibility=table.visibility,
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
+        second_poses=second_poses,
     )
 
 
@@ -230,15 +244,15 @@ def _nobodys(parts: PartsTable | None) -> frozenset[str]:
 
 def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
     sources = {}
-    for part in ("program", "responder"):
+    for part in ("program", "responder", "second_program"):
         name = getattr(parts, part)
-        if name in ("student", "none"):
+        if name == "student" or name == (SAME if part == "second_program" else "none"):
             continue
         if part == "responder" and name not in files and name in library.names():
             sources[name] = library.source(name)
             continue
         if name not in files or not name.endswith(".py"):
-            none = "" if part == "program" else f', "none", {", ".join(library.names())}'
+            none = {"program": "", "second_program": f', "{SAME}"'}.get(part, f', "none", {", ".join(library.names())}')
             problems.add(
                 ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
             )

@@ -47,6 +47,7 @@ class WorldTable(StrictTable):
     labels: bool = True
     obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
     robot: str = "Default_Robot"
+    robots: Literal[1, 2] = 1
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
     noise: Literal["course", "both directions"] = "course"
@@ -81,6 +82,7 @@ class PartsTable(StrictTable):
     """Whose program and responder are run, and which cell of a notebook is the program."""
 
     program: str = Field(default="student", min_length=1)
+    second_program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
     cell: str | int = "last"
 
@@ -98,7 +100,7 @@ class PartsTable(StrictTable):
 class ChannelTable(StrictTable):
     """What becomes of messages on their way: delays in seconds, shares as probabilities, an infrared link in mm."""
 
-    link: Literal["cable", "infrared"] = "cable"
+    link: Literal["cable", "infrared", "between robots"] = "cable"
     beacon: Annotated[tuple[float, float], Shape("[x, y]")] | None = None
     range: float = Field(default=600.0, gt=0, le=5000)
     facing: float = Field(default=90.0, gt=0, le=360)
@@ -116,6 +118,8 @@ class ChannelTable(StrictTable):
         needless = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
         if self.link == "cable" and needless:
             raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
+        if self.link == "between robots" and self.beacon is not None:
+            raise ValueError("has a beacon, but the robots are each other's, expected none beside this link")
         if self.link == "infrared" and self.beacon is None:
             raise ValueError('has link = "infrared" and nothing at its other end, expected beacon = [x, y] beside it')
         if self.beacon is not None and not (0 < self.beacon[0] < WIDTH and 0 < self.beacon[1] < HEIGHT):
@@ -149,6 +153,7 @@ class ScenarioTable(StrictTable):
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
+    second_poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
@@ -159,7 +164,7 @@ class ScenarioTable(StrictTable):
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
-    @field_validator("poses", mode="before")
+    @field_validator("poses", "second_poses", mode="before")
     @classmethod
     def _list_of_poses(cls, value: object) -> object:
         if isinstance(value, list) and value and all(isinstance(entry, int | float) for entry in value):

@@ -54,6 +54,7 @@ class Surroundings:
     ground: Floor | None = None
     without: frozenset[str] = frozenset()  # the parts, program and responder, that nobody writes
     agents: frozenset[str] = frozenset()
+    robots: int = 1
     files: Mapping[str, bytes] = field(default_factory=dict)
     aliases: Mapping[str, Texts] = field(default_factory=dict)
     criteria: Sequence[Criterion] = ()
@@ -84,6 +85,7 @@ class Criterion(StrictTable):
     title: str = Field(min_length=1, max_length=200)
     marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
     scenarios: SomeTexts = ()
+    robot: Literal[1, 2] = 1  # which one it looks at, where there are two
     #: how the trials become marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"

@@ -66,6 +66,9 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")
     shutil.copytree(EXAMPLE, tmp_path / "submissions" / "ada")
     shutil.copy(MESSAGING, tmp_path)
+    (tmp_path / "my-robots").mkdir()
+    (tmp_path / "my-robots" / "robot.py").write_text("print('PY::hello')\n")
+    (tmp_path / "my-robots" / "robot2.py").write_text("%%sim_magic_preloaded -x 1500 -y 500 -a 180\n")
     environment = os.environ | {"ROBOMARK_HOME": str(tmp_path / "home")}
     ids: dict[str, str] = {}
     for words in commands(document):

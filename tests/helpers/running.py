@@ -8,7 +8,7 @@ from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import AgentSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, PartnerSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
@@ -44,15 +44,27 @@ def run_program(
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
     meter: JobMeter | None = None,
+    second: str | None = None,
+    second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
+    given: bool = False,
+    program_limits: ChildLimits = PROGRAM_LIMITS,
+    child_seed: int | None = None,
 ) -> Recording:
-    """One trial; the start is the background's own unless given."""
+    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots.
+
+    ``given`` is whether the assignment brings that one.
+    """
     ground = floor(background)
+    partner = None
+    if second is not None:
+        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, program_limits, output_bytes)
+        partner = PartnerSpec(program_of_second, second_start, given=given)
     spec = TrialSpec(
-        program=ProgramSpec(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
+        program=ProgramSpec(Code("robot.py", program), preamble, program_limits, output_bytes),
         responder=None
         if responder is None
         else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
-        collaborative=responder is not None,
+        collaborative=responder is not None or second is not None,
         floor=ground,
         robot=robot(robot_name),
         pose=start or ground.default_pose,
@@ -60,8 +72,9 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
-        child_seed=seed,
+        child_seed=seed if child_seed is None else child_seed,
         physics=physics,
         agents={name: agent_spec(name, text, files, output_bytes) for name, text in (agents or {}).items()},
+        partner=partner,
     )
     return runner.run(spec, obstacles, meter)

@@ -16,6 +16,7 @@ from paths import HELPERS
 from responders.channel import Channel
 from running import run_program
 from service.grading.trial_runner import TrialRunner
+from sim.motion import Physics
 from sim.recording import Pose, Verdict
 from sim.world import Noise
 from submissions.assignment.examples import examples
@@ -33,6 +34,14 @@ for i in range(20):
     print("IMG_DATA")
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
+"""
+WANDERER = """
+import random
+import ev3dev2_glue as glue
+while True:
+    print("PY::" + str(ultrasonic.distance_centimeters))
+    tank_drive.on_for_seconds(random.randint(10, 50), 30, random.uniform(0.1, 1))
+    print(len(glue.pyState()["messages"]))
 """
 COUNT = """
 import random, time
@@ -73,7 +82,26 @@ INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 60
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one run: a follower of 60 s, a conversation of 20 images, one by infrared, or of three agents."""
+    """The hash of one run: a follower of 60 s, a talk of 20 images, one by infrared, three agents, or two robots.
+
+    The two bump into each other, ask one responder, and draw chance of their own.
+    """
+    if name == "pair":
+        recording = run_program(
+            runner,
+            WANDERER,
+            Pose(400, 500, 0),
+            second=WANDERER,
+            noise=Noise(10, 20),
+            responder="def responder(text):\n    return f'JSON::[{sender}, \"{text}\"]'",
+            channel=Channel(jitter=0.1, loss=0.1),
+            physics=Physics(solid=True),
+            seconds=20,
+        )
+        assert recording.partner is not None
+        assert {recording.verdict, recording.partner.verdict} == {Verdict.TIME_LIMIT}
+        assert recording.touches
+        return f"{recording.sha256}{recording.partner.sha256}"
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT, recording.faults
@@ -102,7 +130,7 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
-RUNS = ("follower", "talk", "infrared", "agents")
+RUNS = ("follower", "talk", "infrared", "agents", "pair")
 WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys

@@ -62,6 +62,7 @@ def test_catalogue_is_in_order(name: str) -> None:
     assert assignment.description
     assert re.fullmatch("[0-9a-f]{64}", assignment.version)
     asked = {"robot.py": assignment.parts.program, "responder.py": assignment.parts.responder}
+    asked["robot2.py"] = assignment.parts.second_program
     starter = {path.name for path in (assignment_folder(name) / "starter").iterdir()}
     assert {part for part, who in asked.items() if who == "student"} <= starter or starter == {"notebook.ipynb"}
 

@@ -33,7 +33,7 @@ class ResponderRole:
         self._own_name = "responder"
         self._units = 0
         self._namespace: dict[str, Any] = {}
-        self._defines_msg = False
+        self._defines_msg = self._defines_sender = False
         self._stack: list[str] = []
         self._calls = 0
 
@@ -75,6 +75,8 @@ class ResponderRole:
 
         self._units = max(self._units, began + message["t"])
         roboSim.collect(message.get("data", []), message.get("images", []))
+        if "sender" in message and not self._defines_sender:
+            self._namespace["sender"] = message["sender"]
         self._wire.send(self._answer(message["text"]))
 
     def _load(self, text: str) -> Frame | None:
@@ -85,7 +87,7 @@ class ResponderRole:
                 self._find()
         except BaseException as error:
             return student_code.describe(error, self._name)
-        self._defines_msg = "msg" in self._namespace
+        self._defines_msg, self._defines_sender = "msg" in self._namespace, "sender" in self._namespace
         return None
 
     def _find(self) -> Callable[[str], Any]:

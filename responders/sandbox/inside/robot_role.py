@@ -49,6 +49,7 @@ def run(wire: Wire, grants: Grants) -> None:
         link.ask({"do": "wait", "units": units})
 
     signal.signal(signal.SIGXCPU, busy)
+    link.number = spec.get("number", 1)
     link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"])
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)

@@ -15,7 +15,7 @@ from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
 from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
-from sim.recording import Message
+from sim.recording import Message, Recording
 
 SCHEMA = 1
 
@@ -46,8 +46,8 @@ def json_document(view: View) -> dict[str, Any]:
                 "seed": trial.seed,
                 "verdict": trial.verdict.value,
                 "sha256": trial.recording.sha256,
-                "spoken": [storable(line.text) for line in trial.recording.spoken],
-                "messages": [_message(message) for message in trial.recording.messages],
+                **_said(trial.recording),
+                **({"partner": _said(trial.recording.partner)} if trial.recording.partner is not None else {}),
                 **agent_messages(trial.recording),
             }
             for trial in grade.trials
@@ -67,6 +67,13 @@ def json_text(view: View) -> str:
 def json_list(views: Sequence[View]) -> str:
     """The documents of a batch, each with its student."""
     return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+
+
+def _said(recording: Recording) -> dict[str, Any]:
+    return {
+        "spoken": [storable(line.text) for line in recording.spoken],
+        "messages": [_message(message) for message in recording.messages],
+    }
 
 
 def _message(message: Message) -> dict[str, Any]:

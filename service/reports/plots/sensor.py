@@ -24,6 +24,7 @@ from service.reports.plots.style import (
     RIGHT,
     RULE,
     SAID,
+    SECOND_ROBOT,
     WIDTH,
     axes_at,
     font,
@@ -111,9 +112,11 @@ def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
 def strips_of(recording: Recording) -> tuple[Strip, ...]:
     """The kinds of events that happened at all, with their times in seconds."""
     answers = [m for m in recording.messages if m.sender == "responder"]
+    heard = [m for m in recording.messages if m.sender == "partner"]
     strips = (
         Strip("sent", tuple(m.t for m in recording.messages if m.sender == "robot"), ">", LEFT),
         Strip("answer", tuple(m.delivered for m in answers if m.delivered is not None), "<", RIGHT),
+        Strip("heard", tuple(m.delivered for m in heard if m.delivered is not None), "<", SECOND_ROBOT),
         Strip("said", tuple(line.t for line in recording.spoken), "o", SAID),
         Strip("touch", tuple(touch.t for touch in recording.touches), "D", FAULT),
         Strip("fault", tuple(fault.t for fault in recording.faults), "X", FAULT),
