@@ -93,6 +93,7 @@ class Bridge:
                 "name": spec.program.code.name,
                 "text": spec.program.code.text,
                 "preamble": spec.program.preamble,
+                "modules": dict(spec.program.modules),
                 "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
             }
@@ -164,7 +165,7 @@ class Bridge:
                     self._advance(_READ)
                 self._reply(None)
             case "stuck":
-                self._never_waits(frame["line"])
+                self._never_waits(frame["line"], frame["file"])
             case "refused":
                 if len(self.notes) < _MOST_NOTES:
                     self.notes.append(refusal("program", frame))
@@ -323,10 +324,10 @@ class Bridge:
     def _free_act(self) -> None:
         self._free_acts += 1
         if self._free_acts > _FREE_ACTS:
-            self._never_waits(None)
+            self._never_waits(None, None)
 
-    def _never_waits(self, line: int | None) -> NoReturn:
+    def _never_waits(self, line: int | None, file: str | None) -> NoReturn:
         where = "this loop never waits" if line is not None else "the program never waits"
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
-        fault = Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", f"{where}, so the world cannot move", line, hint)
-        raise _Cut(fault)
+        sentence = f"{where}, so the world cannot move"
+        raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))

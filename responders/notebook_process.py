@@ -86,7 +86,7 @@ class NotebookProcess(ResponderProcess):
 
     def placed(self, fault: Fault) -> Fault:
         """A fault of the process with the cell, and the line in it, where that is known."""
-        if fault.who != "responder" or fault.line is None or fault.cell is not None:
+        if fault.who != "responder" or fault.line is None or fault.cell is not None or fault.file:
             return fault
         cell, line = self.place(fault.line)
         return replace(fault, cell=cell, line=line)
@@ -98,11 +98,11 @@ class NotebookProcess(ResponderProcess):
         cell = bisect.bisect_right(self._first_lines, line)
         return cell, line - self._first_lines[cell - 1] + 1
 
-    def note(self, line: int | None, sentence: str) -> None:
-        """Keep a sentence for the report, with the place that it is about."""
-        cell, number = self.place(line)
+    def note(self, line: int | None, sentence: str, file: str | None = None) -> None:
+        """Keep a sentence for the report, with the place that it is about; ``file`` lies beside the notebook."""
+        cell, number = self.place(line) if file is None else (self._cell, line)
         where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
-        self._note(f"{where}: {sentence}")
+        self._note(f"{where}{f' of {file}' if file else ''}: {sentence}")
 
     def _take_cell(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
         # Each costs output, so that a process cannot send these for ever.
@@ -130,11 +130,11 @@ class NotebookProcess(ResponderProcess):
     def _take(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "refused":
-                self.note(frame["line"], frame["what"][:200])
+                self.note(frame["line"], frame["what"][:200], frame["file"])
             case "note":
                 # A responder may call magics too.
                 self._spend("", "sent")
-                self.note(frame["line"], frame["text"][:400])
+                self.note(frame["line"], frame["text"][:400], frame["file"])
             case _:
                 super()._take(frame)
 

@@ -6,7 +6,8 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
@@ -23,12 +24,13 @@ Preamble = Literal["none", "imports", "preloaded"]
 
 @dataclass(frozen=True, slots=True)
 class ProgramSpec:
-    """A robot program and what it may use."""
+    """A robot program and what it may use; ``modules`` are texts that it can import, by their names."""
 
     code: Code
     preamble: Preamble
     limits: ChildLimits
     output_bytes: int
+    modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True)

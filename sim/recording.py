@@ -217,7 +217,7 @@ class Touch:
 class Fault:
     """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one.
 
-    In a notebook the line is that of a cell, both counted from 1.
+    In a notebook the line is that of a cell, both counted from 1; with a ``file`` it is that of a file beside.
     """
 
     t: float
@@ -228,12 +228,14 @@ class Fault:
     hint: str = ""
     cell: int | None = None
     staff: str = ""  # what our own code stumbled over, for staff to look at
+    file: str = ""  # the Python file beside the program, responder or notebook that the line is in
 
     @property
     def place(self) -> str:
-        """``line 3`` or ``cell 7, line 3``; empty where neither is known."""
+        """``line 3``, ``cell 7, line 3`` or ``line 3 of helper.py``; empty where nothing is known."""
         cell = [f"cell {self.cell}"] if self.cell is not None else []
-        return ", ".join(cell + ([f"line {self.line}"] if self.line is not None else []))
+        beside = f" of {self.file}" if self.file else ""
+        return ", ".join(cell + ([f"line {self.line}{beside}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import stat
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,7 @@ from sim.recorded import floor_of
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program
 from submissions.notebook import is_script, read_notebook, read_script
 from submissions.source_text import decode_source
@@ -109,7 +111,8 @@ def run(
         last = LastRun(wanted, seed, seed if sheet is None else sheet)
         limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
-            executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
+            text = "\n".join(cell.source for cell in notebook.cells)
+            executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner)
         show_notebook(executed, _show)
         if executed.runs:
             _keep(executed.runs[-1].recording, program.name, seed, trace_file, image)
@@ -118,7 +121,9 @@ def run(
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
     chosen = setup(flags)
     spec = TrialSpec(
-        program=ProgramSpec(Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES),
+        program=ProgramSpec(
+            Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES, _modules_beside(program, text)
+        ),
         responder=_responder(responder),
         collaborative=chosen.collaborative or responder is not None,
         floor=floor(chosen.background, seed=seed if sheet is None else sheet),
@@ -194,11 +199,25 @@ def _responder(given: str | None) -> ResponderSpec | None:
     if not path.exists() and ":" in given:
         file, _, name = given.rpartition(":")
         path = Path(file)
-    return ResponderSpec(Code(path.name, _source(path)), _files_beside(path), _RESPONDER, _OUTPUT_BYTES, name)
+    text = _source(path)
+    return ResponderSpec(Code(path.name, text), _files_beside(path, text), _RESPONDER, _OUTPUT_BYTES, name)
 
 
-def _files_beside(path: Path) -> dict[str, bytes]:
+def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
+    """What a file with this text imports from its folder."""
+
+    def read(name: str) -> bytes | None:
+        beside = path.parent / name
+        if beside.is_symlink() or not beside.is_file() or name == path.name:
+            return None
+        return beside.read_bytes()
+
+    return modules_of(text, read)
+
+
+def _files_beside(path: Path, text: str) -> dict[str, bytes]:
     files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
+    files |= {f"{name}.py": module.encode() for name, module in _modules_beside(path, text).items()}
     left = _FILES_BYTES
     for beside in sorted(path.parent.iterdir()):
         if beside.suffix in (".py", ".ipynb", "") or beside.is_symlink() or not beside.is_file():
@@ -226,7 +245,8 @@ def _show(recording: Recording) -> None:
         f"{recording.verdict}"
     )
     for fault in recording.faults:
-        where = f" ({fault.place} of the {fault.who})" if fault.line is not None else ""
+        whose = "" if fault.file else f" of the {fault.who}"
+        where = f" ({fault.place}{whose})" if fault.line is not None else ""
         typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
         if fault.hint:
             typer.echo(f"            {fault.hint}", err=True)

@@ -54,7 +54,7 @@ def run_notebook(
     def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
         wanted = planner.simulator.apply(last.flags)
         spec = TrialSpec(
-            program=program_spec(program, limits.program, limits.output_bytes),
+            program=program_spec(program, limits.program, limits.output_bytes, files),
             responder=None,
             collaborative=setup.collaborative or wanted.collaborative,
             floor=floor(wanted.background, seed=last.sheet),
@@ -70,7 +70,7 @@ def run_notebook(
         return PlannedRun(spec, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
 
     found = sites(notebook)
-    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, last.sheet)
+    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, files, last.sheet)
     planner = NotebookRuns(found[-1] if found else None, marked_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)

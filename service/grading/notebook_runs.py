@@ -5,7 +5,7 @@ It decides only; the cells are executed and the robots run by ``responders``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from responders.channel import Channel
@@ -19,6 +19,7 @@ from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, Setup, Simulator, parse_flags
 from submissions.marked_cell import Site
 
@@ -47,6 +48,7 @@ class UnmarkedRuns:
     output_bytes: int
     seconds: float
     seed: int
+    files: Mapping[str, bytes]  # of which programs import modules
     sheet: int = 0
 
 
@@ -131,7 +133,7 @@ class NotebookRuns:
         own = self._unmarked
         seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
         return TrialSpec(
-            program=program_spec(program, own.limits, own.output_bytes),
+            program=program_spec(program, own.limits, own.output_bytes, own.files),
             responder=None,
             collaborative=setup.collaborative,
             floor=floor(setup.background, seed=own.sheet),
@@ -146,6 +148,7 @@ class NotebookRuns:
         )
 
 
-def program_spec(program: Program, limits: ChildLimits, output_bytes: int) -> ProgramSpec:
-    """The program of a cell as the bridge takes it."""
-    return ProgramSpec(Code(f"cell {program.cell}", program.text), program.flags.preamble, limits, output_bytes)
+def program_spec(program: Program, limits: ChildLimits, output_bytes: int, files: Mapping[str, bytes]) -> ProgramSpec:
+    """The program of a cell as the bridge takes it, with the modules among ``files`` that it can import."""
+    code = Code(f"cell {program.cell}", program.text)
+    return ProgramSpec(code, program.flags.preamble, limits, output_bytes, modules_of(code.text, files.get))

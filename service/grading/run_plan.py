@@ -23,6 +23,7 @@ from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of
@@ -103,8 +104,9 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment brings its own, or none",)
-    program = _program(Code(code.name, text), flags, assignment) if code is not None else None
-    beside = _responder(responder, _files(submission, assignment), assignment)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     return _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
 
 
@@ -129,8 +131,9 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
     responder = _part("responder", "responder.py", asked.responder, None, assignment)
-    program = _program(Code(f"cell {cell.number}", text), flags, assignment)
-    beside = _responder(responder, _files(submission, assignment), assignment)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(f"cell {cell.number}", text), flags, files, assignment)
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
     return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
 
@@ -168,7 +171,7 @@ def _executed(
     notes: tuple[str, ...],
 ) -> RunPlan:
     """A notebook from top to bottom; what in it is no robot program stands for the responder."""
-    files = _files(submission, assignment)
+    files = _files(submission, assignment, "student")
     functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
@@ -186,7 +189,7 @@ def _executed(
     return RunPlan(
         assignment,
         NotebookTrial(spec, marked_site(notebook, which) if which is not None else None, which, as_read),
-        _program(program, flags, assignment) if program is not None else None,
+        _program(program, flags, _files(submission, assignment, asked.program), assignment) if program else None,
         None,
         functions,
         True,
@@ -224,15 +227,19 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
     return flags, text, tuple(notes)
 
 
-def _files(submission: Submission, assignment: Assignment) -> Mapping[str, bytes]:
-    """What lies in the responder's folder; a submission's own file wins over a given one."""
-    return {**assignment.given, **submission.files}
+def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
+    """What lies beside a part of ``who``; a submission's own file wins over a given one.
+
+    What the assignment brings imports none of the submission's code.
+    """
+    own = (each for each in submission.files.items() if who == "student" or not each[0].endswith(".py"))
+    return {**assignment.given, **dict(own)}
 
 
-def _program(code: Code, flags: Flags, assignment: Assignment) -> ProgramSpec:
+def _program(code: Code, flags: Flags, files: Mapping[str, bytes], assignment: Assignment) -> ProgramSpec:
     limits = assignment.limits
     allowed = ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _avoided(assignment, "program"))
-    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes)
+    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, modules_of(code.text, files.get))
 
 
 def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assignment) -> ResponderSpec | None:

@@ -112,15 +112,28 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: Caller, meter: JobMe
 
 
 def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
-    """The part, and the Python files beside a responder, as bytes: they say themselves how they are written."""
+    """The part, and the files submitted beside it that it can import.
+
+    A responder may import any, and what is in it as bytes: they say themselves how they are written.
+    """
     yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
     left = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
-    beside = {name: data for name, data in plan.own_files.items() if name.lower().endswith(".py")}
-    for name, data in beside.items() if part == "responder" else ():
+    for name, kind, content in _beside(part, plan):
         if left > 0:
-            yield {"name": name, "bytes": data[:_MOST_OF_ONE].decode("latin-1")}
-        left -= len(data)
+            yield {"name": name, kind: content[:_MOST_OF_ONE]}
+        left -= len(content)
+
+
+def _beside(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
+    if part == "responder":
+        for name, data in plan.own_files.items():
+            if name.lower().endswith(".py"):
+                yield name, "bytes", data.decode("latin-1")
+    elif plan.program is not None:
+        for module, text in plan.program.modules.items():
+            if f"{module}.py" in plan.own_files:
+                yield f"{module}.py", "text", text
 
 
 def _entries(assignment: Assignment) -> Iterator[str]:

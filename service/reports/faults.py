@@ -5,6 +5,7 @@ Faults are told, never judged; marks do not depend on anything here.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,7 +13,9 @@ from types import MappingProxyType
 from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
+from sim.errors import UsageError
 from sim.recording import Fault, Verdict
+from submissions.source_text import decode_source
 from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
@@ -59,7 +62,9 @@ def fault_groups(grade: Grade, submission: Submission | None = None, limit: int 
 def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None) -> FaultGroup:
     index, fault = places[0]
     source = _source(fault, submission)
-    where = _WHERE[fault.who] if source is None else f"{_WHERE[fault.who]} ({one_line(source.name, 60)})"
+    where = _WHERE[fault.who]
+    if source is not None and not fault.file:
+        where += f" ({one_line(source.name, 60)})"
     if fault.place:
         where += f", {fault.place}"
     trial = grade.trials[index]
@@ -75,10 +80,20 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
 def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if submission is None:
         return None
+    if fault.file:
+        return _beside(fault.file, submission)
     if submission.notebook is not None and fault.cell is not None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
     return {"program": submission.program, "responder": submission.responder}.get(fault.who)
+
+
+def _beside(file: str, submission: Submission) -> Code | None:
+    """A process has named the file, so it may be any, or none."""
+    data = submission.files.get(file)
+    with contextlib.suppress(UsageError):
+        return None if data is None else Code(file, decode_source(data, file).text)
+    return None
 
 
 def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:

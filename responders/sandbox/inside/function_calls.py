@@ -8,15 +8,15 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from . import student_code
 from .frames import Frame, fits
+from .student_code import StudentFiles
 
 #: In place of a responder's name: the module needs none.
 NO_RESPONDER = ""
 
 
-def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
-    """The answer to one ``call`` spec; ``name`` is that of the student's file, for line numbers."""
+def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Frame:
+    """The answer to one ``call`` spec."""
     function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
@@ -24,7 +24,7 @@ def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
         value = function(*spec["arguments"], **spec["named"])
         text = _as_json(value)
     except BaseException as error:
-        return {"do": "returned", "kind": "error", "error": student_code.describe(error, name)}
+        return {"do": "returned", "kind": "error", "error": files.described(error)}
     if text is None:
         return {"do": "returned", "kind": "other", "type": type(value).__name__[:100]}
     if not fits(text):

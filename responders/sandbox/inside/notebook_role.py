@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from . import cell_source, student_code
+from . import cell_source
 from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
 from .responder_role import ResponderRole
@@ -65,8 +65,7 @@ class NotebookRole(ResponderRole):
         """Tell the worker, with the line that is being run."""
         self._notes += 1
         if self._notes <= _MOST_NOTES:
-            line = student_code.line_of(sys._getframe(), self._name)
-            self._wire.send({"do": "note", "text": clip(text, 300), "line": line})
+            self._wire.send({"do": "note", "text": clip(text, 300), **self._files.place(sys._getframe())})
 
     def expand(self, line: str) -> str:
         """``{expression}`` and ``$name`` in a magic's line, by the names that the cell has there."""
@@ -102,7 +101,7 @@ class NotebookRole(ResponderRole):
         self._fix_msg()
         self._robot_runs = True
         began = self._units
-        line = student_code.line_of(sys._getframe(), self._name)
+        line = self._files.line_in_main(sys._getframe())
         self._wire.send(
             {
                 "do": "magic",
@@ -136,7 +135,7 @@ class NotebookRole(ResponderRole):
         except BaseException as error:
             if isinstance(error, SystemExit) and error.code in (None, 0):
                 return None
-            return student_code.describe(error, self._name)
+            return self._files.described(error)
         return None
 
     def _call_cell_magic(self, magic: cell_source.CellMagic, above: int, shell: Shell) -> None:
