@@ -117,28 +117,6 @@ class Bridge:
             tuple(f"{side} {csv} {tick}" for side, csv, tick in images),
         )
 
-    def robot_state(self) -> dict[str, Any]:
-        """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
-        world, readings = self.world, self.world.readings()
-        state: dict[str, Any] = {
-            "x": world.pose.x,
-            "y": world.pose.y,
-            "angle": math.radians(world.pose.heading),
-            "ultrasonic": readings["ultrasonic"],
-            "gyro": readings["gyro"],
-            "penDown": self._spec.pen_down,
-            "_sensorNoise": self._spec.noise.light,
-            "_wheelNoise": self._spec.noise.motor,
-        }
-        for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
-            rgb = readings[side]
-            state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
-            state[f"{side}_light_raw"] = rgb
-            state[f"{side}_light"] = int(rgb[0])
-            state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
-            state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
-        return state
-
     def _serve(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "read":
@@ -331,3 +309,26 @@ class Bridge:
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{where}, so the world cannot move"
         raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
+
+
+def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
+    """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
+    readings = world.readings()
+    state: dict[str, Any] = {
+        "x": world.pose.x,
+        "y": world.pose.y,
+        "angle": math.radians(world.pose.heading),
+        "ultrasonic": readings["ultrasonic"],
+        "gyro": readings["gyro"],
+        "penDown": spec.pen_down,
+        "_sensorNoise": spec.noise.light,
+        "_wheelNoise": spec.noise.motor,
+    }
+    for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
+        rgb = readings[side]
+        state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
+        state[f"{side}_light_raw"] = rgb
+        state[f"{side}_light"] = int(rgb[0])
+        state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
+        state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
+    return state

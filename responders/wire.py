@@ -183,6 +183,7 @@ NOTEBOOK: Schema = MappingProxyType(
             },
             {},
         ),
+        "state": ({}, {}),
         "executed": ({"missing": _or_none(_text)}, {}),
     }
 )
@@ -201,7 +202,20 @@ CALLS: Schema = MappingProxyType(
 #: Kinds that hold numbers and words of the schema alone, or are a child's last. Nothing else that a child has worded is
 #: kept of them, and honest programs send thousands; every other frame is paid for before it is handed on.
 NOTHING_KEPT = frozenset(
-    {"read", "wait", "motor", "motor_state", "paid_motor", "until", "until_said", "stuck", "busy", "sleep", "cell"}
+    {
+        "read",
+        "wait",
+        "motor",
+        "motor_state",
+        "paid_motor",
+        "until",
+        "until_said",
+        "stuck",
+        "busy",
+        "sleep",
+        "cell",
+        "state",
+    }
 )
 
 #: The field that each kind of answer must have.

@@ -36,6 +36,7 @@ class Program:
     flags: Flags
 
 
+_NO_PROGRAM = Program(0, "", Flags())
 #: From the program, the flags of the magic that starts it and the simulator's set-up to the marked run.
 MarkedRun = Callable[[Program, Flags, Setup], PlannedRun]
 
@@ -67,6 +68,11 @@ class NotebookRuns:
         self.marked_ran = False
         #: Where robots were started, in order.
         self.started: list[Site] = []
+
+    def standing(self) -> PlannedRun:
+        """How the robot stands that does not run."""
+        setup = self.simulator.apply(Flags())
+        return PlannedRun(self._own(_NO_PROGRAM, setup), setup.obstacles)
 
     def call(self, call: MagicCall) -> PlannedRun:
         """What one magic comes to."""

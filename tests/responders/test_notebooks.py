@@ -351,7 +351,7 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunne
         ("pip install torch", "cell 2, line 1: %pip was refused: packages cannot be installed here"),
         ("%pip install torch", "cell 2, line 1: %pip was refused"),
         ("%%seqdiag\na -> b;", "cell 2, line 1: %%seqdiag was skipped: diagrams are not drawn here"),
-        ("%run other.py", "cell 2, line 1: %run was skipped: it is not known here"),
+        ("%run other.py", "cell 2, line 1: FileNotFoundError: there is no file other.py beside the notebook"),
         ("%%nonsense\nhello", "cell 2, line 1: %%nonsense was skipped"),
         ("1 +", "cell 2, line 1: SyntaxError: invalid syntax; the other cells were run all the same"),
         ("\n\nopen('/etc/passwd')", "cell 2, line 3: programs here may only open files in their own folder"),

@@ -8,7 +8,9 @@ from __future__ import annotations
 import builtins
 import linecache
 import os
+import sys
 import traceback
+import warnings
 from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import Any
@@ -32,6 +34,9 @@ class StudentFiles:
         self.imported: set[str] = set()
         here = os.getcwd()
         self._folder = f"{here}/" if here != "/" else None
+        folders = {here, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
+        # The longest first: one may lie in another.
+        self._folders = [f"{folder}/" for folder in sorted(folders, key=len, reverse=True)]
 
     def has(self, name: str) -> bool:
         """Whether code with this file name is the student's."""
@@ -64,7 +69,13 @@ class StudentFiles:
                 if self.has(frame.f_code.co_filename):
                     place = self._place(frame.f_code.co_filename, number)
             words = _words(error)
-        return {"type": type(error).__name__, "text": clip(words), **place}
+        return {"type": type(error).__name__, "text": clip(self.without_folders(words)), **place}
+
+    def without_folders(self, text: str) -> str:
+        """``text`` without what leads to this machine's modules and to the working folder."""
+        for folder in self._folders:
+            text = text.replace(folder, "")
+        return text
 
     def _place(self, name: str, line: int | None) -> Frame:
         return {"line": line, "file": None if name == self.main else self._beside(name)}
@@ -133,11 +144,10 @@ class Output:
 
 def install_output(emit: Callable[[str], None]) -> None:
     """Let one call of ``print`` be one text, without its end, and refuse ``input``."""
-    import sys
-
     stream = Output(emit)
     sys.stdout = sys.stderr = stream
     sys.stdin = None
+    warnings.formatwarning = _without_its_folder
     real_print = builtins.print
 
     def one_text(
@@ -156,3 +166,8 @@ def install_output(emit: Callable[[str], None]) -> None:
     one_text.__name__, no_input.__name__ = "print", "input"
     builtins.print = one_text
     builtins.input = no_input
+
+
+def _without_its_folder(message: Any, category: type[Warning], filename: str, lineno: int, line: Any = None) -> str:
+    """As Python has it, but for the folder of the file, which is another on each machine."""
+    return f"{os.path.basename(filename)}:{lineno}: {category.__name__}: {message}\n"

@@ -50,10 +50,12 @@ def json_document(view: View) -> dict[str, Any]:
                     {"t": message.t, "sender": message.sender, "text": storable(message.text)}
                     for message in trial.recording.messages
                 ],
+                "notes": [storable(note) for note in trial.recording.notes],
             }
             for trial in grade.trials
         ],
         "accuracy": _accuracy(grade.accuracy),
+        "notes": [storable(note) for note in grade.notes],
         **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
 
