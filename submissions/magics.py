@@ -86,6 +86,10 @@ class Flags:
         given = {key: value for key, value in values.items() if value is not None}
         return replace(self, values=self.values | given)
 
+    def without(self, flag: str) -> Flags:
+        """These flags but for one value."""
+        return replace(self, values={key: value for key, value in self.values.items() if key != flag})
+
 
 @dataclass(frozen=True, slots=True)
 class Setup:

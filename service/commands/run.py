@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import stat
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ import typer
 from models import weights_bytes
 from responders.channel import Channel
 from responders.code import Code
+from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
@@ -26,7 +28,7 @@ from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
 from sim.errors import UsageError
-from sim.floors import floor
+from sim.floors import Floor, floor, floor_from_image, names
 from sim.recorded import floor_of
 from sim.recording import Recording
 from sim.robot import robot
@@ -39,14 +41,18 @@ from submissions.submission import Notebook
 
 _PROGRAM = ChildLimits(5.0, 128 << 20)
 _RESPONDER = ChildLimits(10.0, 512 << 20)
+_ALL_CPU = 150.0  # of all processes together, beside what the responder may compute
 _OUTPUT_BYTES = 1_000_000
+_IMAGES = (".png", ".jpg", ".jpeg")
 _FILES_BYTES = 16 << 20
 _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 
 def run(
     program: Annotated[Path, typer.Argument(help="The robot program, a .py file, or a notebook.")],
-    background: Annotated[str | None, typer.Option("-b", "--background", help="Floor.")] = None,
+    background: Annotated[
+        str | None, typer.Option("-b", "--background", help="Floor, or an image of 2362 x 1143 pixels.")
+    ] = None,
     robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot.")] = None,
     obstacles: Annotated[str | None, typer.Option("-o", "--obstacles", help="Obstacle preset.")] = None,
     x: Annotated[str | None, typer.Option("-x", "--xpos", help="Start, mm from the left.")] = None,
@@ -77,6 +83,9 @@ def run(
     move: Annotated[bool, typer.Option("-m", "--move", hidden=True)] = False,
     refresh: Annotated[bool, typer.Option("-F", "--refresh", hidden=True)] = False,
     responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None,
+    responder_cpu: Annotated[
+        float, typer.Option(min=0.1, max=3600, help="Seconds that the responder, or the notebook, may compute.")
+    ] = _RESPONDER.cpu_seconds,
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
@@ -89,8 +98,9 @@ def run(
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
     if image is not None and image.suffix.lower() != ".png":
         raise UsageError(f"--picture {image}: expected a name that ends in .png")
+    own = _own_floor(background)
     values = {
-        "b": background,
+        "b": background if own is None else None,
         "r": robot_setup,
         "o": obstacles,
         "x": x,
@@ -104,29 +114,32 @@ def run(
     wanted = Flags(switches=frozenset(switches)).with_values(**values)
     if unsafe:
         warn_of_no_sandbox()
+    allowed = replace(_RESPONDER, cpu_seconds=responder_cpu)
+    meter = JobMeter(JobLimits(cpu_seconds=_ALL_CPU + responder_cpu))
     notebook = _notebook(program)
     if notebook is not None:
         if responder is not None:
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
-        last = LastRun(wanted, seed, seed if sheet is None else sheet)
-        limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
+        last = LastRun(wanted, seed, seed if sheet is None else sheet, own)
+        limits = RunLimits(allowed, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
             text = "\n".join(cell.source for cell in notebook.cells)
-            executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner)
+            executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner, meter)
         show_notebook(executed, _show)
         if executed.runs:
-            _keep(executed.runs[-1].recording, program.name, seed, trace_file, image)
+            _keep(executed.runs[-1].recording, program.name, seed, trace_file, image, own)
         return
     flags, text = _program(program)
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
+    flags = flags if own is None else flags.without("b")
     chosen = setup(flags)
     spec = TrialSpec(
         program=ProgramSpec(
             Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES, _modules_beside(program, text)
         ),
-        responder=_responder(responder),
+        responder=_responder(responder, allowed),
         collaborative=chosen.collaborative or responder is not None,
-        floor=floor(chosen.background, seed=seed if sheet is None else sheet),
+        floor=own or floor(chosen.background, seed=seed if sheet is None else sheet),
         robot=robot(chosen.robot),
         pose=chosen.pose,
         noise=Noise(chosen.light_noise, chosen.motor_noise),
@@ -139,16 +152,26 @@ def run(
     for note in chosen.notes:
         typer.echo(f"note: {note}", err=True)
     with TrialRunner(NONE if unsafe else FULL) as runner:
-        recording = runner.run(spec, chosen.obstacles)
+        recording = runner.run(spec, chosen.obstacles, meter)
     _show(recording)
-    _keep(recording, program.name, seed, trace_file, image)
+    _keep(recording, program.name, seed, trace_file, image, own)
 
 
-def _keep(recording: Recording, name: str, seed: int, trace_file: Path | None, image: Path | None) -> None:
+def _own_floor(background: str | None) -> Floor | None:
+    """The floor that an image file is; None where a floor is named."""
+    path = Path(background or "")
+    if background in names() or path.suffix.lower() not in _IMAGES:
+        return None
+    return floor_from_image(path.name, _read(path))
+
+
+def _keep(
+    recording: Recording, name: str, seed: int, trace_file: Path | None, image: Path | None, own: Floor | None
+) -> None:
     if trace_file is not None:
         _write(trace_file, json.dumps(trace(recording)).encode())
     if image is not None:
-        _write(image, _drawn(recording, name, seed))
+        _write(image, _drawn(recording, name, seed, own))
 
 
 def _notebook(path: Path) -> Notebook | None:
@@ -177,7 +200,7 @@ def _source(path: Path) -> str:
 def _read(path: Path) -> bytes:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise UsageError(f"{path} is not a file; expected a Python file")
+            raise UsageError(f"{path} is not a file; expected one that can be read")
         return path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from error
@@ -191,7 +214,7 @@ def _write(path: Path, data: bytes) -> None:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _responder(given: str | None) -> ResponderSpec | None:
+def _responder(given: str | None, limits: ChildLimits) -> ResponderSpec | None:
     """FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
     if given is None:
         return None
@@ -200,7 +223,7 @@ def _responder(given: str | None) -> ResponderSpec | None:
         file, _, name = given.rpartition(":")
         path = Path(file)
     text = _source(path)
-    return ResponderSpec(Code(path.name, text), _files_beside(path, text), _RESPONDER, _OUTPUT_BYTES, name)
+    return ResponderSpec(Code(path.name, text), _files_beside(path, text), limits, _OUTPUT_BYTES, name)
 
 
 def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
@@ -252,7 +275,7 @@ def _show(recording: Recording) -> None:
             typer.echo(f"            {fault.hint}", err=True)
 
 
-def _drawn(recording: Recording, name: str, seed: int) -> bytes:
+def _drawn(recording: Recording, name: str, seed: int, own: Floor | None) -> bytes:
     trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
-    driven_on = floor_of(recording)
+    driven_on = own if own is not None and own.name == recording.background else floor_of(recording)
     return png(draw_path(trial, name, driven_on.pixels if driven_on else None))

@@ -10,12 +10,13 @@ import typer
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from service.reports.readable import readable
-from sim.floors import floor
+from sim.floors import Floor, floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
@@ -41,10 +42,16 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
+    own_floor: Floor | None = None  # an image in the place of a floor
 
 
 def run_notebook(
-    notebook: Notebook, files: Mapping[str, bytes], limits: RunLimits, last: LastRun, runner: TrialRunner
+    notebook: Notebook,
+    files: Mapping[str, bytes],
+    limits: RunLimits,
+    last: LastRun,
+    runner: TrialRunner,
+    meter: JobMeter,
 ) -> ExecutedNotebook:
     """Execute the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
 
@@ -57,7 +64,7 @@ def run_notebook(
             program=program_spec(program, limits.program, limits.output_bytes, files),
             responder=None,
             collaborative=setup.collaborative or wanted.collaborative,
-            floor=floor(wanted.background, seed=last.sheet),
+            floor=last.own_floor or floor(wanted.background, seed=last.sheet),
             robot=robot(wanted.robot),
             pose=wanted.pose,
             noise=Noise(wanted.light_noise, wanted.motor_noise),
@@ -74,7 +81,7 @@ def run_notebook(
     planner = NotebookRuns(found[-1] if found else None, marked_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)
-    return runner.execute_notebook(spec, planner)
+    return runner.execute_notebook(spec, planner, meter)
 
 
 def show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
