@@ -20,7 +20,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, SENSORS, TICK, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, SENSORS, Fault, Image, Line, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
@@ -58,7 +58,7 @@ class Bridge:
         self._meter = meter
         self.now = 0
         self.chain = Chain()
-        self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
+        self.world = world_of(spec, arena, camera, self.chain)
         self.conversation = Conversation(spec.channel, spec.seed, self.chain)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
@@ -94,6 +94,7 @@ class Bridge:
                 "text": spec.program.code.text,
                 "preamble": spec.program.preamble,
                 "modules": dict(spec.program.modules),
+                "tick": spec.tick,
                 "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
             }
@@ -153,12 +154,13 @@ class Bridge:
         self._free_acts = 0
         end = self.now + units
         last = min(end, self._limit)
-        due = (self.world.clock + 1) * TICK
+        tick = self._spec.tick
+        due = (self.world.clock + 1) * tick
         while due <= last:
             self.now = due
             self._arrived += self.conversation.deliver(due)
             self.world.tick()
-            due += TICK
+            due += tick
             if self.world.clock % 3000 == 0:
                 self._meter.heartbeat()
         if end > self._limit:
@@ -174,7 +176,7 @@ class Bridge:
     def _read(self, what: str, times: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
         end = self.now + times * _READ
-        known = self._told_in == end // TICK
+        known = self._told_in == end // self._spec.tick
         if known:
             self._free_acts = 0
             self.now = end
@@ -309,6 +311,11 @@ class Bridge:
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{where}, so the world cannot move"
         raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
+
+
+def world_of(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:
+    """The world that a trial begins in."""
+    return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
 
 
 def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:

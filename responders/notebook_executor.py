@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
-from responders.bridge import Bridge, robot_state
+from responders.bridge import Bridge, robot_state, world_of
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
@@ -20,7 +20,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.motion import Rectangle
 from sim.recording import SECOND, Fault, Recording, Verdict
-from sim.world import Chain, World
+from sim.world import Chain
 
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
@@ -138,7 +138,7 @@ def execute_notebook(
 def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str) -> Recording:
     """The recording of a run that did not come about: the robot stands where it would have started."""
     chain = Chain()
-    world = _world(spec, arena, camera, chain)
+    world = world_of(spec, arena, camera, chain)
     return Recording(
         background=spec.floor.name,
         start=spec.pose,
@@ -154,10 +154,6 @@ def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, 
         robot=spec.robot.name,
         sandbox=sandbox,
     )
-
-
-def _world(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:
-    return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain)
 
 
 class _Execution:
@@ -202,7 +198,7 @@ class _Execution:
         standing = self._planner.standing()
         assert standing.spec is not None
         ground = self._ground(standing.spec, standing.obstacles)
-        return robot_state(_world(standing.spec, *ground, Chain()), standing.spec)
+        return robot_state(world_of(standing.spec, *ground, Chain()), standing.spec)
 
     def finish(self) -> None:
         """Run what the planner has for the end."""

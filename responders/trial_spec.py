@@ -15,7 +15,7 @@ from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import Pose
+from sim.recording import TICK, Pose
 from sim.robot import Robot
 from sim.world import Noise
 
@@ -61,3 +61,4 @@ class TrialSpec:
     child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
+    tick: int = TICK  # how long one lasts, units of simulated time

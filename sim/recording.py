@@ -22,6 +22,8 @@ Integers = NDArray[np.int64]
 #: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
 SECOND = 3_000_000
 TICK = SECOND // 30
+#: A tick in the original's browser, whose timer leaves out what is less than a millisecond.
+BROWSER_TICK = SECOND // 1000 * 33
 MILLISECOND = SECOND // 1000
 #: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
 SENSOR_SIDE = 20
@@ -61,7 +63,7 @@ _WHEELS = Panel("Wheel encoders, degrees", height=0.75, rank=1)
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows.
+    """One row a tick; row i is the state after tick i+1. All arrays have n rows.
 
     A column that is not given is not known. This is the table of columns: what the chain packs, what a program can
     read, what the store keeps, what traces and plots show is taken from here.
@@ -105,6 +107,7 @@ class Ticks:
     )
     left_pixels: int = 305  # how many pixels the sums are over
     right_pixels: int = 305
+    length: int = TICK  # of a tick, units of simulated time
 
     def __post_init__(self) -> None:
         for each in COLUMNS:
@@ -121,7 +124,12 @@ class Ticks:
     @property
     def t(self) -> Floats:
         """Seconds, shape (n,)."""
-        return np.arange(1, len(self.x) + 1) / 30.0
+        return np.arange(1, len(self.x) + 1) * self.length / SECOND
+
+    @property
+    def per_second(self) -> float:
+        """How many there are in a second."""
+        return SECOND / self.length
 
     @property
     def left_rgb(self) -> Floats:

@@ -77,7 +77,7 @@ def run_notebook(
         return PlannedRun(spec, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
 
     found = sites(notebook)
-    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, files, last.sheet)
+    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, files, sheet=last.sheet)
     planner = NotebookRuns(found[-1] if found else None, marked_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)

@@ -16,7 +16,7 @@ from responders.trial_spec import ProgramSpec, TrialSpec
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor
-from sim.recording import Recording
+from sim.recording import TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
 from submissions.helper_modules import modules_of
@@ -50,6 +50,7 @@ class UnmarkedRuns:
     seconds: float
     seed: int
     files: Mapping[str, bytes]  # of which programs import modules
+    tick: int = TICK
     sheet: int = 0
 
 
@@ -151,6 +152,7 @@ class NotebookRuns:
             seed=seed,
             child_seed=seed,
             pen_down=setup.pen_down,
+            tick=own.tick,
         )
 
 

@@ -88,7 +88,8 @@ class NotebookTrial:
         sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
         # Their noise would tell the trial again, were it of the world's seed.
         limits, files = spec.program.limits, self.notebook.files
-        unmarked = UnmarkedRuns(limits, spec.program.output_bytes, spec.seconds, spec.child_seed, files, sheet)
+        output = spec.program.output_bytes
+        unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
         notebook = replace(self.notebook, seed=spec.child_seed)
 
         def execute() -> tuple[ExecutedNotebook, list[Site]]:

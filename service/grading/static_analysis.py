@@ -21,6 +21,7 @@ from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
 from service.grading.run_plan import Part, RunPlan
 from sim.chance import Stream
+from sim.recorded import seconds_at
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
@@ -88,7 +89,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
             [each.t, each.name, each.value, each.simtime] for each in recording.datalog if math.isfinite(each.value)
         ],
         "images": [{"t": each.t, "pose": _pose(each.pose), "truth": each.truth} for each in recording.images],
-        "image_log": [[side, tick / 30] for side, _, tick in recording.image_log],
+        "image_log": [[side, seconds_at(recording, tick)] for side, _, tick in recording.image_log],
         "touches": [[each.t, each.what] for each in recording.touches],
     }
 

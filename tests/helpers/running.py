@@ -12,7 +12,7 @@ from responders.trial_spec import Preamble, ProgramSpec, ResponderSpec, TrialSpe
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
-from sim.recording import Pose, Recording
+from sim.recording import TICK, Pose, Recording
 from sim.robot import robot
 from sim.world import Noise
 
@@ -37,6 +37,7 @@ def run_program(
     seed: int = 1,
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
+    tick: int = TICK,
     meter: JobMeter | None = None,
 ) -> Recording:
     """One trial; the start is the background's own unless given."""
@@ -56,5 +57,6 @@ def run_program(
         seed=seed,
         child_seed=seed,
         physics=physics,
+        tick=tick,
     )
     return runner.run(spec, obstacles, meter)

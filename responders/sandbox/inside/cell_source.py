@@ -18,7 +18,7 @@ WRAPPERS = frozenset(
 #: Line magics that do so with the rest of their line, after their options.
 LINE_WRAPPERS = frozenset(("time", "timeit", "prun", "memit"))
 
-_OPTIONS = re.compile(r"(?:-[nrp][ \t]*\d+[ \t]+|-\w+[ \t]+)*")
+_OPTIONS = re.compile(r"(?:-[nrpl][ \t]*\d+[ \t]+|-s[ \t]+\w+[ \t]+|-\w+[ \t]+)*")
 _CELL_MAGIC = re.compile(r"%%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
 _LINE_MAGIC = re.compile(r"%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
 _ASSIGNED = re.compile(r"(?P<target>[A-Za-z_][\w.,\[\]'\" ]*=[ \t]*)(?P<rest>[%!].*)\Z")

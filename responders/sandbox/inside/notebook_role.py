@@ -100,7 +100,7 @@ class NotebookRole(ResponderRole):
         outer, self._captured = self._captured, []
         try:
             work()
-            return "\n".join(self._captured)
+            return "".join(f"{text}\n" for text in self._captured)
         finally:
             self._captured = outer
 
@@ -180,7 +180,7 @@ class NotebookRole(ResponderRole):
         if value is not None and not text.rstrip().endswith(";"):
             self._namespace["_"] = value
             # Where in memory a thing lies is nobody's business, and another place each time.
-            print(self._files.without_folders(_ADDRESS.sub("", clip(repr(value), _SHOWN))))
+            print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
 
     def _evaluated(self, text: str, above: int) -> Any:
         """Run it, ``above`` being the lines before it; the value of its last line, if that is an expression."""
@@ -223,7 +223,7 @@ class NotebookRole(ResponderRole):
         if self._captured is None:
             super()._emit(text)
         else:
-            self._captured.append(text)
+            self._captured.append(self._files.without_folders(text))
 
 
 def _leave(code: object = None) -> None:

@@ -19,6 +19,7 @@ from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
 
 _NOTED = ("parser", "agent", "logger")
+_FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
 class ResponderRole:
@@ -132,7 +133,8 @@ class ResponderRole:
         """Wrap what parser, agent and logger are bound to now, and the predict of every bound network."""
         for name, value in list(self._namespace.items()):
             if name in _NOTED:
-                if callable(value) and not hasattr(value, "_robomark_noted"):
+                # An object that is called may keep something that a function in its place would not.
+                if isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
                     self._namespace[name] = self._noted(name, value)
                 continue
             predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
@@ -178,7 +180,7 @@ class ResponderRole:
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
 
     def _emit(self, text: str) -> None:
-        self._wire.send({"do": "print", "text": fitted(text)})
+        self._wire.send({"do": "print", "text": fitted(self._files.without_folders(text))})
 
     def _refused(self, what: str) -> None:
         self._wire.send({"do": "refused", "what": what, **self._files.place(sys._getframe())})

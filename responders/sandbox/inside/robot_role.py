@@ -52,7 +52,7 @@ def run(wire: Wire, grants: Grants) -> None:
         wire.send({"do": "refused", "what": what, **files.place(sys._getframe())})
 
     signal.signal(signal.SIGXCPU, busy)
-    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"])
+    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"], spec["tick"])
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(spec["seed"])

@@ -73,7 +73,7 @@ class CapturedOutput:
     def show(self) -> None:
         """Print it after all."""
         if self.stdout:
-            print(self.stdout)
+            print(self.stdout.removesuffix("\n"))
 
     __call__ = show
 

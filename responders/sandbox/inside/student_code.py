@@ -73,9 +73,11 @@ class StudentFiles:
 
     def without_folders(self, text: str) -> str:
         """``text`` without what leads to this machine's modules and to the working folder."""
+        if "/" not in text:
+            return text
         for folder in self._folders:
             text = text.replace(folder, "")
-        return text
+        return text if self._folder is None else text.replace(self._folder[:-1], ".")
 
     def _place(self, name: str, line: int | None) -> Frame:
         return {"line": line, "file": None if name == self.main else self._beside(name)}

@@ -19,7 +19,7 @@ from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.floors import Floor
-from sim.recorded import TICKS_PER_SECOND, floor_of, pose_after, pose_at, seconds_at, ticks_until
+from sim.recorded import floor_of, pose_after, pose_at, seconds_at, ticks_until
 from sim.recording import Datum, Image, Recording
 from sim.sensors import Footprint
 from submissions.criteria.logged import Datalog, ImageLog, Instrument
@@ -100,7 +100,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     wrong = next((words for holds, words in checks if not holds), None)
     if wrong is None:
         return passed(f"The program logged {len(log)} images as expected.", measures=measures)
-    last = seconds_at(log[-1][2]) if log else None
+    last = seconds_at(recording, log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
     held = Fraction(sum(holds for holds, _ in checks), len(checks))
     return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
@@ -247,14 +247,14 @@ def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: R
         return []
     found: list[Datum] = []
     for datum in samples:
-        if _was_read(datum, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
+        if _was_read(datum, recording, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
             found.append(datum)
     return found
 
 
-def _was_read(datum: Datum, readings: NDArray[np.float64]) -> bool:
-    last = min(max(ticks_until(datum.t), 1), len(readings))
-    first = min(max(int((datum.t - _AGE) * TICKS_PER_SECOND), 1), last)
+def _was_read(datum: Datum, recording: Recording, readings: NDArray[np.float64]) -> bool:
+    last = min(max(ticks_until(recording, datum.t), 1), len(readings))
+    first = min(max(int((datum.t - _AGE) * recording.ticks.per_second), 1), last)
     return bool((np.abs(readings[first - 1 : last] - datum.value) <= _ROUNDED).any())
 
 
