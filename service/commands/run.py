@@ -19,7 +19,7 @@ from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.grade import warn_of_no_sandbox
-from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
+from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
@@ -27,6 +27,7 @@ from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
+from service.reports.written import prepare_folder
 from sim.errors import UsageError
 from sim.floors import Floor, floor, floor_from_image, names
 from sim.recorded import floor_of
@@ -91,6 +92,9 @@ def run(
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
+    diagrams: Annotated[
+        Path | None, typer.Option(help="Draw the diagrams of a notebook's cells into this folder, as PNG.")
+    ] = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
     ] = False,
@@ -98,6 +102,8 @@ def run(
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
     if image is not None and image.suffix.lower() != ".png":
         raise UsageError(f"--picture {image}: expected a name that ends in .png")
+    if diagrams is not None:
+        prepare_folder(diagrams)
     own = _own_floor(background)
     values = {
         "b": background if own is None else None,
@@ -126,9 +132,12 @@ def run(
             text = "\n".join(cell.source for cell in notebook.cells)
             executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner, meter)
         show_notebook(executed, _show)
+        show_diagrams(notebook, diagrams)
         if executed.runs:
             _keep(executed.runs[-1].recording, program.name, seed, trace_file, image, own)
         return
+    if diagrams is not None:
+        raise UsageError(f"{program.name} is not a notebook and draws no diagrams; leave --diagrams out")
     flags, text = _program(program)
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
     flags = flags if own is None else flags.without("b")
