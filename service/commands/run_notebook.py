@@ -57,7 +57,7 @@ def run_notebook(
     limits: RunLimits,
     last: LastRun,
     runner: TrialRunner,
-    meter: JobMeter,
+    meter: JobMeter | None = None,
 ) -> ExecutedNotebook:
     """Execute the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
 

@@ -15,7 +15,6 @@ import pytest
 from models import weights_bytes
 from notebook_builder import NOTEBOOKS
 from responders.notebook_executor import ExecutedNotebook
-from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook
 from service.grading.trial_runner import TrialRunner
@@ -35,7 +34,7 @@ def executed(folder: Path, seconds: float, runner: TrialRunner) -> ExecutedNoteb
     files = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".py"}
     limits = RunLimits(ChildLimits(10.0, 512 << 20), ChildLimits(5.0, 128 << 20), 1_000_000, seconds)
     last = LastRun(Flags(), 0, 0)
-    return run_notebook(read.notebook, {_NETWORK: weights_bytes("shapes"), **files}, limits, last, runner, JobMeter())
+    return run_notebook(read.notebook, {_NETWORK: weights_bytes("shapes"), **files}, limits, last, runner)
 
 
 def in_order(wanted: list[str], text: str) -> list[str]:
