@@ -1,4 +1,4 @@
-"""What a trial depends on, as plain values: the two parts of a submission, the robot on its floor, channel and seeds.
+"""What a trial depends on, as plain values: the parts of a submission, the robot on its floor, channel and seeds.
 
 Nothing here runs; ``trial.py`` makes a recording of it.
 """
@@ -45,6 +45,13 @@ class ResponderSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class AgentSpec(ResponderSpec):
+    """What the responder and the other agents ask: an agent of the student's, or one that is ``given``."""
+
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrialSpec:
     """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
 
@@ -62,3 +69,4 @@ class TrialSpec:
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
     tick: int = TICK  # how long one lasts, units of simulated time
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name

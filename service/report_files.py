@@ -14,7 +14,7 @@ from service.plotting import draw
 from service.reports.html import BatchRow, batch_index, report
 from service.reports.view import staff_view, student_view
 from service.reports.written import file_stems, write_page
-from service.store import intake, plots, policies, results
+from service.store import intake, plots, policies, rankings, results
 from service.store.batches import JobLine
 from service.store.engine import Store
 from service.store.states import JobState, PlotState
@@ -82,7 +82,9 @@ def write_batch(
     ]
     rows += [BatchRow(name, note=f"not taken in: {sentence}") for name, sentence in problems]
     sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
-    return write_page(folder, _INDEX, batch_index(rows, title, sandbox))
+    with store.reading() as session:
+        ranks = rankings.rank_tables(session, lines)
+    return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
 
 
 def _remark(line: JobLine) -> str:

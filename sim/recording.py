@@ -156,12 +156,18 @@ class Line:
     text: str
 
 
+#: Why the channel lost a text; empty where it did not.
+LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One text that crossed the bridge.
 
     ``t`` is when it was sent; ``delivered`` when it arrived, None if it never did. ``reply_to`` is the index, in
     the recording's messages, of the text that it answers. ``note`` says what befell it: lost, duplicated, malformed.
+    ``distance`` (mm) and ``angle`` (degrees, to the left above 0) are from the robot to the other end of an infrared
+    link when the text set out or, of an answer, when it came or was lost.
     """
 
     t: float
@@ -170,6 +176,42 @@ class Message:
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
+    lost: LossReason = ""  # recordings of earlier releases say so in their note alone
+    distance: float | None = None
+    angle: float | None = None
+    arrived_as: str | None = None  # where the channel corrupted it
+
+    @property
+    def received(self) -> str:
+        """The text as it arrived, if it did."""
+        return self.text if self.arrived_as is None else self.arrived_as
+
+
+@dataclass(frozen=True, slots=True)
+class AgentMessage:
+    """One text between the responder and an agent, or between two agents, while the robot's message was answered.
+
+    ``message`` is the index of that one, -1 while the responder was loaded. ``reply_to`` is the index, in the
+    recording's agent messages, of what it answers; ``note`` says of a question why it got no answer.
+    """
+
+    t: float
+    sender: str
+    receiver: str
+    text: str  # what was sent, if it was a text; else as JSON has it
+    message: int
+    reply_to: int | None = None
+    note: str = ""
+    is_text: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class AgentOutput:
+    """What an agent printed, and what it wrote to its logger.txt."""
+
+    agent: str
+    printed: str
+    log: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +242,7 @@ class Call:
     callee: str  # parser, agent, logger, or the name bound to a network
     argument: str  # shortened repr
     result: str  # shortened repr
+    before: int = 0  # how many agent messages there were when it ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,14 +279,16 @@ class Fault:
     hint: str = ""
     cell: int | None = None
     staff: str = ""  # what our own code stumbled over, for staff to look at
+    agent: str = ""  # which agent of the responder's it was, if not the responder itself
     file: str = ""  # the Python file beside the program, responder or notebook that the line is in
 
     @property
     def place(self) -> str:
-        """``line 3``, ``cell 7, line 3`` or ``line 3 of helper.py``; empty where nothing is known."""
-        cell = [f"cell {self.cell}"] if self.cell is not None else []
+        """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty where none is known."""
+        within = [self.agent] if self.agent else []
+        within += [f"cell {self.cell}"] if self.cell is not None else []
         beside = f" of {self.file}" if self.file else ""
-        return ", ".join(cell + ([f"line {self.line}{beside}"] if self.line is not None else []))
+        return ", ".join(within + ([f"line {self.line}{beside}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,6 +312,7 @@ class Recording:
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    beacon: tuple[float, float] | None = None  # the other end of an infrared link
     label_patches: bool = True  # whether the floor showed its grey label patches
     sheet: int = 0  # the seed of the digits on it, for a digit sheet
     robot: str = "Default_Robot"
@@ -275,3 +321,5 @@ class Recording:
     responder_log: str = ""  # what the responder wrote to logger.txt
     sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())
+    agent_messages: tuple[AgentMessage, ...] = ()
+    agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order

@@ -48,6 +48,7 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
+    channel: Channel
     own_floor: Floor | None = None  # an image in the place of a floor
 
 
@@ -74,7 +75,7 @@ def run_notebook(
             robot=robot(wanted.robot),
             pose=wanted.pose,
             noise=Noise(wanted.light_noise, wanted.motor_noise),
-            channel=Channel(),
+            channel=last.channel,
             seconds=limits.seconds,
             seed=last.seed,
             child_seed=last.seed,

@@ -14,13 +14,14 @@ from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
+from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
@@ -79,6 +80,7 @@ class RunPlan:
     notes: tuple[str, ...] = ()
     submission: str = ""  # content hash
     child_seed: int = 0  # of the chance that is the submission's own, and no trial's
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
@@ -90,6 +92,9 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     if notebook is not None and assignment.training is not None:
         function = assignment.training.function
         raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
+    if notebook is not None and assignment.parts.agents:
+        files = " and ".join(f"{name}.py" for name in assignment.parts.agents)
+        raise UsageError(f"{notebook.name}: is a notebook, expected robot.py and responder.py beside {files}")
     if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
         plan = _of_notebook(submission, notebook, assignment)
     else:
@@ -109,7 +114,8 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     files = _files(submission, assignment, asked.program)
     program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
-    return _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    return replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
 
 
 def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
@@ -234,8 +240,22 @@ def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[
 
     What the assignment brings imports none of the submission's code.
     """
-    own = (each for each in submission.files.items() if who == "student" or not each[0].endswith(".py"))
+    submitted = without_agents(submission.files, assignment.parts.agents)
+    own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
     return {**assignment.given, **dict(own)}
+
+
+def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
+    """Each has a folder like the responder's and may use as much; in a given one's lie given files alone."""
+    agents = {}
+    for name, who in assignment.parts.agents.items():
+        given = who != "student"
+        code = Code(who, assignment.given_parts[who]) if given else code_of(name, submission.files)
+        spec = _responder(code, assignment.given if given else _files(submission, assignment, who), assignment)
+        if spec is None:
+            raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
+        agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
+    return agents
 
 
 def _program(code: Code, flags: Flags, files: Mapping[str, bytes], assignment: Assignment) -> ProgramSpec:

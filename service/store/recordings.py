@@ -96,6 +96,9 @@ def from_bytes(data: bytes) -> Recording:
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pixels)
         words = {_FORMERLY.get(name, name): value for name, value in words.items()}
+        for message in words.get("messages", ()):
+            if message.get("note") == "lost":  # earlier releases knew no other reason
+                message.setdefault("lost", "chance")
         return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
@@ -157,6 +160,7 @@ def _without_floods(recording: Recording) -> Recording:
             printed=recording.printed[:_TEXT_KEPT],
             datalog=recording.datalog[:_TEXT_KEPT],
             messages=recording.messages[:_TEXT_KEPT],
+            agent_messages=recording.agent_messages[:_TEXT_KEPT],
         ),
         f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
     )
@@ -164,11 +168,16 @@ def _without_floods(recording: Recording) -> Recording:
 
 def _without_words(recording: Recording) -> Recording:
     bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
+    outputs = (
+        replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
+    )
     cut = replace(
         bare,
         responder_output=recording.responder_output[:_TEXT_KEPT],
         responder_log=recording.responder_log[:_TEXT_KEPT],
         faults=recording.faults[:10],
+        agent_messages=(),
+        agent_outputs=tuple(outputs),
     )
     return _noted(cut, "what was printed, said and sent is left out")
 

@@ -6,6 +6,7 @@ What is called and what the value is worth is the worker's business, on the othe
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 from .frames import Frame, fits
@@ -20,9 +21,14 @@ def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Fra
     function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
+    return value_frame(lambda: function(*spec["arguments"], **spec["named"]), files)
+
+
+def value_frame(call: Callable[[], Any], files: StudentFiles) -> Frame:
+    """What a call of the student's gives, or what went wrong instead."""
     try:
-        value = function(*spec["arguments"], **spec["named"])
-        text = _as_json(value)
+        value = call()
+        text = as_json(value)
     except BaseException as error:
         return {"do": "returned", "kind": "error", "error": files.described(error)}
     if text is None:
@@ -32,7 +38,7 @@ def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Fra
     return {"do": "returned", "kind": "value", "text": text}
 
 
-def _as_json(value: Any) -> str | None:
+def as_json(value: Any) -> str | None:
     """None for what JSON does not have; arrays are lists."""
     try:
         return json.dumps(value, allow_nan=False, default=_plain)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, function_calls, model_files, own_modules, refusals, student_code
+from . import determinism, function_calls, model_files, other_agents, own_modules, refusals, student_code
 from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
 
@@ -32,6 +32,7 @@ class ResponderRole:
         self._name: str = spec["name"]
         self._files = student_code.StudentFiles(self._name)
         self._function: str | None = spec["function"]
+        self._own_name = "responder"
         self._units = 0
         self._namespace: dict[str, Any] = {}
         self._defines_msg = False
@@ -59,6 +60,7 @@ class ResponderRole:
         sys.modules["__main__"] = module
         self._namespace = module.__dict__
         self._namespace.update(roboSim=roboSim, eds=eds)
+        self._namespace.update(other_agents.functions(self._spec.get("agents", ()), self._wire, self._waited))
 
     def _serve(self) -> None:
         while True:
@@ -134,7 +136,7 @@ class ResponderRole:
         for name, value in list(self._namespace.items()):
             if name in _NOTED:
                 # An object that is called may keep something that a function in its place would not.
-                if isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
+                if name != self._own_name and isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
                     self._namespace[name] = self._noted(name, value)
                 continue
             predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
@@ -178,6 +180,9 @@ class ResponderRole:
     def _sleep(self, units: int) -> None:
         self._units += units
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
+
+    def _waited(self, until: int) -> None:
+        self._units = max(self._units, until)
 
     def _emit(self, text: str) -> None:
         self._wire.send({"do": "print", "text": fitted(self._files.without_folders(text))})

@@ -13,8 +13,9 @@ from typing import Any
 from service.grading.grade import Accuracy
 from service.reports.formats.registry import document, table
 from service.reports.readable import json_number
-from service.reports.trace import storable
+from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
+from sim.recording import Message
 
 SCHEMA = 1
 
@@ -46,10 +47,8 @@ def json_document(view: View) -> dict[str, Any]:
                 "verdict": trial.verdict.value,
                 "sha256": trial.recording.sha256,
                 "spoken": [storable(line.text) for line in trial.recording.spoken],
-                "messages": [
-                    {"t": message.t, "sender": message.sender, "text": storable(message.text)}
-                    for message in trial.recording.messages
-                ],
+                "messages": [_message(message) for message in trial.recording.messages],
+                **agent_messages(trial.recording),
                 "notes": [storable(note) for note in trial.recording.notes],
             }
             for trial in grade.trials
@@ -70,6 +69,18 @@ def json_text(view: View) -> str:
 def json_list(views: Sequence[View]) -> str:
     """The documents of a batch, each with its student."""
     return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+
+
+def _message(message: Message) -> dict[str, Any]:
+    """A text with its time; where the channel lost or corrupted it, what it did and where the robot was."""
+    words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": storable(message.text)}
+    if message.lost:
+        words["lost"] = message.lost
+        if message.distance is not None:
+            words |= {"distance": message.distance, "angle": message.angle}
+    if message.arrived_as is not None:
+        words["arrived_as"] = storable(message.arrived_as)
+    return words
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

@@ -5,11 +5,13 @@ It decides what is told and what is left out; ``conversation.py`` draws it.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.reports.crossing import befell, out_of_reach_by
 from service.reports.readable import message_words, one_line
 from sim.recording import Call, Message, Recording
 
@@ -26,7 +28,7 @@ Kind = Literal["message", "call", "return", "lost", "silence"]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One arrow: ``t`` (seconds) is when it started, None inside the responder, where no time passes."""
+    """One arrow: ``t`` (seconds) is when it started, None inside a process, where no time passes."""
 
     kind: Kind
     source: str
@@ -67,7 +69,8 @@ def conversation(
 ) -> SequenceDiagram:
     """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
 
-    Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
+    Kept are the first exchanges and, of the later ones, those in which what was sent again got through, or something
+    was lost or wrong.
     """
     exchanges = _exchanges(recording.messages)
     kept = _chosen(recording, exchanges, most_exchanges, most_steps)
@@ -85,13 +88,14 @@ def conversation(
     if skipped:
         steps.append(Gap(skipped))
     named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
-    parties = tuple(party for party in PARTIES if party in named or party in ("robot", "responder"))
+    lanes = (*PARTIES, *(each.agent for each in recording.agent_outputs if each.agent not in _KNOWN))
+    parties = tuple(party for party in lanes if party in named or party in ("robot", "responder"))
     return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
 
 
 def troubled(message: Message) -> bool:
     """Whether a message was lost, never arrived, or could not be read."""
-    return message.delivered is None or bool(message.note)
+    return message.delivered is None or bool(befell(message))
 
 
 def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
@@ -111,7 +115,8 @@ def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
 def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
     wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(recording, exchange)]
     half = most_exchanges - most_exchanges // 2
-    order = dict.fromkeys([*range(min(half, len(exchanges))), *wrong, *range(len(exchanges))])
+    first = range(min(half, len(exchanges)))
+    order = dict.fromkeys([*first, *_got_through(recording, exchanges, wrong), *wrong, *range(len(exchanges))])
     kept: set[int] = set()
     steps = 0
     for number in list(order)[:most_exchanges]:
@@ -120,6 +125,19 @@ def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges
             break
         kept.add(number)
     return kept
+
+
+def _got_through(recording: Recording, exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
+    """The exchanges in which a text that was sent before, and went astray, got through."""
+    astray: set[str] = set()
+    failed = set(wrong)
+    for number, exchange in enumerate(exchanges):
+        text = recording.messages[exchange.sent].text if exchange.sent is not None else ""
+        if number in failed:
+            astray.add(text)
+        elif text in astray:
+            astray.discard(text)
+            yield number
 
 
 def _went_wrong(recording: Recording, exchange: _Exchange) -> bool:
@@ -137,7 +155,7 @@ def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, li
         message = recording.messages[exchange.sent]
         steps: list[Step | Gap] = [_crossing(message)]
         if message.delivered is not None:
-            made = list(_calls(call for call in recording.calls if call.message == exchange.sent))
+            made = list(_inside(recording, exchange.sent))
             steps += made[:MOST_CALL_STEPS]
             if len(made) > MOST_CALL_STEPS:
                 steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
@@ -151,11 +169,33 @@ def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, li
 
 def _crossing(message: Message) -> Step:
     source, target = ("robot", "responder") if message.sender == "robot" else ("responder", "robot")
-    label, note = message_words(message.text, 90), one_line(message.note, 30)
+    label, note = message_words(message.text, 90), befell(message)
+    reach = out_of_reach_by(message)
+    label = f"{label} ({reach})" if reach else label
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
     shown_at = message.t if message.sender == "robot" else message.delivered
     return Step("message", source, target, label, shown_at, note)
+
+
+def _inside(recording: Recording, message: int) -> Iterator[Step]:
+    """What was called, and what agents were asked, until the robot's message was answered."""
+    calls = sorted((call for call in recording.calls if call.message == message), key=_before)
+    told, shown_at = 0, recording.messages[message].t
+    for place, each in enumerate(recording.agent_messages):
+        if each.message == message:
+            until = bisect_right(calls, place, told, key=_before)
+            yield from _calls(calls[told:until])
+            told = until
+            kind: Kind = "call" if each.reply_to is None else "return"
+            label, t = message_words(each.text, 60), None if each.t == shown_at else each.t
+            yield Step(kind, each.sender, each.receiver, label, t, one_line(each.note, 30))
+            shown_at = each.t
+    yield from _calls(calls[told:])
+
+
+def _before(call: Call) -> int:
+    return call.before
 
 
 def _calls(calls: Iterable[Call]) -> Iterator[Step]:
