@@ -48,7 +48,7 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
-    channel: Channel
+    channel: Channel = Channel()
     own_floor: Floor | None = None  # an image in the place of a floor
 
 
