@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import typer
@@ -48,7 +48,7 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
-    channel: Channel = Channel()
+    channel: Channel = field(default_factory=Channel)
     own_floor: Floor | None = None  # an image in the place of a floor
 
 
