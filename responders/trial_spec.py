@@ -16,7 +16,7 @@ from responders.sandbox.running_child import ChildLimits
 from sim.chance import Stream
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import Pose
+from sim.recording import TICK, Pose
 from sim.robot import Robot
 from sim.world import Noise
 
@@ -25,12 +25,13 @@ Preamble = Literal["none", "imports", "preloaded"]
 
 @dataclass(frozen=True, slots=True)
 class ProgramSpec:
-    """A robot program and what it may use."""
+    """A robot program and what it may use; ``modules`` are texts that it can import, by their names."""
 
     code: Code
     preamble: Preamble
     limits: ChildLimits
     output_bytes: int
+    modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,7 @@ class TrialSpec:
     child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
+    tick: int = TICK  # how long one lasts, units of simulated time
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name
     partner: PartnerSpec | None = None
     number: int = 1  # of the robot: what its program is told that it is

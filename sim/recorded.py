@@ -6,10 +6,8 @@ Whatever is drawn or judged of it is the service's.
 from __future__ import annotations
 
 from sim.floors import Floor, floor, names
-from sim.recording import Fault, Pose, Recording, Verdict
+from sim.recording import SECOND, Fault, Pose, Recording, Verdict
 from sim.robot import ROBOTS, Robot
-
-TICKS_PER_SECOND = 30
 
 
 def floor_of(recording: Recording) -> Floor | None:
@@ -37,14 +35,14 @@ def verdict_of(recording: Recording) -> Verdict:
     return next((fault.verdict for fault in faults_of(recording)), Verdict.FINISHED)
 
 
-def seconds_at(tick: float) -> float:
+def seconds_at(recording: Recording, tick: int) -> float:
     """When a tick was done."""
-    return tick / TICKS_PER_SECOND
+    return tick * recording.ticks.length / SECOND
 
 
-def ticks_until(t: float) -> int:
+def ticks_until(recording: Recording, t: float) -> int:
     """How many ticks were done at ``t`` seconds."""
-    return int(t * TICKS_PER_SECOND + 1e-6)
+    return int(t * recording.ticks.per_second + 1e-6)
 
 
 def pose_after(recording: Recording, tick: int) -> Pose:
@@ -58,4 +56,4 @@ def pose_after(recording: Recording, tick: int) -> Pose:
 
 def pose_at(recording: Recording, t: float) -> Pose:
     """Where the robot was at ``t`` seconds: its pose after the last tick until then."""
-    return pose_after(recording, ticks_until(t))
+    return pose_after(recording, ticks_until(recording, t))

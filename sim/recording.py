@@ -22,6 +22,8 @@ Integers = NDArray[np.int64]
 #: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
 SECOND = 3_000_000
 TICK = SECOND // 30
+#: A tick in the original's browser, whose timer leaves out what is less than a millisecond.
+BROWSER_TICK = SECOND // 1000 * 33
 MILLISECOND = SECOND // 1000
 #: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
 SENSOR_SIDE = 20
@@ -61,7 +63,7 @@ _WHEELS = Panel("Wheel encoders, degrees", height=0.75, rank=1)
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows.
+    """One row a tick; row i is the state after tick i+1. All arrays have n rows.
 
     A column that is not given is not known. This is the table of columns: what the chain packs, what a program can
     read, what the store keeps, what traces and plots show is taken from here.
@@ -105,6 +107,7 @@ class Ticks:
     )
     left_pixels: int = 305  # how many pixels the sums are over
     right_pixels: int = 305
+    length: int = TICK  # of a tick, units of simulated time
 
     def __post_init__(self) -> None:
         for each in COLUMNS:
@@ -121,7 +124,12 @@ class Ticks:
     @property
     def t(self) -> Floats:
         """Seconds, shape (n,)."""
-        return np.arange(1, len(self.x) + 1) / 30.0
+        return np.arange(1, len(self.x) + 1) * self.length / SECOND
+
+    @property
+    def per_second(self) -> float:
+        """How many there are in a second."""
+        return SECOND / self.length
 
     @property
     def left_rgb(self) -> Floats:
@@ -261,7 +269,7 @@ class Touch:
 class Fault:
     """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one.
 
-    In a notebook the line is that of a cell, both counted from 1.
+    In a notebook the line is that of a cell, both counted from 1; with a ``file`` it is that of a file beside.
     """
 
     t: float
@@ -273,13 +281,15 @@ class Fault:
     cell: int | None = None
     staff: str = ""  # what our own code stumbled over, for staff to look at
     agent: str = ""  # which agent of the responder's it was, if not the responder itself
+    file: str = ""  # the Python file beside the program, responder or notebook that the line is in
 
     @property
     def place(self) -> str:
-        """``line 3``, ``cell 7, line 3`` or ``parser, line 3``; empty where none is known."""
+        """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty where none is known."""
         within = [self.agent] if self.agent else []
         within += [f"cell {self.cell}"] if self.cell is not None else []
-        return ", ".join(within + ([f"line {self.line}"] if self.line is not None else []))
+        beside = f" of {self.file}" if self.file else ""
+        return ", ".join(within + ([f"line {self.line}{beside}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)

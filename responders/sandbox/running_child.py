@@ -42,6 +42,7 @@ _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
 _MOST_GIVEN = 10_000
+_NOWHERE: wire.Frame = {"line": None, "file": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +138,7 @@ class Child:
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
             ) from None
         if frame["do"] == "busy":
-            raise self._too_busy(frame["line"])
+            raise self._too_busy(frame)
         if frame["do"] not in wire.NOTHING_KEPT:
             self._meter.keep(len(line))
         elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
@@ -244,8 +245,8 @@ class Child:
                 f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
             )
 
-    def _last_word(self) -> int | None:
-        """Ask the child which line it is on, and give it a moment to say so."""
+    def _last_word(self) -> wire.Frame:
+        """Ask the child where it is, and give it a moment to say so."""
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
         deadline = time.monotonic() + _LAST_WORD_SECONDS
@@ -266,14 +267,15 @@ class Child:
         for line in reversed(data.splitlines()):
             with contextlib.suppress(wire.WireError):
                 frame = wire.parse(wire.unnumbered(line)[1], {"busy": wire.ROBOT["busy"]})
-                return None if frame["line"] is None else int(frame["line"])
-        return None
+                return frame
+        return _NOWHERE
 
-    def _too_busy(self, line: int | None) -> ChildStopped:
+    def _too_busy(self, place: wire.Frame) -> ChildStopped:
         return ChildStopped(
             Verdict.CPU_LIMIT,
             f"it computed for more than {self._limits.cpu_seconds:g} seconds of CPU time",
-            line,
+            place["line"],
+            place["file"],
         )
 
     def _stalled(self) -> ChildStopped:
@@ -301,7 +303,7 @@ class Child:
         number = os.WTERMSIG(status)
         # The kernel's own limit on processor time, a second or two behind ours, ends with SIGKILL too.
         if number == signal.SIGXCPU or (number == signal.SIGKILL and used > self._limits.cpu_seconds):
-            return self._too_busy(None)
+            return self._too_busy(_NOWHERE)
         if number == signal.SIGSYS:
             return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
         if number != signal.SIGKILL:

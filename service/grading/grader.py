@@ -24,6 +24,7 @@ from sim.chance import Stream
 from sim.errors import AssignmentError
 from sim.floors import Floor, floor, floor_from_image
 from sim.motion import Physics
+from sim.recording import BROWSER_TICK, TICK
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
@@ -195,6 +196,7 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
         child_seed=child_seed(trial.seed, plan.submission),
         pen_down="p" in plan.flags.switches,
         physics=Physics(world.solid, world.drive),
+        tick=BROWSER_TICK if world.tick == "browser" else TICK,
         partner=_partner(trial, plan),
     )
 

@@ -26,6 +26,7 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of
@@ -115,8 +116,9 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment brings its own, or none",)
-    program = _program(Code(code.name, text), flags, assignment) if code is not None else None
-    beside = _responder(responder, _files(submission, assignment), assignment)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
     return replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
 
@@ -142,8 +144,9 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
     responder = _part("responder", "responder.py", asked.responder, None, assignment)
-    program = _program(Code(f"cell {cell.number}", text), flags, assignment)
-    beside = _responder(responder, _files(submission, assignment), assignment)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(f"cell {cell.number}", text), flags, files, assignment)
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
     return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
 
@@ -181,7 +184,7 @@ def _executed(
     notes: tuple[str, ...],
 ) -> RunPlan:
     """A notebook from top to bottom; what in it is no robot program stands for the responder."""
-    files = _files(submission, assignment)
+    files = _files(submission, assignment, "student")
     functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
@@ -199,7 +202,7 @@ def _executed(
     return RunPlan(
         assignment,
         NotebookTrial(spec, marked_site(notebook, which) if which is not None else None, which, as_read),
-        _program(program, flags, assignment) if program is not None else None,
+        _program(program, flags, _files(submission, assignment, asked.program), assignment) if program else None,
         None,
         functions,
         True,
@@ -220,7 +223,7 @@ def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
     code = _part("second robot program", SECOND_PROGRAM, who, second_program_of(submission), assignment)
     assert code is not None
     flags, text, notes = _flags(code.text, assignment)
-    program = _program(Code(code.name, text), flags, assignment)
+    program = _program(Code(code.name, text), flags, _files(submission, assignment, who), assignment)
     return replace(plan, second_program=program, second_flags=flags, collaborative=True, notes=(*plan.notes, *notes))
 
 
@@ -252,9 +255,14 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
     return flags, text, tuple(notes)
 
 
-def _files(submission: Submission, assignment: Assignment) -> Mapping[str, bytes]:
-    """What lies in the responder's folder; a submission's own file wins over a given one."""
-    return {**assignment.given, **without_agents(submission.files, assignment.parts.agents)}
+def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
+    """What lies beside a part of ``who``; a submission's own file wins over a given one.
+
+    What the assignment brings imports none of the submission's code.
+    """
+    submitted = without_agents(submission.files, assignment.parts.agents)
+    own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
+    return {**assignment.given, **dict(own)}
 
 
 def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
@@ -263,17 +271,17 @@ def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSp
     for name, who in assignment.parts.agents.items():
         given = who != "student"
         code = Code(who, assignment.given_parts[who]) if given else code_of(name, submission.files)
-        spec = _responder(code, assignment.given if given else _files(submission, assignment), assignment)
+        spec = _responder(code, assignment.given if given else _files(submission, assignment, who), assignment)
         if spec is None:
             raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
         agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
     return agents
 
 
-def _program(code: Code, flags: Flags, assignment: Assignment) -> ProgramSpec:
+def _program(code: Code, flags: Flags, files: Mapping[str, bytes], assignment: Assignment) -> ProgramSpec:
     limits = assignment.limits
     allowed = ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _avoided(assignment, "program"))
-    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes)
+    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, modules_of(code.text, files.get))
 
 
 def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assignment) -> ResponderSpec | None:

@@ -5,6 +5,7 @@ Faults are told, never judged; marks do not depend on anything here.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -12,10 +13,12 @@ from types import MappingProxyType
 from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
+from sim.errors import UsageError
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
 from submissions.assignment.second_robot import second_program_of
+from submissions.source_text import decode_source
 from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
@@ -64,7 +67,7 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
     index, fault = places[0]
     source = _source(fault, submission)
     where = f"Agent {fault.agent}" if fault.agent else _WHERE[fault.who]
-    if source is not None:
+    if source is not None and not fault.file:
         where += f" ({one_line(source.name, 60)})"
     place = replace(fault, agent="").place
     if place:
@@ -82,6 +85,8 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
 def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if submission is None:
         return None
+    if fault.file:
+        return _beside(fault.file, submission)
     if submission.notebook is not None and fault.cell is not None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
@@ -91,6 +96,14 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if fault.who == "second program":
         parts[fault.who] = second_program_of(submission)
     return parts.get(fault.who)
+
+
+def _beside(file: str, submission: Submission) -> Code | None:
+    """A process has named the file, so it may be any, or none."""
+    data = submission.files.get(file)
+    with contextlib.suppress(UsageError):
+        return None if data is None else Code(file, decode_source(data, file).text)
+    return None
 
 
 def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:

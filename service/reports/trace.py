@@ -9,7 +9,8 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from sim.recording import SECOND, TICK, Image, Line, Pose, Recording
+from sim.recorded import seconds_at
+from sim.recording import Image, Line, Pose, Recording
 
 
 def trace(recording: Recording) -> dict[str, Any]:
@@ -86,7 +87,7 @@ def _images(recording: Recording) -> list[dict[str, Any]]:
     for side, csv, tick in recording.image_log:
         rows.append(
             {
-                "t": tick * TICK / SECOND,
+                "t": seconds_at(recording, tick),
                 "tick": tick,
                 "source": "image_data",
                 side: [int(value) for value in csv.split(",") if value.strip().isdecimal()],

@@ -71,7 +71,7 @@ def to_bytes(recording: Recording) -> bytes:
         for field in fields(recording)
         if field.name not in ("ticks", "images", "partner")
     }
-    words["ticks"] = {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels}
+    words["ticks"] = _of_all_ticks(ticks)
     words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
     arrays: dict[str, NDArray[Any]] = {
         "words": _bytes_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
@@ -107,6 +107,10 @@ def from_bytes(data: bytes) -> Recording:
         return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images, partner=partner)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
+
+
+def _of_all_ticks(ticks: Ticks) -> dict[str, int]:
+    return {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels, "length": ticks.length}
 
 
 def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
@@ -184,5 +188,5 @@ def _without_words(recording: Recording) -> Recording:
 
 
 def _without_ticks(recording: Recording) -> Recording:
-    ticks = Ticks(np.empty(0), left_pixels=recording.ticks.left_pixels, right_pixels=recording.ticks.right_pixels)
+    ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_of_all_ticks(recording.ticks)}))
     return _noted(replace(recording, ticks=ticks), "its ticks are left out")

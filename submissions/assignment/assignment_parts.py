@@ -177,6 +177,7 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
         solid=table.solid,
         drive=table.drive,
         noise=table.noise,
+        tick=table.tick,
         sheet=_sheet(table),
     )
 

@@ -37,6 +37,7 @@ class WorldSpec:
     solid: bool = False  # walls and obstacles stop the robot
     drive: Literal["course", "wheels"] = "course"  # who moves it: the course's equations, or rigid-body wheels
     noise: Literal["course", "both directions"] = "course"  # of the wheels: of positive speeds alone, or of all
+    tick: Literal["thirtieth", "browser"] = "thirtieth"  # of a second, or 33 ms as in the original's browser
     sheet: int | None = 0  # the seed of the digits on a digit sheet; None: each trial's own seed
 
 

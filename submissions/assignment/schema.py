@@ -51,6 +51,7 @@ class WorldTable(StrictTable):
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
     noise: Literal["course", "both directions"] = "course"
+    tick: Literal["thirtieth", "browser"] = "thirtieth"
     sheet: int | str = 0
 
     @field_validator("sheet", mode="before")

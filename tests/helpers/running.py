@@ -12,7 +12,7 @@ from responders.trial_spec import AgentSpec, PartnerSpec, Preamble, ProgramSpec,
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
-from sim.recording import Pose, Recording
+from sim.recording import TICK, Pose, Recording
 from sim.robot import robot
 from sim.world import Noise
 
@@ -43,6 +43,7 @@ def run_program(
     seed: int = 1,
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
+    tick: int = TICK,
     meter: JobMeter | None = None,
     second: str | None = None,
     second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
@@ -74,6 +75,7 @@ def run_program(
         seed=seed,
         child_seed=seed if child_seed is None else child_seed,
         physics=physics,
+        tick=tick,
         agents={name: agent_spec(name, text, files, output_bytes) for name, text in (agents or {}).items()},
         partner=partner,
     )

@@ -198,8 +198,8 @@ def test_what_the_machine_stumbles_over_is_not(
     [
         FIND_WIRE + forged('{"do":"motor","port":"outB","command":"run-to-rel-pos","position_sp":1e308}'),
         FIND_WIRE + forged('{"do":"motor","port":"outB","position":-1e308,"time_sp":1e308,"command":"run-timed"}'),
-        FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff\\\\u0000","line":10000000}}'),
-        FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null}'),
+        FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff","line":9,"file":null}}'),
+        FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null,"file":null}'),
         "print('Light_left: ' + '9' * 400 + ' 1e999')\nprint('Gyro: nan inf')",
         "print('\\ud800\\x00')\nprint('PY::\\ud800')",
         "raise Exception('\\ud800\\x00' * 1000)",

@@ -30,7 +30,7 @@ class AgentRole(ResponderRole):
             self._units = max(self._units, asked["t"])
             self._note_calls()
             self._stack, self._calls = [self._own_name], 0
-            self._wire.send(function_calls.value_frame(functools.partial(self._called, asked), self._name))
+            self._wire.send(function_calls.value_frame(functools.partial(self._called, asked), self._files))
 
     def _called(self, asked: Frame) -> Any:
         return self._find()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))

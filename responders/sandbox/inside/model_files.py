@@ -13,8 +13,6 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from .student_code import line_of
-
 
 def preload_onnx() -> None:
     """Import onnxruntime, where it is installed, and let every session of it do with one thread: there are no more."""
@@ -63,7 +61,7 @@ def explain_joblib() -> None:
     joblib.load = numpy_pickle.load = explained
 
 
-def install_version_notes(name: str, tell: Callable[[str, int | None], None]) -> None:
+def install_version_notes(tell: Callable[[str], None]) -> None:
     """Tell, once for each version, that a model was saved by another scikit-learn; other warnings are shown as ever."""
     if "sklearn" not in sys.modules:
         return
@@ -80,6 +78,6 @@ def install_version_notes(name: str, tell: Callable[[str, int | None], None]) ->
         if saved not in told and len(told) < 3:
             told.add(saved)
             sentence = f"a model was saved by scikit-learn {saved} and is read by {read}; it may answer differently"
-            tell(sentence, line_of(sys._getframe(), name))
+            tell(sentence)
 
     warnings.showwarning = show_or_tell

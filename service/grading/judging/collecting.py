@@ -97,7 +97,7 @@ def _logged(recording: Recording) -> Iterator[Image]:
     log = recording.image_log
     for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
         if side == "left":
-            t = seconds_at(tick)
+            t = seconds_at(recording, tick)
             pixels = _bytes(left)
             beside = _bytes(right) if other == "right" else b""
             yield Image(t, tick, pose_after(recording, tick), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))

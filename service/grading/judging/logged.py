@@ -129,7 +129,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     wrong = next((words for reached, words in checks if reached < 1), None)
     if wrong is None:
         return passed(f"The program logged {len(log)} images as expected.", measures=measures)
-    last = seconds_at(log[-1][2]) if log else None
+    last = seconds_at(recording, log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
     held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
     return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)

@@ -75,7 +75,7 @@ def move_between(recording: Recording, first: int, last: int) -> Move:
     _, before = place_at(recording, first)
     _, after = place_at(recording, last)
     ahead, left = relative_to(before, after.x, after.y)
-    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(last - first))
+    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(recording, last - first))
 
 
 def straight(recording: Recording) -> NDArray[np.bool_]:

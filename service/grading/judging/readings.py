@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.recorded import TICKS_PER_SECOND, ticks_until
+from sim.recorded import ticks_until
 from sim.recording import Floats, Recording
 from submissions.criteria.logged import Instrument
 
@@ -34,8 +34,8 @@ def were_read(
     if not len(recording.ticks) or not len(values):
         return found
     numbers = np.asarray(values, dtype=np.float64)
-    last = np.clip([ticks_until(t) for t in at], 1, len(recording.ticks))
-    first = np.clip([int((t - _AGE) * TICKS_PER_SECOND) for t in at], 1, last)
+    last = np.clip([ticks_until(recording, t) for t in at], 1, len(recording.ticks))
+    first = np.clip([int((t - _AGE) * recording.ticks.per_second) for t in at], 1, last)
     columns = np.column_stack([column for each in instruments for column in _columns(each, recording)])
     for back in range(int(np.max(last - first)) + 1):
         rows = np.maximum(last - back, first) - 1

@@ -13,7 +13,6 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import headings, standing, times, travel
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
-from sim.recorded import TICKS_PER_SECOND
 from sim.recording import Floats, Recording
 from submissions.criteria.relation import Relation, Series
 
@@ -82,12 +81,12 @@ def _series(name: Series, recording: Recording) -> Floats:
         case "heading":
             return headings(recording)[1:]
         case "speed":
-            return np.abs(ahead) * TICKS_PER_SECOND
+            return np.abs(ahead) * ticks.per_second
         case "turning":
-            return np.abs(turned) * TICKS_PER_SECOND
+            return np.abs(turned) * ticks.per_second
         case "left wheel speed" | "right wheel speed":
             wheel = ticks.left_position if name == "left wheel speed" else ticks.right_position
-            return np.abs(np.diff(wheel, prepend=0.0)) * TICKS_PER_SECOND
+            return np.abs(np.diff(wheel, prepend=0.0)) * ticks.per_second
         case "left light" | "right light":
             rgb = ticks.left_rgb if name == "left light" else ticks.right_rgb
             return np.asarray(rgb[:, 0] / 2.55)

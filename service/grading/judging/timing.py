@@ -99,4 +99,4 @@ def _moving(recording: Recording) -> float:
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
     changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
-    return seconds_at(int(np.logical_or.reduce(changes).sum()))
+    return seconds_at(recording, int(np.logical_or.reduce(changes).sum()))

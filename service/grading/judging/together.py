@@ -12,7 +12,7 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
-from sim.recorded import pose_after, seconds_at
+from sim.recorded import pose_after, seconds_at, ticks_until
 from sim.recording import Floats, Recording
 from submissions.criteria.together import Apart
 
@@ -25,7 +25,7 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
     if distances is None:
         return failed("Expected two robots, but there was one.")
     last = len(distances) - 1
-    first = last if criterion.when == "end" else min(int(criterion.after * 30), last)
+    first = last if criterion.when == "end" else min(ticks_until(recording, criterion.after), last)
     looked_at = distances[first:]
     good = (looked_at >= criterion.at_least) & (looked_at <= (criterion.at_most or np.inf))
     share = Fraction(int(good.sum()), len(good))
@@ -38,26 +38,32 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
     expected = f"Expected the robots to be {_asked(criterion)}"
     if criterion.when == "always":
         needed = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
-        told = f"they were so for {float(share) * 100:.0f}% of the time after {seconds_at(first):.2f} s"
+        told = f"they were so for {float(share) * 100:.0f}% of the time after {seconds_at(recording, first):.2f} s"
         at = first + int(np.argmin(good))
         if share >= Fraction(str(criterion.share)):
-            return passed(f"The robots were {_asked(criterion)}: {told}.", seconds_at(last), recording.end, measures)
+            return passed(
+                f"The robots were {_asked(criterion)}: {told}.", seconds_at(recording, last), recording.end, measures
+            )
         return failed(
-            f"{expected} for {needed} of the time, but {told}; at {seconds_at(at):.2f} s they were "
+            f"{expected} for {needed} of the time, but {told}; at {seconds_at(recording, at):.2f} s they were "
             f"{distances[at]:.0f} mm apart.",
-            seconds_at(at),
+            seconds_at(recording, at),
             pose_after(recording, at),
             share,
             measures,
         )
     at = first + int(np.argmax(good))
     if good.any():
-        told = f"at {seconds_at(at):.2f} s the robots were {distances[at]:.0f} mm apart"
-        return passed(f"{told.capitalize()}.", seconds_at(at), pose_after(recording, at), measures)
-    ends = "at the end" if criterion.when == "end" else f"at some time after {seconds_at(first):.2f} s"
+        told = f"at {seconds_at(recording, at):.2f} s the robots were {distances[at]:.0f} mm apart"
+        return passed(f"{told.capitalize()}.", seconds_at(recording, at), pose_after(recording, at), measures)
+    began = seconds_at(recording, first)
+    ends = "at the end" if criterion.when == "end" else f"at some time after {began:.2f} s"
     nearest = f"{distances[last]:.0f} mm" if criterion.when == "end" else _span(looked_at)
     return failed(
-        f"{expected} {ends}, but they were {nearest} apart.", seconds_at(last), recording.end, measures=measures
+        f"{expected} {ends}, but they were {nearest} apart.",
+        seconds_at(recording, last),
+        recording.end,
+        measures=measures,
     )
 
 

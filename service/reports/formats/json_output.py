@@ -49,10 +49,12 @@ def json_document(view: View) -> dict[str, Any]:
                 **_said(trial.recording),
                 **({"partner": _said(trial.recording.partner)} if trial.recording.partner is not None else {}),
                 **agent_messages(trial.recording),
+                "notes": [storable(note) for note in trial.recording.notes],
             }
             for trial in grade.trials
         ],
         "accuracy": _accuracy(grade.accuracy),
+        "notes": [storable(note) for note in grade.notes],
         **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
 

@@ -41,7 +41,7 @@ from service.reports.plots.style import (
     whole,
     write,
 )  # fmt: skip
-from sim.recorded import robot_of
+from sim.recorded import robot_of, ticks_until
 from sim.recording import Pose, Recording
 
 Pixels = NDArray[np.uint8]
@@ -284,7 +284,7 @@ def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], p
     taken = [end for end in ends if math.isfinite(sum(end))]
     step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
     for second in range(step, math.ceil(recording.end_t), step):
-        row = second * 30
+        row = ticks_until(recording, second)
         if row >= len(points):
             break
         x, y = float(points[row, 0]), float(points[row, 1])

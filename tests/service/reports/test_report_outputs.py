@@ -29,10 +29,11 @@ from sim.recording import Verdict
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
     document = json.loads(json_text(staff_view(build.shape_grade())))
-    assert list(document) == ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy"]
+    top = ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy", "notes"]
+    assert list(document) == top
     assert document["schema"] == 1
     assert list(document["criteria"][0]) == ["id", "title", "marks", "max_marks", "message"]
-    assert list(document["trials"][0]) == ["scenario", "seed", "verdict", "sha256", "spoken", "messages"]
+    assert list(document["trials"][0]) == ["scenario", "seed", "verdict", "sha256", "spoken", "messages", "notes"]
     assert list(document["trials"][0]["messages"][0]) == ["t", "sender", "text"]
     assert document["accuracy"] == {"value": 5 / 6, "low": 0.4365, "high": 0.9699, "n": 6}
     assert (document["marks"], document["max_marks"], document["verdict"]) == (7, 8, "finished")
