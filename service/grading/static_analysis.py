@@ -19,10 +19,11 @@ from service.grading.judging.case import StaticAnalysis
 from service.grading.judging.code import calls_of
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
-from service.grading.run_plan import Part, RunPlan
+from service.grading.run_plan import RunPlan
 from sim.chance import Stream
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment
+from submissions.bundle import Part
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 
 _MEGABYTE = 1 << 20
@@ -61,7 +62,7 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter:
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
                     checks[criterion.id, place] = _check(criterion, trial, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
-    return StaticAnalysis(answers, plan.flags, called, checks, sandbox)
+    return StaticAnalysis(answers, plan.flags, called, checks, sandbox, plan.missing)
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:

@@ -6,7 +6,7 @@ It knows no marks and no particular trial; the faults of a recording say where a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -134,8 +134,35 @@ _NO_ROBOT = VerdictWords(
 )
 
 
+#: Where there was a part to grade, and the other not.
+_WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
+    {
+        "robot.py": VerdictWords(
+            "no robot.py",
+            "There is no robot.py, so no robot was run: only your responder was graded.",
+            "The marks that need a robot program are missing for that alone.",
+            "Submit robot.py beside responder.py; if it is there, check its name.",
+            "bad",
+        ),
+        "responder.py": VerdictWords(
+            "no responder.py",
+            "There is no responder.py, so nothing answered your robot program, which was graded by itself.",
+            "The marks that need a responder are missing for that alone.",
+            "Submit responder.py beside robot.py; if it is there, check its name.",
+            "bad",
+        ),
+    }
+)
+
+
 def grade_words(grade: Grade) -> VerdictWords:
-    """The words for a grade's verdict, or that there was nothing to run."""
+    """The words for a grade's verdict, for what was not submitted, or that there was nothing to run."""
+    if grade.missing:
+        words = _WITHOUT[grade.missing]
+        if grade.verdict is Verdict.FINISHED:
+            return words
+        ended = verdict_words(grade.verdict)
+        return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
     return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
 
 

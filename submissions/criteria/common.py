@@ -95,6 +95,11 @@ class Criterion(StrictTable):
         return False
 
     @property
+    def parts_needed(self) -> frozenset[str]:
+        """The parts without which there is nothing to look at."""
+        return frozenset({"program", "responder"} if self.asks_responder else {"program"})
+
+    @property
     def result_needed(self) -> str | None:
         """The id of the criterion that has to be judged before it."""
         return None
