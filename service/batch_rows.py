@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from service.grading.grade import Grade
-from service.reports.rows import TableRow
+from service.reports.rows import TableRow, missing_words
 from service.store import results
 from service.store.batches import JobLine
 from service.store.engine import Store
@@ -40,11 +40,6 @@ def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Gra
 def refused_row(refusal: Refusal) -> TableRow[Grade]:
     """The row of what was not taken in."""
     return TableRow(refusal.student, refusal.source, refusal.assignment, reason=refusal.reason, refused=True)
-
-
-def missing_words(missing: str) -> str:
-    """That a part was not submitted; empty where none is missing."""
-    return f"there is no {missing}; the rest was graded" if missing else ""
 
 
 def why_not_shown(line: JobLine, *, published: bool = False) -> str:

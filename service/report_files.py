@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.batch_rows import missing_words, refused_row, row_of, why_not_shown
+from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
 from service.plotting import draw
 from service.reports.html import BatchRow, batch_index, refusal_page, report
-from service.reports.rows import ReportPage
+from service.reports.rows import ReportPage, missing_words
 from service.reports.view import staff_view, student_view
 from service.reports.written import file_stem, file_stems, write_page
 from service.store import intake, plots, policies, results

@@ -121,7 +121,7 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
                 raise UsageError(f"{cannot_be_told(near[row.student.id])}; expected names that can be told apart.")
             found.append(row.read())
         except UsageError as error:
-            found.append(" ".join(str(error).split()))
+            found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
     found = _one_each(rows, found)
     return BatchContents(
         tuple(each for each in found if isinstance(each, GradingRequest)),

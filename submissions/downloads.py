@@ -24,6 +24,7 @@ IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_(?P<plugin>[a-z]+)(?:_(?P<file>.*))?", re.DOTALL)
 #: What can only be a group; any other hyphen may be the student's own.
 _GROUP = re.compile(r"^(?:[^-]*\bgroup\b[^-]*|[^-]*\d)-(?=\D)", re.IGNORECASE)
+_SUFFIX = "assignsubmission_file_"
 _GRADESCOPE_LIST = "submission_metadata.yml"
 _MOST_LIST_BYTES = 50_000_000
 _NBGRADER, _NBGRADER_TIME = "submitted", "timestamp.txt"
@@ -89,10 +90,12 @@ def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[StudentFiles]:
         name = people[number]
         hidden = name == NAMELESS
         student = Student(f"{NAMELESS} {number}") if hidden else Student(own, name)
-        source = f"{shown(names[number])}_{number}_assignsubmission_file_"
         files = {(found[path]["file"] or path.name): path for path in paths if found[path]["plugin"] == "file"}
         folders = [path for path in files.values() if path.is_dir()]
         problem = "" if files else "was typed into Moodle's text box, expected files."
+        # Its own name, so that sentences speak of that; shortened, it would lose the number.
+        own_name = folders[0].name if len(folders) == 1 else ""
+        source = own_name if own_name == shown(own_name) != "" else f"{shown(names[number])}_{number}_{_SUFFIX}"
         yield StudentFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
 
 

@@ -109,8 +109,20 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     program = _program(Code(code.name, text), flags, assignment) if code is not None else None
     beside = _responder(responder, _files(submission, assignment), assignment)
     plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    if missing == "program" and (asking := _stand_in(assignment)) is not None:
+        asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
+        plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
     # What is sent to a responder that is not there is a message all the same.
     return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
+
+
+def _stand_in(assignment: Assignment) -> ProgramSpec | None:
+    """A program that asks a responder all that it is judged by alone; None where that is nothing."""
+    texts = list(dict.fromkeys(text for criterion in assignment.criteria for text in criterion.questions))
+    if not texts:
+        return None
+    text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
+    return _program(Code("questions.py", text), Flags(), assignment)
 
 
 def _missing(submission: Submission, assignment: Assignment) -> Part | None:

@@ -48,3 +48,8 @@ class ReportPage:
 
     row: TableRow[Grade]
     html: str
+
+
+def missing_words(missing: str) -> str:
+    """That a part was not submitted; empty where none is missing."""
+    return f"there is no {missing}; the rest was graded" if missing else ""

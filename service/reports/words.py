@@ -139,7 +139,7 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     {
         "robot.py": VerdictWords(
             "no robot.py",
-            "There is no robot.py, so no robot was run: only your responder was graded.",
+            "There is no robot.py, so only your responder was graded, by itself.",
             "The marks that need a robot program are missing for that alone.",
             "Submit robot.py beside responder.py; if it is there, check its name.",
             "bad",

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import SomeTextOrTexts
+from submissions.criteria.common import SomeTextOrTexts, Texts
 from submissions.criteria.texts import TextConditions
 
 
@@ -36,6 +36,11 @@ class Replies(TextConditions):
     def asks_responder(self) -> bool:
         """True: nothing else is looked at."""
         return True
+
+    @property
+    def questions(self) -> Texts:
+        """Those of ``expect``."""
+        return tuple(self.expect)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

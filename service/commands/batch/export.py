@@ -71,7 +71,7 @@ def export(
         if chosen.packed is not None and output is not None:
             with for_the_user(), _opened(output) as sink:
                 left_over = chosen.packed(report_pages(store, shown, refusals), sink)
-            _name_left_over(left_over, "did not come from Moodle, so that their reports are left out")
+            _name_left_over(left_over, "left out, for Moodle would not know whose it is")
             return
         rows = rows_of(store, lines, refusals, published=published)
     if output is not None and _is_for_files(chosen, output):
@@ -93,7 +93,7 @@ def _document(chosen: Format, rows: Sequence[TableRow[Grade]], worksheet: Path |
         except UnicodeDecodeError:
             raise UsageError(f"{worksheet} is not UTF-8; expected it as Moodle wrote it") from None
         filled = chosen.filled_in(rows, given)
-        _name_left_over(filled.left_over, f"are not in {worksheet.name}")
+        _name_left_over(filled.left_over, f"not in {worksheet.name}")
         return filled.text
     assert chosen.table is not None
     return chosen.table(rows)
@@ -148,7 +148,7 @@ def _write(path: Path, text: str) -> None:
 def _name_left_over(left_over: Sequence[str], why: str) -> None:
     if left_over:
         told = ", ".join(left_over[:_MOST_NAMED]) + (" ..." if len(left_over) > _MOST_NAMED else "")
-        _warn(f"{len(left_over)} of the batch {why}: {told}")
+        _warn(f"{why}: {told}")
 
 
 def _warn(sentence: str) -> None:
