@@ -72,7 +72,8 @@ def grade(
             except RobomarkError as error:
                 refused = isinstance(error, UsageError)
                 who = Student(shown_name(named_by(path)))
-                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, str(error), refused)
+                reason = str(error).removeprefix(f"{shown(path.name)}: ")
+                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
                 if len(submissions) == 1:
                     if refused and chosen.refusal is not None:
                         sys.stdout.write(chosen.refusal(row))
