@@ -10,11 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-import yaml
-
-from sim.errors import UsageError
 from submissions.bundle import named_by
 from submissions.people import NAMELESS, NOBODY, Student, told_apart
 from submissions.raw_files import shown
@@ -26,7 +22,6 @@ _MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_(?P<plugin
 _GROUP = re.compile(r"^(?:[^-]*\bgroup\b[^-]*|[^-]*\d)-(?=\D)", re.IGNORECASE)
 _SUFFIX = "assignsubmission_file_"
 _GRADESCOPE_LIST = "submission_metadata.yml"
-_MOST_LIST_BYTES = 50_000_000
 _NBGRADER, _NBGRADER_TIME = "submitted", "timestamp.txt"
 
 
@@ -101,7 +96,10 @@ def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[StudentFiles]:
 
 def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]:
     """A row for each of those who submitted something together."""
-    listed = _gradescope_list(folder / _GRADESCOPE_LIST)
+    # Only for who has such a list.
+    from submissions.gradescope_list import read_list
+
+    listed = read_list(folder / _GRADESCOPE_LIST)
     for name in dict.fromkeys([*listed, *(entry.name for entry in entries if entry.is_dir())]):
         own = listed.get(name)
         path = folder / name
@@ -112,25 +110,6 @@ def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]
         when = own.get(":created_at") if isinstance(own, dict) else None
         for student in submitters or [NOBODY]:
             yield StudentFiles(shown(name), student, path, submitted_at=_moment(when), problem=problem)
-
-
-def _gradescope_list(path: Path) -> dict[str, Any]:
-    """Every value as text, whatever Ruby calls it; nothing is merged or made, so that a list cannot grow."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(_MOST_LIST_BYTES + 1)
-        if len(data) > _MOST_LIST_BYTES:
-            raise UsageError(f"{path.name}: is larger than {_MOST_LIST_BYTES // 10**6} MB, expected Gradescope's list.")
-        listed = yaml.load(data, Loader=yaml.CBaseLoader)
-    except OSError as error:
-        raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
-    except (yaml.YAMLError, RecursionError, UnicodeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f" at line {mark.line + 1}"
-        raise UsageError(f"{path.name}: cannot be read{line}, expected Gradescope's list as it was exported.") from None
-    if not isinstance(listed, dict):
-        raise UsageError(f"{path.name}: is no list of submissions, expected Gradescope's as it was exported.")
-    return {name: own for name, own in listed.items() if isinstance(name, str)}
 
 
 def _submitters(own: object) -> Iterator[Student]:
