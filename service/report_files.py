@@ -67,21 +67,21 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     rows = [
         BatchRow(
             line.student,
-            line.name,
             line.marks,
             line.max_marks,
             None if line.verdict is None else Verdict(line.verdict),
             own.get(line.id),
             why_not_shown(line) or missing_words(line.missing),
+            line.name if line.name != line.student else "",
         )
         for line in lines
     ]
     rows += [
         BatchRow(
             refusal.student.id or refusal.source,
-            refusal.student.name,
             report=path.name,
             note=f"not taken in: {refusal.reason}",
+            name=refusal.student.name if refusal.student.name != refusal.student.id else "",
         )
         for refusal, path in zip(refusals, paths[len(graded) :], strict=True)
     ]

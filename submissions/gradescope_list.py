@@ -1,4 +1,4 @@
-"""Reads the list that Gradescope puts beside the submissions of its export: YAML as Ruby writes it, taken as plain data.
+"""Reads the list that Gradescope puts beside the submissions of an export: YAML as Ruby writes it, as plain data.
 
 Who is meant by what it says is ``downloads.py``'s.
 """

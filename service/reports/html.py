@@ -37,12 +37,12 @@ class BatchRow:
     """One student of a batch. ``report`` is a path relative to the index page; marks are None until graded."""
 
     student: str
-    name: str = ""
     marks: Decimal | None = None
     max_marks: Decimal | None = None
     verdict: Verdict | None = None
     report: str | None = None
     note: str = ""
+    name: str = ""  # the student's, where that is not what they are called by
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,8 +67,10 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         if row.grade is not None:
             _check_maximum(row.grade.entry.max_marks, line, places)
             line[places[_GRADE]] = _marks(row)
-        if _FEEDBACK in places:
-            line[places[_FEEDBACK]] = safe_cell(_feedback(row))
+        feedback = places.get(_FEEDBACK)
+        # What waits leaves standing what somebody wrote.
+        if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
+            line[feedback] = safe_cell(_feedback(row))
     stream = io.StringIO()
     ending = "\r\n" if first.endswith("\r") else "\n"
     csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(lines)
