@@ -242,6 +242,29 @@ def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_c
             students.enrol(Student("ada "), at)
 
 
+def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
+    with store.transaction() as session:
+        at = now(session)
+        students = Students(session, intake.course_of(session, "default", at))
+        known = students.enrol(Student("s1"), at)
+        for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
+            assert students.enrol(told, at) == known
+        person = session.scalars(select(Person)).one()
+        assert (person.name, person.email) == ("Ada Lovelace", "ada@uni.example")
+
+
+def test_only_who_is_there_is_found(store: Store) -> None:
+    with store.transaction() as session:
+        at = now(session)
+        students = Students(session, intake.course_of(session, "default", at))
+        known = students.enrol(Student("Ada Lovelace"), at)
+        assert students.find(" Ada  Lovelace") == known
+        with pytest.raises(UsageError, match='did you mean "Ada Lovelace"'):
+            students.find("Ada Lovelance")
+        with pytest.raises(UsageError, match="there is no student 'bob' in this course; robomark course enrol"):
+            students.find("bob")
+
+
 def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> None:
     """Two whom today's rules would not tell apart, and one enrolled with blanks by an extension."""
     with store.transaction() as session:

@@ -93,11 +93,8 @@ def test_junit_calls_an_unmarked_grade_an_error() -> None:
 
 def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
     evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
-    rows = list(
-        csv.DictReader(
-            io.StringIO(marks_csv([row_of(build.shape_grade()).shown(staff_view), row_of(evil).shown(staff_view)]))
-        )
-    )
+    table = marks_csv([row_of(grade).shown(staff_view) for grade in (build.shape_grade(), evil)])
+    rows = list(csv.DictReader(io.StringIO(table)))
     assert rows[0]["student"] == "s1234567"
     assert rows[0]["accuracy"] == "0.8333"
     assert rows[0]["marks: names-the-right-shape"] == "5"
