@@ -97,7 +97,7 @@ def enrol(
         for student in listed:
             students.enrol(student, at)
         audit.note(session, audit.this_user(), "enrol", "course", str(course_id), students=len(listed))
-    print(f"{len(listed)} students are in the course")
+    print(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
 
 
 def _due(text: str | None) -> datetime | None:

@@ -85,7 +85,10 @@ def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
     assert "[red]odd.txt" in status.out
     assert batch in robomark(home, "batch", "list").out
     rows = list(csv.DictReader(io.StringIO(robomark(home, "batch", "export", batch).out)))
-    assert {row["student"]: row["verdict"] for row in rows} == {"reference": "finished", "flawed": "finished"}
+    odd = "[red]odd.txt"
+    verdicts = {row["file"]: row["verdict"] for row in rows}
+    assert verdicts == {"reference": "finished", "flawed": "finished", odd: ""}
+    assert all(bool(row["reason"]) == (row["file"] == odd) for row in rows)
     exported = json.loads(robomark(home, "batch", "export", batch, "--format", "json").out)
     assert {row["student"]: row["marks"] for row in exported}["reference"] == 10
 

@@ -1,7 +1,4 @@
-"""Tables of a batch in which one is graded, one lacks a part, one was refused and one waits: whole, and read by others.
-
-What Moodle and Gradescope do with a file follows their own rules, written down again here.
-"""
+"""Tables of a batch in which one is graded, one lacks a part, one was refused and one waits: read by others, too."""
 
 from __future__ import annotations
 
@@ -12,13 +9,13 @@ import re
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
-from decimal import Decimal
 
 import pandas
 import pytest
 from junitparser import Error, Failure, JUnitXml, Skipped
 
 import report_builders as build
+from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from paths import DATA
 from service.grading.grade import Grade
 from service.reports.formats import FORMATS
@@ -143,22 +140,6 @@ def test_junit_is_read_as_what_it_says() -> None:
     assert kinds == [{Failure}, {Failure}, {Error}, {Skipped}, {Error}]
 
 
-def imported_by_moodle(text: str) -> dict[str, tuple[Decimal | None, str]]:
-    """Moodle's rules for a worksheet: found by Identifier, taken where the grade column has a number in range."""
-    lines = list(csv.reader(io.StringIO(text.removeprefix("\ufeff"))))
-    places = {name: lines[0].index(name) for name in ("Identifier", "Grade", "Last modified (grade)")}
-    feedback = lines[0].index("Feedback comments")
-    found = {}
-    for line in lines[1:]:
-        assert len(line) == len(lines[0])
-        number = re.fullmatch(r"Participant (\d+)", line[places["Identifier"]])
-        assert number is not None
-        grade = Decimal(line[places["Grade"]]) if line[places["Grade"]] else None
-        assert grade is None or 0 <= grade <= Decimal(line[lines[0].index("Maximum Grade")])
-        found[number[1]] = (grade, line[feedback])
-    return found
-
-
 def test_moodle_takes_the_worksheet_back_with_all_else_untouched() -> None:
     before = list(csv.reader(io.StringIO(WORKSHEET)))
     after = list(csv.reader(io.StringIO(written("moodle-worksheet"))))
@@ -199,20 +180,6 @@ def test_what_is_not_its_worksheet_is_refused(given: str, expected: str) -> None
     assert filled_in is not None
     with pytest.raises(UsageError, match=expected):
         filled_in(ROWS, given)
-
-
-def feedback_taken_by_moodle(archive: zipfile.ZipFile) -> dict[str, str]:
-    """Moodle's rules for a feedback zip: a part of the path says whose it is, and the rest is the file's name."""
-    found = {}
-    for path in archive.namelist():
-        for part in path.split("/"):
-            pieces = part.split("_", 4)
-            if len(pieces) < 5 or not pieces[1].isdecimal():
-                continue
-            assert pieces[2] in ("assignsubmission", "assignfeedback")
-            assert pieces[3] == "file"
-            found[pieces[1]] = path.split("/")[-1]
-    return found
 
 
 def test_moodle_finds_whose_each_feedback_file_is() -> None:
