@@ -15,7 +15,7 @@ from service.plotting import draw
 from service.reports.html import BatchRow, batch_index, refusal_page, report
 from service.reports.rows import ReportPage, missing_words
 from service.reports.view import staff_view, student_view
-from service.reports.written import file_stem, file_stems, write_page
+from service.reports.written import file_stems, refused_stems, write_page
 from service.store import intake, plots, policies, results
 from service.store.batches import JobLine
 from service.store.engine import Store
@@ -59,8 +59,7 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     """
     graded = [line for line in lines if not why_not_shown(line)]
     names = [(line.student, line.assignment) for line in graded]
-    # What was refused may be one student's several times over, so it is called as it came.
-    stems = [*file_stems(names), *(file_stem(refusal.source, "refused") for refusal in refusals)]
+    stems = [*file_stems(names), *refused_stems([(refusal.source, refusal.student.id) for refusal in refusals])]
     pages = report_pages(store, graded, refusals)
     paths = [write_page(folder, f"{stem}.html", page.html) for stem, page in zip(stems, pages, strict=True)]
     own = {line.id: path.name for line, path in zip(graded, paths, strict=False)}
@@ -98,7 +97,7 @@ def _page(store: Store, line: JobLine, grade: Grade) -> tuple[str, Mapping[str, 
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
         assignment = intake.load_assignment(session, line.id) if drawn is None else None
     if assignment is not None:
-        drawn = draw(grade, assignment)
+        drawn = draw(grade, assignment, submission)
     found = drawn or {}
     view = student_view(grade, released) if line.staff_only is None else staff_view(grade)
     return report(view, found, submission), found

@@ -14,7 +14,7 @@ from sqlalchemy import insert, select, update
 
 from builders import grading_request
 from command import robomark
-from service.reports.written import file_stem, file_stems
+from service.reports.written import file_stem, file_stems, refused_stems
 from service.store import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Person
@@ -328,6 +328,12 @@ def test_a_student_with_several_assignments_has_a_file_for_each() -> None:
     graded = [("ada", "json-queue"), ("bob", "json-queue"), ("ada", "echo-responder")]
     assert file_stems(graded) == ["ada+json-queue", "bob", "ada+echo-responder"]
     assert file_stems(graded[::-1]) == file_stems(graded)[::-1]
+
+
+def test_who_was_refused_together_has_a_file_each() -> None:
+    refused = [("submission_1", "ada"), ("submission_1", "bob"), ("submission_2", "ada"), ("line 4: ada", "ada")]
+    assert len(set(refused_stems(refused))) == 4
+    assert refused_stems(refused)[2] == "submission_2+refused"
 
 
 def test_files_in_an_index_of_a_batch_keep_their_students_names() -> None:

@@ -21,7 +21,7 @@ from service.home import for_the_user
 from service.report_files import report_pages
 from service.reports.formats import FORMATS, Format
 from service.reports.rows import TableRow
-from service.reports.written import file_stem, file_stems
+from service.reports.written import file_stems, refused_stems
 from service.settings import load_settings
 from service.store import batches, regrades
 from service.store.engine import open_store
@@ -107,27 +107,23 @@ def _is_for_files(chosen: Format, output: Path) -> bool:
 
 
 def _write_each(chosen: Format, rows: Sequence[TableRow[Grade]], folder: Path) -> None:
-    """A file a submission, named after its student, and after its assignment where one student has several.
-
-    What was refused may be one student's several times over, so it is called as it came.
-    """
+    """A file a submission, named after its student, and after its assignment where one student has several."""
     try:
         with for_the_user():
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
+    document, refusal = chosen.document, chosen.refusal
     graded = [row for row in rows if row.grade is not None]
+    refused = [row for row in rows if row.refused]
+    texts = [document(row.grade) for row in graded if row.grade is not None] if document is not None else []
     stems = file_stems([(row.student.id, row.assignment) for row in graded])
-    written = 0
-    for stem, row in zip(stems, graded, strict=True):
-        if row.grade is not None and chosen.document is not None:
-            _write(folder / f"{stem}{chosen.suffix}", chosen.document(row.grade))
-            written += 1
-    for row in rows:
-        if row.refused and chosen.refusal is not None:
-            _write(folder / f"{file_stem(row.source, 'refused')}{chosen.suffix}", chosen.refusal(row))
-            written += 1
-    print(f"{written} files in {folder}")
+    if refusal is not None:
+        texts += map(refusal, refused)
+        stems += refused_stems([(row.source, row.student.id) for row in refused])
+    for stem, text in zip(stems, texts, strict=True):
+        _write(folder / f"{stem}{chosen.suffix}", text)
+    print(f"{len(texts)} files in {folder}")
 
 
 def _opened(path: Path) -> BinaryIO:
