@@ -79,7 +79,7 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
         BatchRow(
             refusal.student.id or refusal.source,
             report=path.name,
-            note=f"not taken in: {refusal.reason}",
+            note=f"not taken in: {refusal.sentence}",
             name=refusal.student.name if refusal.student.name != refusal.student.id else "",
         )
         for refusal, path in zip(refusals, paths[len(graded) :], strict=True)

@@ -100,16 +100,16 @@ def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]
     from submissions.gradescope_list import read_list
 
     listed = read_list(folder / _GRADESCOPE_LIST)
-    for name in dict.fromkeys([*listed, *(entry.name for entry in entries if entry.is_dir())]):
+    there = [entry.name for entry in entries if _is_folder(entry)]
+    for name in dict.fromkeys([*listed, *there]):
         own = listed.get(name)
-        path = folder / name
         submitters = list(_submitters(own))
         problem = "" if submitters else f"is nobody's in {_GRADESCOPE_LIST}, expected its submitters there."
-        if "/" in name or not path.is_dir():
+        if name not in there:
             problem = f"is in {_GRADESCOPE_LIST} and not beside it, expected a folder of that name."
         when = own.get(":created_at") if isinstance(own, dict) else None
         for student in submitters or [NOBODY]:
-            yield StudentFiles(shown(name), student, path, submitted_at=_moment(when), problem=problem)
+            yield StudentFiles(shown(name), student, folder / name, submitted_at=_moment(when), problem=problem)
 
 
 def _submitters(own: object) -> Iterator[Student]:
@@ -140,8 +140,8 @@ def _moment(written: object) -> datetime | None:
 
 def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
     """Whether there are folders of students, and in each of those nothing but folders of assignments."""
-    inside = [entry for student in entries if student.is_dir() for entry in _visible(student)]
-    folders_alone = all(entry.is_dir() for entry in (*entries, *inside))
+    inside = [entry for student in entries if _is_folder(student) for entry in _visible(student)]
+    folders_alone = all(_is_folder(entry) for entry in (*entries, *inside))
     timed = any((entry / _NBGRADER_TIME).is_file() for entry in inside)
     return bool(inside) and folders_alone and (timed or folder.name == _NBGRADER)
 
@@ -154,6 +154,10 @@ def _nbgrader(entries: Sequence[Path]) -> Iterator[StudentFiles]:
             when = _beginning(stamp) if stamp.is_file() else ""
             source = shown(f"{student.name}/{own.name}")
             yield StudentFiles(source, Student(student.name), files, assignment=own.name, submitted_at=_moment(when))
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
 
 
 def _beginning(path: Path) -> str:

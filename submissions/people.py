@@ -57,6 +57,11 @@ class Refusal:
     student: Student = NOBODY
     assignment: str = ""
 
+    @property
+    def sentence(self) -> str:
+        """What came in and why it was refused, for where the student stands beside it."""
+        return f"{self.source}: {self.reason}" if self.source != self.student.id else self.reason
+
 
 @dataclass(frozen=True, slots=True)
 class People:

@@ -169,6 +169,9 @@ submission_90002:
   :submitters:
   - :name: Eve Adams
     :email: eve@uni.example
+"..":
+  :submitters:
+  - :name: Mallory
 """
 
 
@@ -184,7 +187,7 @@ def test_gradescopes_export_goes_by_its_list(tmp_path: Path) -> None:
     assert [request.source for request in contents.grading_requests] == ["submission_90000"] * 2 + ["submission_90001"]
     when = {str(request.submitted_at) for request in contents.grading_requests}
     assert when == {"2026-11-19 16:03:18+00:00"}
-    assert set(refused(contents)) == {"eve@uni.example", "submission_90003"}
+    assert set(refused(contents)) == {"eve@uni.example", "submission_90003", "Mallory"}
     assert "not beside it" in refused(contents)["eve@uni.example"]
     assert "nobody's" in refused(contents)["submission_90003"]
 

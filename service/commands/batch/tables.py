@@ -58,7 +58,7 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
         )
     for refusal in refusals:
         whose = who(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
-        table.add_row(*whose, "", "", Text(f"not taken in: {refusal.reason}", style="red"), "")
+        table.add_row(*whose, "", "", Text(f"not taken in: {refusal.sentence}", style="red"), "")
     return table
 
 

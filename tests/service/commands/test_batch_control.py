@@ -208,7 +208,7 @@ def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:
     for words, expected in [
         (("policy", "--due", "soon"), "expected a date"),
         (("extend", "ada"), "say what to allow"),
-        (("policy", "--attempts", "0"), "range"),
+        (("policy", "--attempts", "0"), "greater than or equal to 1"),
         (("extend", "adda", "--more-attempts", "1"), 'did you mean "ada"?'),
         (("extend", "ada", "-a", "json-que", "--more-attempts", "1"), 'did you mean "json-queue"?'),
         (("policy", "-a", "jsonqueue", "--attempts", "1"), 'did you mean "json-queue"?'),

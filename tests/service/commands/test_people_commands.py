@@ -57,7 +57,7 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
     for row in (
         r"^Ada Lovelace .* 10 / 10 +finished",
         r"^Alan Turing .* 6 / 10 +finished; no responder\.py",
-        r"^Zoë Ångström .* not taken in: has no robot\.py or responder\.py \(found report\.docx\)",
+        r"^Zoë Ångström .* not taken in: Zoë Ångström_500002_assignsubmission_file: has no robot\.py or responder\.py",
     ):
         assert re.search(row, status, re.MULTILINE), status
     filled, feedback = tmp_path / "filled.csv", tmp_path / "feedback.zip"
