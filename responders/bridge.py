@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from responders import message_format, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
+from responders.link import link_of
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child
@@ -59,7 +60,8 @@ class Bridge:
         self.now = 0
         self.chain = Chain()
         self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
-        self.conversation = Conversation(spec.channel, spec.seed, self.chain)
+        link = link_of(spec.channel, arena, lambda: self.world.pose)
+        self.conversation = Conversation(spec.channel, spec.seed, self.chain, link)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
@@ -265,10 +267,10 @@ class Bridge:
         sent = self.conversation.send(text, self.now)
         for copy in range(sent.copies):
             if self._responder is not None:
-                answer = self._responder.answer(text, self.now, sent.message, self.collected())
+                answer = self._responder.answer(sent.text, self.now, sent.message, self.collected())
             else:
                 self._meter.keep(len(_PINGPONG) + len(text))
-                answer = Answer(_PINGPONG + text)
+                answer = Answer(_PINGPONG + sent.text)
             self.conversation.answer(sent, copy, answer)
         return sent.message
 

@@ -89,6 +89,7 @@ def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], san
         touches=tuple(world.touches),
         faults=faults,
         obstacles=world.obstacles,
+        beacon=spec.channel.beacon,
         label_patches=spec.floor.label_patches,
         sheet=spec.floor.sheet,
         robot=spec.robot.name,

@@ -100,6 +100,16 @@ class Arena:
         nearest = min(hit[2] for hit in hits)
         return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
 
+    def stands_between(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Whether the straight way from one place to another, mm, meets an edge of the floor or of an obstacle.
+
+        Walls and obstacles are higher than whatever looks across, so the height of the ray makes no difference.
+        """
+        ray = [(x * _METRE, y * _METRE, 0.0) for x, y in (start, end)]
+        edges = _HORIZONTAL | _VERTICAL
+        ((body, *_),) = pb.rayTestBatch(ray[:1], ray[1:], collisionFilterMask=edges, physicsClientId=self._client.id)
+        return bool(body >= 0)
+
     def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """The names of the walls and obstacles that the robot's body overlaps, or comes within half a millimetre of."""
         near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + _TOUCH]

@@ -148,12 +148,18 @@ class Line:
     text: str
 
 
+#: Why the channel lost a text; empty where it did not.
+LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One text that crossed the bridge.
 
     ``t`` is when it was sent; ``delivered`` when it arrived, None if it never did. ``reply_to`` is the index, in
     the recording's messages, of the text that it answers. ``note`` says what befell it: lost, duplicated, malformed.
+    ``distance`` (mm) and ``angle`` (degrees, to the left above 0) are from the robot to the other end of an infrared
+    link when the text set out or, of an answer, when it came or was lost.
     """
 
     t: float
@@ -162,6 +168,15 @@ class Message:
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
+    lost: LossReason = ""  # recordings of earlier releases say so in their note alone
+    distance: float | None = None
+    angle: float | None = None
+    arrived_as: str | None = None  # where the channel corrupted it
+
+    @property
+    def received(self) -> str:
+        """The text as it arrived, if it did."""
+        return self.text if self.arrived_as is None else self.arrived_as
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,6 +272,7 @@ class Recording:
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    beacon: tuple[float, float] | None = None  # the other end of an infrared link
     label_patches: bool = True  # whether the floor showed its grey label patches
     sheet: int = 0  # the seed of the digits on it, for a digit sheet
     robot: str = "Default_Robot"

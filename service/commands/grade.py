@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +14,21 @@ import typer
 from rich.console import Console
 
 from responders.sandbox.zygote import FULL, NONE
+from service.commands.channel_flags import (
+    BeaconFlag,
+    BlockedByFlag,
+    CorruptionFlag,
+    DelayFlag,
+    DuplicationFlag,
+    FacingFlag,
+    JitterFlag,
+    LinkFlag,
+    LossFlag,
+    RangeFlag,
+    ReorderingFlag,
+    changed,
+    given_flags,
+)
 from service.commands.format_option import format_option
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
@@ -41,6 +58,17 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
+    link: LinkFlag = None,
+    beacon: BeaconFlag = None,
+    reach: RangeFlag = None,
+    facing: FacingFlag = None,
+    blocked_by: BlockedByFlag = None,
+    loss: LossFlag = None,
+    delay: DelayFlag = None,
+    jitter: JitterFlag = None,
+    duplication: DuplicationFlag = None,
+    reordering: ReorderingFlag = None,
+    corruption: CorruptionFlag = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
@@ -57,6 +85,19 @@ def grade(
     rows: list[TableRow[Grade]] = []
     if report is not None:
         prepare_folder(report)
+    given = given_flags(
+        link=link,
+        beacon=beacon,
+        range=reach,
+        facing=facing,
+        blocked_by=blocked_by,
+        loss=loss,
+        delay=delay,
+        jitter=jitter,
+        duplication=duplication,
+        reordering=reordering,
+        corruption=corruption,
+    )
     near = _like_others(submissions) if report is not None else {}
     secret = secret_here(load_settings())
     worst: RobomarkError | None = None
@@ -68,7 +109,8 @@ def grade(
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
-                graded = grade_submission(submission, asked, secret=secret, runner=runner)
+                graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
+                graded = replace(graded, notes=(*_tried(given), *graded.notes))
             except RobomarkError as error:
                 refused = isinstance(error, UsageError)
                 who = Student(shown_name(named_by(path)))
@@ -94,6 +136,21 @@ def grade(
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")
+
+
+def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
+    """The assignment with the channel of the flags in every scenario: another one, for it marks otherwise."""
+    if not given:
+        return asked
+    scenarios = tuple(replace(each, channel=changed(each.channel, given)) for each in asked.scenarios)
+    version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
+    return replace(asked, scenarios=scenarios, version=version)
+
+
+def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
+    """What a grade must say of itself when flags have changed what it was made with."""
+    words = ", ".join(f"{name} {value}" for name, value in given.items())
+    return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
 
 
 def _print(form: Format, graded: Grade) -> None:

@@ -15,11 +15,27 @@ from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from service.commands.channel_flags import (
+    BeaconFlag,
+    BlockedByFlag,
+    CorruptionFlag,
+    DelayFlag,
+    DuplicationFlag,
+    FacingFlag,
+    JitterFlag,
+    LinkFlag,
+    LossFlag,
+    RangeFlag,
+    ReorderingFlag,
+    changed,
+    given_flags,
+)
 from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
+from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
@@ -79,6 +95,17 @@ def run(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
+    link: LinkFlag = None,
+    beacon: BeaconFlag = None,
+    reach: RangeFlag = None,
+    facing: FacingFlag = None,
+    blocked_by: BlockedByFlag = None,
+    loss: LossFlag = None,
+    delay: DelayFlag = None,
+    jitter: JitterFlag = None,
+    duplication: DuplicationFlag = None,
+    reordering: ReorderingFlag = None,
+    corruption: CorruptionFlag = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     diagrams: Annotated[
@@ -105,6 +132,22 @@ def run(
         "P": pen_colour,
     }
     switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
+    channel = changed(
+        Channel(),
+        given_flags(
+            link=link,
+            beacon=beacon,
+            range=reach,
+            facing=facing,
+            blocked_by=blocked_by,
+            loss=loss,
+            delay=delay,
+            jitter=jitter,
+            duplication=duplication,
+            reordering=reordering,
+            corruption=corruption,
+        ),
+    )
     wanted = Flags(switches=frozenset(switches)).with_values(**values)
     if unsafe:
         warn_of_no_sandbox()
@@ -112,7 +155,7 @@ def run(
     if notebook is not None:
         if responder is not None:
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
-        last = LastRun(wanted, seed, seed if sheet is None else sheet)
+        last = LastRun(wanted, seed, seed if sheet is None else sheet, channel)
         limits = RunLimits(_RESPONDER, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
             executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
@@ -134,7 +177,7 @@ def run(
         robot=robot(chosen.robot),
         pose=chosen.pose,
         noise=Noise(chosen.light_noise, chosen.motor_noise),
-        channel=Channel(),
+        channel=channel,
         seconds=seconds,
         seed=seed,
         child_seed=seed,
@@ -222,8 +265,10 @@ def _show(recording: Recording) -> None:
     """What was printed, spoken and answered, in order, and how it ended."""
     shown = [(line.t, 0, line.text) for line in recording.printed]
     shown += [(line.t, 1, f"(says) {line.text}") for line in recording.spoken]
+    lost = [message for message in recording.messages if message.lost]
+    shown += [(message.t, 2, f"(lost) {message.text}: {befell_in_full(message)}") for message in lost]
     shown += [
-        (message.delivered, 2, f"(answer) {message.text}")
+        (message.delivered, 2, f"(answer) {message.received}")
         for message in recording.messages
         if message.sender == "responder" and message.delivered is not None
     ]

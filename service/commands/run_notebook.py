@@ -47,6 +47,7 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
+    channel: Channel
 
 
 def run_notebook(
@@ -67,7 +68,7 @@ def run_notebook(
             robot=robot(wanted.robot),
             pose=wanted.pose,
             noise=Noise(wanted.light_noise, wanted.motor_noise),
-            channel=Channel(),
+            channel=last.channel,
             seconds=limits.seconds,
             seed=last.seed,
             child_seed=last.seed,

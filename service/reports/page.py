@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
@@ -16,7 +17,7 @@ from service.reports.plots.plot import Plot
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial
-from service.reports.words import VerdictWords, cost_words, grade_words, verdict_words
+from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
 from sim.recording import Fault, Message, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -113,6 +114,7 @@ class Page:
     trials: tuple[TrialLine, ...]
     more_trials: int
     notes: tuple[str, ...]
+    channel: str
     cost: str
     weak_sandbox: bool
     staff: bool
@@ -143,6 +145,7 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
+        channel=channel_words(grade),
         cost=cost_words(grade),
         weak_sandbox=PROCESS_LIMITS in grade.sandbox,
         staff=view.staff,
@@ -231,9 +234,10 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
 def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
     for message in messages:
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
-        if message.note:
-            arrived += f" ({one_line(message.note, 40)})"
-        wrong = message.delivered is None or bool(message.note)
+        happened = befell_in_full(message)
+        if happened:
+            arrived += f" ({happened})"
+        wrong = message.delivered is None or bool(happened)
         yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
 
 

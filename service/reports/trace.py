@@ -30,6 +30,10 @@ def trace(recording: Recording) -> dict[str, Any]:
                 "delivered": None if message.delivered is None else _finite(message.delivered),
                 "reply_to": message.reply_to,
                 "note": message.note,
+                "lost": message.lost,
+                "distance": message.distance,
+                "angle": message.angle,
+                "arrived_as": None if message.arrived_as is None else storable(message.arrived_as),
             }
             for message in recording.messages
         ],

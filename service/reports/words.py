@@ -5,13 +5,14 @@ It knows no marks and no particular trial; the faults of a recording say where a
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
 from service.grading.grade import Grade
-from sim.recording import Verdict
+from sim.recording import LossReason, Verdict
 
 Tone = Literal["good", "notice", "bad"]
 _MEGABYTE = 1 << 20
@@ -119,6 +120,16 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
 )
 
 
+_LOSSES: Mapping[LossReason, str] = MappingProxyType(
+    {
+        "chance": "by chance",
+        "out of range": "because the robot was out of range",
+        "facing away": "because it faced away",
+        "blocked": "because a wall or an obstacle stood between",
+    }
+)
+
+
 def verdict_words(verdict: Verdict) -> VerdictWords:
     """The words for ``verdict``; every verdict has some."""
     return _WORDS[verdict]
@@ -175,6 +186,17 @@ def accuracy_words(grade: Grade) -> str:
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
         f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
     )
+
+
+def channel_words(grade: Grade) -> str:
+    """A sentence or two on what the channel lost in all trials, and why; empty where it lost nothing."""
+    messages = [message for trial in grade.trials for message in trial.recording.messages]
+    lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
+    if not lost:
+        return ""
+    reasons = ", ".join(f"{lost[reason]} {words}" for reason, words in _LOSSES.items() if lost[reason])
+    fair = " What was lost by chance is held against nobody." if lost["chance"] else ""
+    return f"The channel lost {lost.total()} of {len(messages)} messages: {reasons}.{fair}"
 
 
 def cost_words(grade: Grade) -> str:

@@ -96,6 +96,9 @@ def from_bytes(data: bytes) -> Recording:
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pixels)
         words = {_FORMERLY.get(name, name): value for name, value in words.items()}
+        for message in words.get("messages", ()):
+            if message.get("note") == "lost":  # earlier releases knew no other reason
+                message.setdefault("lost", "chance")
         return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error

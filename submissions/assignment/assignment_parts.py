@@ -17,6 +17,7 @@ from responders import library
 from responders.channel import Channel
 from sim.errors import UsageError
 from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
+from sim.motion import gap
 from sim.recording import Pose
 from sim.robot import usual_robot
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
@@ -60,6 +61,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
+    _clear_beacons(scenarios, world, problems)
     around = Surroundings(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
@@ -207,6 +209,15 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
     )
+
+
+def _clear_beacons(scenarios: Sequence[Scenario | None], world: WorldSpec | None, problems: Problems) -> None:
+    """Names a beacon that stands within an obstacle, which would block every way to it."""
+    for number, scenario in enumerate(scenarios):
+        beacon = scenario.channel.beacon if scenario and scenario.channel.blocked_by == "obstacles" else None
+        if world and beacon and any(gap(box, *beacon) == 0 for box in world.obstacles):
+            sentence = "beacon is in an obstacle, which blocks every way to it, expected a place beside them"
+            problems.add(("scenario", number, "channel", "beacon"), sentence)
 
 
 def _nobodys(parts: PartsTable | None) -> frozenset[str]:

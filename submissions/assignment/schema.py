@@ -10,13 +10,13 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from sim.floors import OBSTACLE_PRESETS
+from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.strict_table import Shape, StrictTable
@@ -96,13 +96,31 @@ class PartsTable(StrictTable):
 
 
 class ChannelTable(StrictTable):
-    """What becomes of messages on their way: delays in seconds, the rest as probabilities."""
+    """What becomes of messages on their way: delays in seconds, shares as probabilities, an infrared link in mm."""
+
+    link: Literal["cable", "infrared"] = "cable"
+    beacon: Annotated[tuple[float, float], Shape("[x, y]")] | None = None
+    range: float = Field(default=600.0, gt=0, le=5000)
+    facing: float = Field(default=90.0, gt=0, le=360)
+    blocked_by: Literal["obstacles", "nothing"] = "obstacles"
 
     delay: float = Field(default=0.1, ge=0, le=60)
     jitter: float = Field(default=0.0, ge=0, le=60)
     loss: float = Field(default=0.0, ge=0, le=1)
     duplication: float = Field(default=0.0, ge=0, le=1)
     reordering: float = Field(default=0.0, ge=0, le=1)
+    corruption: float = Field(default=0.0, ge=0, le=1)
+
+    @model_validator(mode="after")
+    def _reaches(self) -> Self:
+        needless = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
+        if self.link == "cable" and needless:
+            raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
+        if self.link == "infrared" and self.beacon is None:
+            raise ValueError('has link = "infrared" and nothing at its other end, expected beacon = [x, y] beside it')
+        if self.beacon is not None and not (0 < self.beacon[0] < WIDTH and 0 < self.beacon[1] < HEIGHT):
+            raise ValueError(f"has its beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
+        return self
 
 
 class SweepTable(StrictTable):

@@ -41,7 +41,7 @@ SECTIONS = dict(
     re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", (ROOT / "docs" / "criteria.md").read_text(), re.DOTALL | re.MULTILINE)
 )
 #: Kinds whose settings are explained with another kind.
-SHARES = {"says": ("prints",), "messages": ("prints",), "replies": ("prints",)}
+SHARES = dict.fromkeys(("says", "messages", "replies", "resends", "in_reach"), ("prints",))
 
 
 def commands(document: Path) -> Iterator[list[str]]:

@@ -13,6 +13,7 @@ import pytest
 
 from models import weights_bytes
 from paths import HELPERS
+from responders.channel import Channel
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
@@ -36,12 +37,30 @@ for i in range(20):
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
+CALL_ROUND = """
+import time
+import ev3dev2_glue as glue
+tank_turn.on(-100, 10)
+for i in range(40):
+    print("PY::" + str(i))
+    time.sleep(0.3)
+    print(glue.pyState()["messages"])
+"""
+ANSWER = "def responder(text):\n    return 'JSON::[\"' + text + '\"]'\n"
+INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 600.0, 120.0)
+
+
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 images."""
+    """The hash of one of three runs: a noisy line follower of 60 s, a conversation of 20 images, one by infrared."""
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
         assert recording.verdict is Verdict.TIME_LIMIT
         assert len(recording.ticks) == 1800
+    elif name == "infrared":
+        start = Pose(1100, 571, 0)
+        recording = run_program(runner, CALL_ROUND, start, noise=Noise(motor=20), responder=ANSWER, channel=INFRARED)
+        assert {message.lost for message in recording.messages} >= {"", "chance", "facing away"}
+        assert any(message.arrived_as for message in recording.messages)
     else:
         recording = run_program(
             runner,
@@ -57,6 +76,7 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
+RUNS = ("follower", "talk", "infrared")
 WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys
@@ -69,13 +89,13 @@ ELSEWHERE = textwrap.dedent("""
 
 
 def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    here = {name: chain(name, runner) for name in ("follower", "talk")}
+    here = {name: chain(name, runner) for name in RUNS}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
             pair = []
             for half in range(2):
-                names = ["follower", "talk"]
+                names = list(RUNS)
                 random.Random(number * 2 + half).shuffle(names)
                 command = [sys.executable, "-c", ELSEWHERE, *names]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=WITH_TESTS))

@@ -25,6 +25,8 @@ from submissions.criteria.ending import Finishes
 
 HEAD = 'id = "a"\ntitle = "A"\n'
 SCENARIO = '[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'
+INFRARED = 'channel = {{ link = "infrared", beacon = {} }}\n'
+POST = HEAD + '[world]\nobstacles = "Central_post"\n'
 FINISHES = '[[criterion]]\ntitle = "Ends"\nmarks = 1\ncheck = "finishes"\n'
 
 
@@ -267,6 +269,12 @@ check = "pose"
         (HEAD + SCENARIO + FINISHES + "marks = 2\n", 10, "this key is given twice"),
         (HEAD + SCENARIO + "channel = { los = 1 }\n" + FINISHES, 6, 'did you mean "loss"?'),
         (HEAD + SCENARIO + "channel = { loss = 1.5 }\n" + FINISHES, 6, "expected at most 1"),
+        (HEAD + SCENARIO + "channel = { facing = 90 }\n" + FINISHES, 6, "facing and no link that it limits, expected"),
+        (HEAD + SCENARIO + 'channel = { link = "infrared" }\n' + FINISHES, 6, "expected beacon = [x, y] beside it"),
+        (HEAD + SCENARIO + INFRARED.format("[3000, 50]") + FINISHES, 6, "has its beacon off the floor, expected"),
+        (HEAD + SCENARIO + INFRARED.format("[100]") + FINISHES, 6, "too few numbers, expected [x, y]"),
+        (POST + SCENARIO + INFRARED.format("[1000, 510]") + FINISHES, 8, "beacon is in an obstacle, which blocks"),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "in_reach"), 9, 'expected link = "infrared" in scenario "s"'),
         (HEAD + SCENARIO + "seconds = nan\n" + FINISHES, 6, "expected a finite number"),
         (HEAD + SCENARIO + "seconds = 1979-05-27\n" + FINISHES, 6, "expected a number"),
         (HEAD + SCENARIO + "trials = true\n" + FINISHES, 6, "expected a whole number"),

@@ -5,14 +5,15 @@ The texts are a student's, patterns are the instructor's; no pair of them takes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from responders.message_format import JSON, PY
 from service.grading.grade import TrialResult
-from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed
 from service.grading.judging.judges import judges
+from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import listed, quoted
 from sim.recorded import pose_at
@@ -33,6 +34,7 @@ class Deed:
 #: How conditions begin that are more than quoted texts.
 _SOMETHING = "something that "
 
+_EXCUSED = "What the channel lost by chance counts as received."
 _PRINT = Deed("the program", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
 _SEND = Deed("the robot", "send", "sent")
@@ -211,60 +213,100 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
         sent = [Line(message.t, message.text) for message in recording.messages if message.sender == "robot"]
         return judge_sequence(criterion, sent, _SEND, recording)
-    queue = []
-    for message in _queue(recording):
-        value = parsed(message.text)
-        value = value if criterion.path is None else at_path(value, criterion.path)
+    arrived = [message for message in recording.messages if _joined(message)]
+    as_arrived = [(message.delivered or 0.0, message.received) for message in arrived]
+    outcome = judge_sequence(criterion, _lines(criterion, as_arrived), _RECEIVE, recording)
+    astray = [message for message in recording.messages if message.sender == "responder" and by_chance(message)]
+    if outcome.passed or not astray:
+        return outcome
+    # As if chance had done nothing to the answers: the program cannot help what it did.
+    as_answered = {id(message): (message.delivered or message.t, message.text) for message in (*arrived, *astray)}
+    excused = judge_sequence(criterion, _lines(criterion, as_answered.values()), _RECEIVE, recording)
+    if excused.score <= outcome.score:
+        return outcome
+    return replace(excused, message=f"{excused.message} {_EXCUSED}")
+
+
+def _lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[Line]:
+    """What joins the robot's queue of answers with their times, in the order of these; of each what is asked for."""
+    lines = []
+    for t, text in sorted(answers, key=lambda answer: answer[0]):
+        value = parsed(text)
+        value = value if value is NOTHING or criterion.path is None else at_path(value, criterion.path)
         if value is not NOTHING:
-            queue.append(Line(message.delivered or 0.0, as_text(value)))
-    return judge_sequence(criterion, queue, _RECEIVE, recording)
-
-
-def _queue(recording: Recording) -> list[Message]:
-    """What joined the robot's queue, in order of arrival."""
-    return sorted(filter(_joined, recording.messages), key=lambda message: message.delivered or 0.0)
+            lines.append(Line(t, as_text(value)))
+    return lines
 
 
 def _joined(message: Message) -> bool:
     """Whether it is an answer that joined the robot's queue."""
-    well_formed = message.text.startswith(JSON) and message.note != "malformed"
-    return message.sender == "responder" and message.delivered is not None and well_formed
+    if message.sender != "responder" or message.delivered is None:
+        return False
+    if message.arrived_as is not None:
+        return is_json_answer(message.arrived_as)
+    return message.text.startswith(JSON) and message.note != "malformed"
 
 
 def _queue_grows(recording: Recording) -> Outcome:
-    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending."""
-    asked = [
+    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending.
+
+    An answer that the channel lost by chance, or that came when the message was sent again, is not missed.
+    """
+    sent = [
         (index, message)
         for index, message in enumerate(recording.messages)
-        if message.sender == "robot" and message.text.startswith(PY) and message.delivered is not None
+        if message.sender == "robot" and message.text.startswith(PY)
     ]
+    asked = [(index, message) for index, message in sent if message.delivered is not None]
     expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
     if not asked:
-        return failed(f"{expected}, but the robot sent no PY:: message.")
+        astray = next((message for _, message in sent if out_of_reach(message)), None)
+        if sent and not astray:
+            return passed("The channel lost every PY:: message by chance, so there was nothing to queue up.")
+        lost = f"the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
+        return failed(f"{expected}, but {lost or 'the robot sent no PY:: message'}.")
     answers = Answers(recording)
-    replies = [(message, answers.to(index)) for index, message in asked]
+    replies = [(message, _reply(answers, index)) for index, message in asked]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
+    came = {message.text for message, reply in replies if reply is not None and _joined(reply)}
     # A message that is sent again shows nothing new.
     different = {message.text for _, message in asked}
-    failing = {message.text for message, reply in replies if reply is None or not _joined(reply)}
-    score = Fraction(len(different) - len(failing), len(different))
-    for message, reply in replies:
-        if reply is None or not _joined(reply):
-            happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
-            if reply is not None and reply.delivered is None and reply.note == "undelivered":
-                happened = "got its answer only after the program had ended"
-            return failed(
-                f"{expected}, but {quoted(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
-                message.t,
-                pose_at(recording, message.t),
-                score,
-            )
+    missed = [(message, reply) for message, reply in replies if not _excused(message, reply, came)]
+    score = Fraction(len(different - {message.text for message, _ in missed}), len(different))
+    for message, reply in missed:
+        happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
+        if reply is not None and reply.delivered is None and reply.note == "undelivered":
+            happened = "got its answer only after the program had ended"
+        if reply is not None and out_of_reach(reply):
+            happened = f"was answered and the channel lost the answer ({loss_words(reply)})"
+        return failed(
+            f"{expected}, but {quoted(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
+            message.t,
+            pose_at(recording, message.t),
+            score,
+        )
+    if not arrivals:
+        return passed("The channel lost every answer by chance.")
     times = [arrived or 0.0 for arrived in arrivals]
     if times != sorted(times):
         return failed(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
     return passed(
-        f"The robot's queue grew by one for each of {len(asked)} messages.", times[-1], pose_at(recording, times[-1])
+        f"The robot's queue grew by one for each of {len(arrivals)} messages.",
+        times[-1],
+        pose_at(recording, times[-1]),
     )
+
+
+def _reply(answers: Answers, index: int) -> Message | None:
+    """The answer to a message that joined the queue, of several copies the first; else the first that there is."""
+    return next(filter(_joined, answers.all_to(index)), answers.to(index))
+
+
+def _excused(message: Message, reply: Message | None, came: Container[str]) -> bool:
+    """Whether a message's answer is in the queue, or not there because of the channel alone."""
+    if reply is None:
+        return False
+    return _joined(reply) or by_chance(reply) or (out_of_reach(reply) and message.text in came)
 
 
 def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:

@@ -16,6 +16,7 @@ from service.reports.readable import json_number
 from service.reports.rows import TableRow
 from service.reports.trace import storable
 from service.reports.view import View, staff_view
+from sim.recording import Message
 
 SCHEMA = 1
 
@@ -47,10 +48,7 @@ def json_document(view: View) -> dict[str, Any]:
                 "verdict": trial.verdict.value,
                 "sha256": trial.recording.sha256,
                 "spoken": [storable(line.text) for line in trial.recording.spoken],
-                "messages": [
-                    {"t": message.t, "sender": message.sender, "text": storable(message.text)}
-                    for message in trial.recording.messages
-                ],
+                "messages": [_message(message) for message in trial.recording.messages],
             }
             for trial in grade.trials
         ],
@@ -86,6 +84,18 @@ def _of_several(row: TableRow[View]) -> dict[str, Any]:
         none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
         return {**who, **why, **none}
     return {**who, **why, **json_document(row.grade)}
+
+
+def _message(message: Message) -> dict[str, Any]:
+    """A text with its time; where the channel lost or corrupted it, what it did and where the robot was."""
+    words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": storable(message.text)}
+    if message.lost:
+        words["lost"] = message.lost
+        if message.distance is not None:
+            words |= {"distance": message.distance, "angle": message.angle}
+    if message.arrived_as is not None:
+        words["arrived_as"] = storable(message.arrived_as)
+    return words
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

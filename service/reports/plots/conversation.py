@@ -35,6 +35,7 @@ _FIRST = 0.28  # from there to the robot's lane
 _EDGE = 0.42  # from the last lane to the right edge
 _LANE_HEADS = 0.44
 _CHARACTERS = 14.9  # of 8 point type that fit into an inch
+_BOLD_CHARACTERS = 12.6  # of the bold words for what befell a message
 _LINE = 0.131  # inches a line of a label takes
 _ARROW = 0.15  # inches below a label that its arrow takes
 _NARROWEST = 1.5  # inches that a label may take, even if its arrow is shorter
@@ -152,7 +153,8 @@ def _arrow(axes: Axes, step: Step, source: float, target: float, y: float) -> No
     if crossing and step.source == "responder" and step.kind == "message":
         colour = RIGHT
     if step.kind == "lost":
-        stop = source + 0.62 * (target - source)
+        room = 1 - (0.16 + len(step.note) / _BOLD_CHARACTERS) / abs(target - source)
+        stop = source + min(0.62, room) * (target - source)
         axes.plot([source, stop], [y, y], color=colour, linewidth=1.3, linestyle=(0, (1.2, 1.6)))
         axes.plot([stop], [y], "x", color=colour, markersize=6.5, markeredgewidth=1.9)
         axes.text(

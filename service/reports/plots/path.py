@@ -6,7 +6,10 @@ The floor is an image that the caller gives; nothing here knows how floors are m
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -50,6 +53,9 @@ _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is sh
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
 _OFF_THE_FLOOR = "#a3aab1"
 _DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
+_BEACON: Mapping[str, Any] = MappingProxyType(
+    {"marker": "*", "linestyle": "none", "markersize": 12, "color": RIGHT, "markeredgecolor": INK}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +96,7 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     axes.set_facecolor(_OFF_THE_FLOOR)
     draw_floor(axes, floor, view)
     _draw_obstacles(axes, recording)
+    _draw_beacon(axes, recording)
     _draw_trace(axes, recording, points)
     _draw_robot(axes, recording.start, recording, dashed=True)
     _draw_robot(axes, recording.end, recording, dashed=False)
@@ -129,8 +136,9 @@ def _points(recording: Recording) -> NDArray[np.float64]:
 
 def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
     reach = robot_of(recording).reach
-    low_x, low_y = (float(value) for value in points[:, :2].min(axis=0))
-    high_x, high_y = (float(value) for value in points[:, :2].max(axis=0))
+    places = points[:, :2] if recording.beacon is None else np.vstack((points[:, :2], [recording.beacon]))
+    low_x, low_y = (float(value) for value in places.min(axis=0))
+    high_x, high_y = (float(value) for value in places.max(axis=0))
     margin = max(_MARGIN, reach + 15)
     view = Viewport(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
     if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
@@ -181,6 +189,11 @@ def _draw_obstacles(axes: Axes, recording: Recording) -> None:
         axes.add_patch(
             Rectangle((x, y), width, height, facecolor="#c8cdd2", edgecolor=INK, hatch="////", linewidth=0.9)
         )
+
+
+def _draw_beacon(axes: Axes, recording: Recording) -> None:
+    if recording.beacon is not None:
+        axes.plot(*([value] for value in recording.beacon), **_BEACON, zorder=5)
 
 
 def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64]) -> None:
@@ -332,6 +345,8 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
         handles.append(
             Line2D([], [], marker="x", linestyle="none", markersize=7, color=FAULT, markeredgewidth=2, label="touch")
         )
+    if recording.beacon is not None:
+        handles.append(Line2D([], [], **_BEACON, label="beacon"))
     if recording.obstacles:
         handles.append(Patch(facecolor="#c8cdd2", edgecolor=INK, hatch="////", label="obstacle"))
     if min(view.left, view.bottom) < -30 or view.right > FLOOR_WIDTH + 30 or view.top > FLOOR_HEIGHT + 30:

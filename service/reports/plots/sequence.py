@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.reports.crossing import befell, out_of_reach_by
 from service.reports.readable import message_words, one_line
 from sim.recording import Call, Message, Recording
 
@@ -67,7 +68,8 @@ def conversation(
 ) -> SequenceDiagram:
     """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
 
-    Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
+    Kept are the first exchanges and, of the later ones, those in which what was sent again got through, or something
+    was lost or wrong.
     """
     exchanges = _exchanges(recording.messages)
     kept = _chosen(recording, exchanges, most_exchanges, most_steps)
@@ -91,7 +93,7 @@ def conversation(
 
 def troubled(message: Message) -> bool:
     """Whether a message was lost, never arrived, or could not be read."""
-    return message.delivered is None or bool(message.note)
+    return message.delivered is None or bool(befell(message))
 
 
 def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
@@ -111,7 +113,8 @@ def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
 def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
     wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(recording, exchange)]
     half = most_exchanges - most_exchanges // 2
-    order = dict.fromkeys([*range(min(half, len(exchanges))), *wrong, *range(len(exchanges))])
+    first = range(min(half, len(exchanges)))
+    order = dict.fromkeys([*first, *_got_through(recording, exchanges, wrong), *wrong, *range(len(exchanges))])
     kept: set[int] = set()
     steps = 0
     for number in list(order)[:most_exchanges]:
@@ -120,6 +123,19 @@ def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges
             break
         kept.add(number)
     return kept
+
+
+def _got_through(recording: Recording, exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
+    """The exchanges in which a text that was sent before, and went astray, got through."""
+    astray: set[str] = set()
+    failed = set(wrong)
+    for number, exchange in enumerate(exchanges):
+        text = recording.messages[exchange.sent].text if exchange.sent is not None else ""
+        if number in failed:
+            astray.add(text)
+        elif text in astray:
+            astray.discard(text)
+            yield number
 
 
 def _went_wrong(recording: Recording, exchange: _Exchange) -> bool:
@@ -151,7 +167,9 @@ def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, li
 
 def _crossing(message: Message) -> Step:
     source, target = ("robot", "responder") if message.sender == "robot" else ("responder", "robot")
-    label, note = message_words(message.text, 90), one_line(message.note, 30)
+    label, note = message_words(message.text, 90), befell(message)
+    reach = out_of_reach_by(message)
+    label = f"{label} ({reach})" if reach else label
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
     shown_at = message.t if message.sender == "robot" else message.delivered

@@ -46,6 +46,26 @@ def test_json_has_exactly_the_keys_of_the_schema() -> None:
     assert document["trials"][4]["spoken"] == ["Is that a diamond"]
 
 
+LOST = (
+    "The channel lost 5 of 6 messages: 1 by chance, 1 because the robot was out of range, 2 because it faced away, "
+    "1 because a wall or an obstacle stood between. What was lost by chance is held against nobody."
+)
+
+
+def test_every_report_says_what_the_channel_lost_and_why() -> None:
+    view = staff_view(build.astray_grade())
+    assert LOST in " ".join(plain_text(view).split())
+    shown = Console(width=400, record=True, file=io.StringIO())
+    shown.print(rich_report(view))
+    assert LOST in shown.export_text()
+    assert LOST in " ".join(report(view, {}).split())
+    messages = json_document(view)["trials"][1]["messages"]
+    assert messages[0] == {"t": 0.1, "sender": "robot", "text": "PY::0", "lost": "chance"}
+    assert (messages[1]["lost"], messages[1]["distance"], messages[1]["angle"]) == ("out of range", 1600.2, 3.0)
+    assert messages[4]["arrived_as"] == "PY::7"
+    assert "The channel" not in plain_text(staff_view(build.line_follower_grade()))
+
+
 def test_json_without_classification_and_with_half_marks() -> None:
     document = json_document(staff_view(build.line_follower_grade()))
     assert document["accuracy"] is None
