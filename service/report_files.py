@@ -16,7 +16,7 @@ from service.reports.html import BatchRow, batch_index, refusal_page, report
 from service.reports.rows import ReportPage, missing_words
 from service.reports.view import staff_view, student_view
 from service.reports.written import file_stems, refused_stems, write_page
-from service.store import intake, plots, policies, results
+from service.store import intake, plots, policies, rankings, results
 from service.store.batches import JobLine
 from service.store.engine import Store
 from service.store.states import PlotState
@@ -86,7 +86,9 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     ]
     sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
     rows.sort(key=lambda row: row.student)
-    return write_page(folder, _INDEX, batch_index(rows, title, sandbox))
+    with store.reading() as session:
+        ranks = rankings.rank_tables(session, lines)
+    return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
 
 
 def _page(store: Store, line: JobLine, grade: Grade) -> tuple[str, Mapping[str, bytes]]:

@@ -23,7 +23,7 @@ from service.reports.readable import one_line, readable
 from service.settings import load_settings
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXAMPLES, REFERENCE
+from submissions.assignment.examples import EXAMPLES, EXPECTED, REFERENCE, add_expected
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import FILE_NAME, catalogue
 from submissions.assignment.reader import find_assignment
@@ -96,13 +96,20 @@ def show(assignment: Which) -> None:
 def check(
     assignment: Annotated[str | None, typer.Argument(help="Its id in the catalogue, or its folder.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="Check the whole catalogue and print one table.")] = False,
+    write_expected: Annotated[
+        bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
+    ] = False,
 ) -> None:
     """Find every mistake in an assignment's files, and grade its examples: do they get what they must?"""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or give --all for the whole catalogue")
+    if everything and write_expected:
+        raise UsageError("name the one assignment whose expectations are to be written")
     with TrialRunner() as runner:
         if assignment is not None:
             checked = [check_examples(assignment, runner=runner)]
+            if write_expected:
+                checked = [_noted(assignment, checked[0])]
             _print_checked(checked[0])
         else:
             checked = [check_examples(name, runner=runner) for name in track(catalogue(), "grading", transient=True)]
@@ -156,6 +163,17 @@ def autograder(
 def _console() -> Console:
     """As wide as the terminal; wide enough for every table where there is none."""
     return Console(width=None if Console().is_terminal else _WIDTH_OF_FILES)
+
+
+def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
+    """As it is with the new expectations, which are written for somebody to read over."""
+    if not checked.unwritten:
+        typer.echo(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
+        return checked
+    with for_the_user():
+        path = add_expected(assignment, checked.unwritten)
+    typer.echo(f"{path}: wrote what {', '.join(checked.unwritten)} got; is it what they must get?")
+    return checked.written()
 
 
 def _print_checked(checked: CheckedAssignment) -> None:

@@ -20,6 +20,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from service.grading.grade import Grade
+from service.grading.ranks import RankTable
 from service.reports.page import page_of
 from service.reports.readable import number, readable
 from service.reports.rows import TableRow
@@ -84,8 +85,10 @@ def refusal_page(row: TableRow[Grade]) -> str:
     )
 
 
-def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "") -> str:
-    """A page with one row a student: marks, verdict, and a link to the report."""
+def batch_index(
+    rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "", ranks: Sequence[RankTable] = ()
+) -> str:
+    """A page with one row a student: marks, verdict, and a link to the report; and the tables of ranks."""
     graded = [row for row in rows if row.marks is not None]
     cells = [
         {
@@ -100,7 +103,7 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "
         }
         for row in rows
     ]
-    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox)
+    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
 
 
 def _render(template: str, **context: object) -> str:

@@ -308,8 +308,10 @@ def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     if kind in _TYPES:
         return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
     if kind == "literal_error":
-        choices = str(context.get("expected", "")).replace("'", '"')
-        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}")
+        choices = str(context.get("expected", ""))
+        hint = did_you_mean(str(details["input"]), re.findall("'(.*?)'", choices))
+        choices = choices.replace("'", '"')
+        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}{hint}")
     bounds = {"greater_than": ("gt", "more than"), "greater_than_equal": ("ge", "at least")}
     bounds |= {"less_than": ("lt", "less than"), "less_than_equal": ("le", "at most")}
     if kind in bounds:

@@ -173,6 +173,7 @@ class PythonCheck(Criterion):
     """
 
     check: Literal["python"]
+    measures: ClassVar[Texts] = ("...",)
     file: Annotated[str, HOLDS_ANSWERS] = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
 
     @property

@@ -5,6 +5,7 @@ No kind of criterion is here; each has a module of its family.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -88,6 +89,8 @@ class Criterion(StrictTable):
 
     #: Whether it looks at runs of the robot; else at the code alone.
     judges_runs: ClassVar[bool] = True
+    #: The figures that it measures in a trial, by name; # stands for a number from 1, ... for any words.
+    measures: ClassVar[Texts] = ()
 
     @property
     def asks_responder(self) -> bool:
@@ -111,6 +114,11 @@ class Criterion(StrictTable):
         """The id of the criterion that has to be judged before it."""
         return None
 
+    def measures_a(self, name: str) -> bool:
+        """Whether it measures a figure of this name."""
+        known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
+        return any(re.fullmatch(each, name) for each in known)
+
     @property
     def python_files(self) -> Texts:
         """The files beside the assignment that are run to judge it."""
@@ -123,3 +131,15 @@ class Criterion(StrictTable):
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """All that it asks and that is not there."""
         yield from ()
+
+
+class AmongMany(Criterion):
+    """One that looks for something among all that a program prints, says, sends or logs.
+
+    Whoever names everything has named what is looked for as well, so strays count: a thing that is looked for and came
+    where it does not belong is one, twenty other things of its sort are another. ``strays`` is how many cost nothing,
+    as many as things are looked for if not given; each further one lowers the score like one more thing that was
+    looked for and did not come.
+    """
+
+    strays: int | None = Field(default=None, ge=0)

@@ -6,11 +6,11 @@ What is sent and answered at all is asked in ``texts.py`` and ``replies.py``.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from submissions.criteria.common import Criterion, Misfit, Surroundings
+from submissions.criteria.common import Criterion, Misfit, Surroundings, Texts
 from submissions.criteria.places import Range
 from submissions.criteria.texts import TextConditions
 
@@ -24,6 +24,7 @@ class Resends(TextConditions):
     """
 
     check: Literal["resends"]
+    measures: ClassVar[Texts] = ("different messages", "tries")
     at_least: int = Field(default=1, ge=1)
     at_most: int | None = Field(default=None, ge=1)
     every: Range = (0.1, 10.0)
@@ -37,6 +38,7 @@ class InReach(TextConditions):
     """
 
     check: Literal["in_reach"]
+    measures: ClassVar[Texts] = ("sent in reach", "sent out of reach")
     at_least: int = Field(default=1, ge=1)
     misses: int = Field(default=0, ge=0)
 

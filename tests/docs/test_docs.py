@@ -32,7 +32,8 @@ from submissions.assignment.schema import (
     WorldTable,
     read_table,
 )
-from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria import SCHEMAS
+from submissions.criteria.common import AmongMany
 
 EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
@@ -130,11 +131,25 @@ def test_every_kind_of_criterion_has_a_section_with_an_example_that_is_in_order(
         assert isinstance(read_table(SCHEMAS[kind], table), SCHEMAS[kind])
 
 
+def test_all_that_can_be_measured_is_listed_and_nothing_else() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (`.*`) \|$", SECTIONS["ranking"], re.MULTILINE)
+    listed = {kind: tuple(re.findall(r"`(.+?)`", names)) for kind, names in rows}
+    assert listed == {kind: schema.measures for kind, schema in SCHEMAS.items() if schema.measures}
+
+
+def test_every_kind_that_looks_among_much_is_named_with_its_strays() -> None:
+    text = re.search(r"^## Naming everything.*?(?=^## )", (ROOT / "docs" / "criteria.md").read_text(), re.M | re.S)
+    assert text is not None
+    assert [
+        kind for kind, schema in SCHEMAS.items() if issubclass(schema, AmongMany) and f"`{kind}`" not in text[0]
+    ] == []
+
+
 @pytest.mark.parametrize("kind", sorted(SCHEMAS))
 def test_every_setting_of_a_criterion_is_explained(kind: str) -> None:
     text = SECTIONS[kind] + "".join(SECTIONS[other] for other in SHARES.get(kind, ()))
     fields = SCHEMAS[kind].model_fields.items()
-    settings = {field.alias or name for name, field in fields if name not in Criterion.model_fields}
+    settings = {field.alias or name for name, field in fields if name not in AmongMany.model_fields}
     assert not {name for name in settings - {"check"} if not re.search(rf"\b{name}\b", text)}
 
 

@@ -28,6 +28,11 @@ SCENARIO = '[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'
 INFRARED = 'channel = {{ link = "infrared", beacon = {} }}\n'
 POST = HEAD + '[world]\nobstacles = "Central_post"\n'
 FINISHES = '[[criterion]]\ntitle = "Ends"\nmarks = 1\ncheck = "finishes"\n'
+LAP = (
+    FINISHES.replace("finishes", "laps")
+    + 'id = "lap"\nline = { on = "Thruxton_Circuit" }\nstart_line = [1, 2, 3, 4]\n[[criterion]]\ntitle = "F"\n'
+)
+RANKING = 'marks = 1\ncheck = "ranking"\nof = "lap"\nmeasure = "lap time"\nsteps = [[50, 1]]\n'
 
 
 def written(folder: Path, text: str, **files: str) -> Path:
@@ -264,6 +269,27 @@ check = "pose"
             HEAD + SCENARIO + FINISHES.replace("finishes", "reports") + 'expected = [["a"], ["b"]]\n',
             10,
             'expected has 2 lists for the 1 poses of scenario "s"',
+        ),
+        (
+            HEAD + SCENARIO + LAP + RANKING.replace("lap time", "laptime"),
+            18,
+            'measure is "laptime", which "lap" (laps) does not measure, expected one of "lap time", "laps", '
+            '"farthest off" or "part of a lap"; did you mean "lap time"?',
+        ),
+        (HEAD + SCENARIO + LAP + RANKING.replace('of = "lap"', 'of = "lapp"'), 17, 'did you mean "lap"?'),
+        (
+            HEAD
+            + SCENARIO
+            + FINISHES.replace("finishes", "source")
+            + 'id = "lap"\nuses = ["while"]\n[[criterion]]\ntitle = "F"\n'
+            + RANKING,
+            17,
+            'which "lap" (source) does not measure, expected one that has figures',
+        ),
+        (
+            HEAD + SCENARIO + FINISHES.replace("finishes", "timing") + 'of = "movin"\nbetween = [1, 2]\n',
+            10,
+            'of is "movin", expected "program", "moving" or "speech"; did you mean "moving"?',
         ),
         (HEAD + SCENARIO + FINISHES + "id = one\n", 10, "texts stand in quotes"),
         (HEAD + SCENARIO + FINISHES + "marks = 2\n", 10, "this key is given twice"),

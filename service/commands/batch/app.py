@@ -22,6 +22,7 @@ from service.commands.batch.tables import (
     changes_table,
     history_table,
     marks_table,
+    rank_table,
     refusals_table,
     summary,
     unjudged_words,
@@ -32,7 +33,7 @@ from service.queue.notifier import Notifier
 from service.report_files import write_batch
 from service.reports.written import prepare_folder
 from service.settings import Settings, load_settings
-from service.store import audit, batches, intake, metrics, regrades, workers
+from service.store import audit, batches, intake, metrics, rankings, regrades, workers
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.states import JobState, Lane
@@ -164,6 +165,7 @@ def status(batch: BatchId) -> None:
     with open_store(settings) as store, store.reading() as session:
         line = batches.batch(session, batches.find_batch(session, batch))
         lines = batches.job_lines(session, line.id)
+        ranks = rankings.rank_tables(session, lines)
         changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
         waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, line.id)
         history = audit.entries(session, "batch", line.id)
@@ -173,6 +175,8 @@ def status(batch: BatchId) -> None:
     if pace is not None:
         console.print(f"{pace.per_minute:.0f} a minute, {pace.left} left", highlight=False)
     console.print(marks_table(lines, line.refusals) if line.regrade_of is None else changes_table(changes))
+    for table in ranks:
+        console.print(rank_table(table))
     if unjudged := unjudged_words(lines):
         console.print(Text(unjudged))
     if waiting:

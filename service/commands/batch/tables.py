@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from service.grading.ranks import RankTable
 from service.store.audit import AuditEntry
 from service.store.batches import BatchLine, JobLine
 from service.store.policies import in_days
@@ -92,6 +93,18 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
     standing = sum(change.standing is Standing.STANDS for change in changes)
     told = f"{same} of {len(changes)} unchanged; {standing} of the new grades stand"
     return Group(table, Text(told)) if shown else Text(told)
+
+
+def rank_table(table: RankTable) -> RenderableType:
+    """A row a student, the best first."""
+    shown = Table("place", "student", ", ".join(filter(None, (table.measure, table.unit))), box=None, pad_edge=False)
+    shown.add_column("95 % interval")
+    shown.add_column("trials that count")
+    for column in shown.columns[0], shown.columns[2]:
+        column.justify = "right"
+    for row in table.texts:
+        shown.add_row(*map(Text, row))
+    return Group(Text(f"{table.assignment}: {table.title}"), shown)
 
 
 def history_table(history: Sequence[AuditEntry]) -> Table:

@@ -148,7 +148,12 @@ def zone_words(zone: Zone) -> str:
 
 
 def distance_to(area: Area, points: Floats) -> Floats:
-    """Signed distance of each point (n, 2) to the edge of the area, mm; a point on the edge has 0."""
+    """Signed distance of each point (n, 2) to the edge of the area, mm, below 0 in it; a point on the edge has 0."""
+    distances = _to_shape(area, points)
+    return -distances if area.outside else distances
+
+
+def _to_shape(area: Area, points: Floats) -> Floats:
     x, y = points[:, 0], points[:, 1]
     if area.circle is not None:
         return np.hypot(x - area.circle[0], y - area.circle[1]) - area.circle[2]

@@ -5,6 +5,7 @@ The texts are a student's, patterns are the instructor's; no pair of them takes 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -15,7 +16,8 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.judges import judges
 from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import listed, quoted
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.words import find_words, listed, quoted, words_of
 from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording
 from submissions.criteria.expressions import found_in
@@ -24,20 +26,24 @@ from submissions.criteria.texts import Messages, Prints, Says, TextConditions, T
 
 @dataclass(frozen=True, slots=True)
 class Deed:
-    """The words for what is judged: the robot, say, said."""
+    """The words for what is judged: the robot, say, said; what is addressed to somebody is no note to oneself."""
 
     who: str
     verb: str
     past: str
+    addressed: bool = False
 
 
 #: How conditions begin that are more than quoted texts.
 _SOMETHING = "something that "
+#: What of a text decides whether it is like another.
+_LONG = 200
+_NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
 _EXCUSED = "What the channel lost by chance counts as received."
 _PRINT = Deed("the program", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
-_SEND = Deed("the robot", "send", "sent")
+_SEND = Deed("the robot", "send", "sent", addressed=True)
 _RECEIVE = Deed("the robot", "receive", "received")
 
 
@@ -74,8 +80,11 @@ def judge_sequence(criterion: TextSequence, lines: Sequence[Line], deed: Deed, r
         return _judge_last(criterion, lines, deed, recording)
     chosen = [line for line in lines if meets(criterion, line.text)]
     if criterion.in_order:
-        return _judge_order(criterion, chosen, lines, deed, recording)
-    return _judge_count(criterion, chosen, lines, deed, recording)
+        outcome, found = _judge_order(criterion, chosen, lines, deed, recording)
+        beside = _out_of_order(criterion, chosen, found, deed)
+        return tempered(outcome, criterion, len(criterion.in_order), beside)
+    outcome = _judge_count(criterion, chosen, lines, deed, recording)
+    return tempered(outcome, criterion, max(_bounds(criterion)[0], 1), _beside(criterion, lines, chosen, deed))
 
 
 def meets(criterion: TextConditions, text: str) -> bool:
@@ -88,12 +97,15 @@ def meets(criterion: TextConditions, text: str) -> bool:
         return False
     if not all(_plain(wanted, fold) in plain for wanted in criterion.contains):
         return False
+    if criterion.among and len(_named(criterion.among, text)) != 1:
+        return False
     return criterion.matches is None or found_in(text, criterion.matches, fold)
 
 
 def conditions(criterion: TextConditions) -> str:
     """What is looked for, in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
-    if criterion.equals and not (criterion.starts_with or criterion.contains or criterion.matches is not None):
+    others = criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
+    if criterion.equals and not others:
         return listed(criterion.equals, "or")
     words = []
     if criterion.equals:
@@ -102,6 +114,8 @@ def conditions(criterion: TextConditions) -> str:
         words.append(f"starts with {listed(criterion.starts_with, 'or')}")
     if criterion.contains:
         words.append(f"contains {listed(criterion.contains)}")
+    if criterion.among:
+        words.append(f"names one of {listed(criterion.among)} alone")
     if criterion.matches is not None:
         words.append(f"matches the pattern {quoted(criterion.matches)}")
     return f"{_SOMETHING}{' and '.join(words)}" if words else ""
@@ -131,12 +145,13 @@ def _judge_last(criterion: TextSequence, lines: Sequence[Line], deed: Deed, reco
 
 def _judge_order(
     criterion: TextSequence, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
-) -> Outcome:
+) -> tuple[Outcome, Sequence[Line]]:
+    """The outcome, and the texts that were taken for those in order."""
     wanted = criterion.in_order
     found: list[Line] = []
     extra: Line | None = None
     for line in chosen:
-        if len(found) < len(wanted) and _compares(criterion, line.text, wanted[len(found)]):
+        if len(found) < len(wanted) and _stands_for(criterion, line.text, wanted[len(found)]):
             found.append(line)
         elif extra is None:
             extra = line
@@ -148,9 +163,8 @@ def _judge_order(
     extras = len(chosen) - len(found) if criterion.only else 0
     score = Fraction(len(found), len(wanted) + extras)
     if criterion.only and extra is not None:
-        return failed(
-            f"{expected}, but it {deed.past} {quoted(extra.text)} as well.", extra.t, pose_at(recording, extra.t), score
-        )
+        words = f"{expected}, but it {deed.past} {quoted(extra.text)} as well."
+        return failed(words, extra.t, pose_at(recording, extra.t), score), found
     if len(found) < len(wanted):
         missing = quoted(wanted[len(found)])
         what = (
@@ -158,9 +172,38 @@ def _judge_order(
         )
         at = found[-1].t if found else None
         pose = pose_at(recording, at) if at is not None else None
-        return failed(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score)
+        return failed(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score), found
     end = found[-1]
-    return passed(f"{deed.who.capitalize()} {deed.past} {listed(wanted)} in order.", end.t, pose_at(recording, end.t))
+    words = f"{deed.who.capitalize()} {deed.past} {listed(wanted)} in order."
+    return passed(words, end.t, pose_at(recording, end.t)), found
+
+
+def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
+    """Whether a text is the one that is wanted; one that contains half of the others or more is none of them."""
+    if criterion.compare != "contains" or not _compares(criterion, text, wanted):
+        return _compares(criterion, text, wanted)
+    others = {other for other in criterion.in_order if not _compares(criterion, wanted, other)}
+    return not others or 2 * sum(_compares(criterion, text, other) for other in others) < len(others)
+
+
+def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequence[Line], deed: Deed) -> Strays:
+    """What of the texts that count, or of those that are asked for, came beside those found."""
+    if criterion.only:
+        # Each further text has lowered the score already.
+        return Strays("")
+    taken = set(map(id, found))
+    # A loop that is stuck on one text has not named everything.
+    changed = [line for place, line in enumerate(chosen) if not place or line.text != chosen[place - 1].text]
+    every = criterion.has_conditions or deed.addressed
+    extra = sum(
+        every or any(_compares(criterion, line.text, text) for text in criterion.in_order)
+        for line in changed
+        if id(line) not in taken
+    )
+    words = f"texts of this sort were {deed.past} {extra} times where they do not belong"
+    # What merely contains "1" may be about anything.
+    sure = every or criterion.compare == "equals"
+    return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
 
 
 def _judge_count(
@@ -183,6 +226,22 @@ def _judge_count(
         return failed(f"{expected}, but {_instead(lines, deed)}.")
     score = Fraction(count, least) if count < least else Fraction(most or 0, count)
     return failed(f"{expected}, but it {deed.past} {count} such, the last {quoted(chosen[-1].text)}.", at, pose, score)
+
+
+def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Line], deed: Deed) -> Strays:
+    """The texts beside those that must come; of those that differ in numbers alone one, but for guesses at these."""
+    if not (chosen and criterion.has_conditions and _bounds(criterion)[0]):
+        return Strays("")
+    guessed = {_form(line.text) for line in chosen}
+    counted = set(map(id, chosen))
+    forms = [_form(line.text) for line in lines if id(line) not in counted]
+    others = sum(form in guessed for form in forms) + len(set(forms) - guessed)
+    return Strays(f"it {deed.past} {others} others as well", others=others)
+
+
+def _form(text: str) -> str:
+    """A text without its numbers."""
+    return _NUMBER.sub("#", " ".join(text[:_LONG].casefold().split()))
 
 
 def _bounds(criterion: TextSequence) -> tuple[int, int | None]:
@@ -320,6 +379,12 @@ def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:
             return _plain(text, fold).startswith(_plain(wanted, fold))
         case "matches":
             return found_in(text, wanted, fold)
+
+
+def _named(choices: Sequence[str], text: str) -> list[str]:
+    """Those of the choices that a text has in it, as whole words."""
+    words = words_of(text)
+    return [choice for choice in choices if find_words(words, words_of(choice)) is not None]
 
 
 def _plain(text: str, ignore_case: bool) -> str:

@@ -54,7 +54,8 @@ def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Ou
     unit = f" {measure.unit}" if measure.unit else ""
     found = f"{criterion.measure}: {measure.value:.2f}{unit}"
     if not evidence.passed:
-        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose, measures=(measure,))
+        # A figure that does not count stands in no table of ranks.
+        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
     share = _share(criterion, measure.value)
     best = criterion.steps[0][0]
     if share == 1:
