@@ -11,10 +11,11 @@ from typing import Any, Protocol
 
 from responders import wire
 from responders.bridge import Bridge
+from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, read_log, recording_of
+from responders.trial import MOST_NOTES, recording_of
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera

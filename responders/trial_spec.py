@@ -1,4 +1,4 @@
-"""What a trial depends on, as plain values: the two parts of a submission, the robot on its floor, channel and seeds.
+"""What a trial depends on, as plain values: the parts of a submission, the robot on its floor, channel and seeds.
 
 Nothing here runs; ``trial.py`` makes a recording of it.
 """
@@ -6,7 +6,8 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
@@ -43,6 +44,13 @@ class ResponderSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class AgentSpec(ResponderSpec):
+    """What the responder and the other agents ask: an agent of the student's, or one that is ``given``."""
+
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrialSpec:
     """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
 
@@ -59,3 +67,4 @@ class TrialSpec:
     child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name

@@ -190,6 +190,12 @@ CALLS: Schema = MappingProxyType(
     }
 )
 
+_ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"agent": _text, "arguments": _text, "named": _text}, {})
+
+#: What a responder's process may say whose submission has agents, and what such an agent's process may.
+RESPONDER_WITH_AGENTS: Schema = MappingProxyType({**RESPONDER, "ask": _ASK})
+AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
+
 #: Kinds that hold numbers and words of the schema alone. Nothing a child has worded is kept of them, and honest
 #: programs send thousands; every other frame is paid for before it is handed on.
 NOTHING_KEPT = frozenset(

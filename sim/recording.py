@@ -180,6 +180,33 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
+class AgentMessage:
+    """One text between the responder and an agent, or between two agents, while the robot's message was answered.
+
+    ``message`` is the index of that one, -1 while the responder was loaded. ``reply_to`` is the index, in the
+    recording's agent messages, of what it answers; ``note`` says of a question why it got no answer.
+    """
+
+    t: float
+    sender: str
+    receiver: str
+    text: str  # what was sent, if it was a text; else as JSON has it
+    message: int
+    reply_to: int | None = None
+    note: str = ""
+    is_text: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class AgentOutput:
+    """What an agent printed, and what it wrote to its logger.txt."""
+
+    agent: str
+    printed: str
+    log: str
+
+
+@dataclass(frozen=True, slots=True)
 class Image:
     """What both light sensors saw when the program printed IMG_DATA, and where the robot was.
 
@@ -207,6 +234,7 @@ class Call:
     callee: str  # parser, agent, logger, or the name bound to a network
     argument: str  # shortened repr
     result: str  # shortened repr
+    before: int = 0  # how many agent messages there were when it ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,12 +271,14 @@ class Fault:
     hint: str = ""
     cell: int | None = None
     staff: str = ""  # what our own code stumbled over, for staff to look at
+    agent: str = ""  # which agent of the responder's it was, if not the responder itself
 
     @property
     def place(self) -> str:
-        """``line 3`` or ``cell 7, line 3``; empty where neither is known."""
-        cell = [f"cell {self.cell}"] if self.cell is not None else []
-        return ", ".join(cell + ([f"line {self.line}"] if self.line is not None else []))
+        """``line 3``, ``cell 7, line 3`` or ``parser, line 3``; empty where none is known."""
+        within = [self.agent] if self.agent else []
+        within += [f"cell {self.cell}"] if self.cell is not None else []
+        return ", ".join(within + ([f"line {self.line}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,3 +311,5 @@ class Recording:
     responder_log: str = ""  # what the responder wrote to logger.txt
     sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())
+    agent_messages: tuple[AgentMessage, ...] = ()
+    agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order

@@ -19,6 +19,7 @@ from typing import Literal
 
 from responders.code import Code
 from sim.errors import UsageError
+from submissions.agent_files import with_agents
 from submissions.assignment.definition import Parts
 from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
@@ -106,6 +107,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     where = where or submission.student
     if submission.notebook is not None:
         return _fit_notebook(submission, submission.notebook, asked, where)
+    submission = with_agents(submission, asked, where)
     notes = list(submission.notes)
     parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}

@@ -143,6 +143,11 @@ class Child:
             self._known[line] = frame
         return frame
 
+    @property
+    def closed(self) -> bool:
+        """Whether it has been ended."""
+        return self._closed
+
     def cpu_seconds(self) -> float:
         """What the child has used so far, by the scheduler's clock."""
         try:

@@ -60,10 +60,12 @@ def _cell(which: str) -> str:
 def _setting(found: Assignment) -> str:
     if not found.scenarios:
         return f"no robot is run; responder: {found.parts.responder}"
+    agents = "".join(f", {name}: {who}" for name, who in found.parts.agents.items())
     noise = "" if found.world.noise == "course" else f", motor noise in {found.world.noise}"
     return (
         f"world: {found.world.background}, robot {found.world.robot}{noise}; "
-        f"program: {found.parts.program}, responder: {found.parts.responder}; of a notebook: {_cell(found.parts.cell)}"
+        f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
+        f"of a notebook: {_cell(found.parts.cell)}"
     )
 
 

@@ -185,6 +185,7 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
     return TrialSpec(
         program=plan.program,
         responder=plan.answers,
+        agents=plan.agents,
         collaborative=plan.collaborative,
         floor=_floor(world, trial.seed),
         robot=robot(world.robot),

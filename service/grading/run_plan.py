@@ -14,13 +14,14 @@ from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
+from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
 from submissions.bundle import Part
 from submissions.criteria.code import SourceRules
@@ -79,6 +80,7 @@ class RunPlan:
     submission: str = ""  # content hash
     missing: Part | None = None  # asked for, and not submitted
     child_seed: int = 0  # of the chance that is the submission's own, and no trial's
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
@@ -90,6 +92,9 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     if notebook is not None and assignment.training is not None:
         function = assignment.training.function
         raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
+    if notebook is not None and assignment.parts.agents:
+        files = " and ".join(f"{name}.py" for name in assignment.parts.agents)
+        raise UsageError(f"{notebook.name}: is a notebook, expected robot.py and responder.py beside {files}")
     if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
         plan = _of_notebook(submission, notebook, assignment)
     else:
@@ -101,8 +106,10 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     asked, missing = assignment.parts, _missing(submission, assignment)
-    if missing is not None:
-        asked = replace(asked, **{missing: "none"})
+    if missing == "program":
+        asked = replace(asked, program="none")
+    elif missing == "responder":
+        asked = replace(asked, responder="none")
     code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
     responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
     flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
@@ -114,6 +121,7 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     if missing == "program" and (asking := _stand_in(assignment)) is not None:
         asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
+    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
     # What is sent to a responder that is not there is a message all the same.
     return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
 
@@ -256,7 +264,20 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
 
 def _files(submission: Submission, assignment: Assignment) -> Mapping[str, bytes]:
     """What lies in the responder's folder; a submission's own file wins over a given one."""
-    return {**assignment.given, **submission.files}
+    return {**assignment.given, **without_agents(submission.files, assignment.parts.agents)}
+
+
+def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
+    """Each has a folder like the responder's and may use as much; in a given one's lie given files alone."""
+    agents = {}
+    for name, who in assignment.parts.agents.items():
+        given = who != "student"
+        code = Code(who, assignment.given_parts[who]) if given else code_of(name, submission.files)
+        spec = _responder(code, assignment.given if given else _files(submission, assignment), assignment)
+        if spec is None:
+            raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
+        agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
+    return agents
 
 
 def _program(code: Code, flags: Flags, assignment: Assignment) -> ProgramSpec:

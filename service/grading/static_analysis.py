@@ -85,6 +85,10 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
             {"t": each.t, "sender": each.sender, "text": each.text, "delivered": each.delivered}
             for each in recording.messages
         ],
+        "agent_messages": [
+            {"t": each.t, "sender": each.sender, "receiver": each.receiver, "text": each.text}
+            for each in recording.agent_messages
+        ],
         "datalog": [
             [each.t, each.name, each.value, each.simtime] for each in recording.datalog if math.isfinite(each.value)
         ],

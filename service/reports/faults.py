@@ -6,13 +6,14 @@ Faults are told, never judged; marks do not depend on anything here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
 from sim.recording import Fault, Verdict
+from submissions.agent_files import code_of
 from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
@@ -59,9 +60,12 @@ def fault_groups(grade: Grade, submission: Submission | None = None, limit: int 
 def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None) -> FaultGroup:
     index, fault = places[0]
     source = _source(fault, submission)
-    where = _WHERE[fault.who] if source is None else f"{_WHERE[fault.who]} ({one_line(source.name, 60)})"
-    if fault.place:
-        where += f", {fault.place}"
+    where = f"Agent {fault.agent}" if fault.agent else _WHERE[fault.who]
+    if source is not None:
+        where += f" ({one_line(source.name, 60)})"
+    place = replace(fault, agent="").place
+    if place:
+        where += f", {place}"
     trial = grade.trials[index]
     first = f"at {fault.t:.2f} s in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
     trials = len({trial_index for trial_index, _ in places})
@@ -78,6 +82,8 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if submission.notebook is not None and fault.cell is not None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
+    if fault.agent:
+        return code_of(fault.agent, submission.files)
     return {"program": submission.program, "responder": submission.responder}.get(fault.who)
 
 

@@ -5,6 +5,7 @@ Nothing is escaped here, and nothing is hidden: what comes in is the reader's vi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
-from sim.recording import Fault, Message, Recording, Verdict
+from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
@@ -91,6 +92,7 @@ class Scene:
     more_messages: int
     responder_output: str
     responder_log: str
+    agents: tuple[AgentOutput, ...]
     notes: tuple[str, ...]
 
 
@@ -223,22 +225,38 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
         words=verdict_words(trial.verdict),
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
-        messages=tuple(_message_lines(recording.messages[:_MOST_MESSAGES])),
-        more_messages=max(0, len(recording.messages) - _MOST_MESSAGES),
+        messages=tuple(itertools.islice(_message_lines(recording), _MOST_MESSAGES)),
+        more_messages=max(0, len(recording.messages) + len(recording.agent_messages) - _MOST_MESSAGES),
         responder_output=readable(recording.responder_output, 4000),
         responder_log=readable(recording.responder_log, 4000),
+        agents=tuple(
+            AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
+            for each in recording.agent_outputs
+        ),
         notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
     )
 
 
-def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
-    for message in messages:
+def _message_lines(recording: Recording) -> Iterator[MessageLine]:
+    """Each message of the robot's is followed by what the agents said until it was answered."""
+    inner: dict[int, list[AgentMessage]] = {}
+    for each in recording.agent_messages:
+        inner.setdefault(each.message, []).append(each)
+    yield from map(_agent_line, inner.get(-1, ()))
+    for index, message in enumerate(recording.messages):
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
         happened = befell_in_full(message)
         if happened:
             arrived += f" ({happened})"
         wrong = message.delivered is None or bool(happened)
         yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
+        yield from map(_agent_line, inner.get(index, ()))
+
+
+def _agent_line(each: AgentMessage) -> MessageLine:
+    arrived = f"({each.note})" if each.note else f"{each.t:.2f} s"
+    sender = f"{each.sender} → {each.receiver}"
+    return MessageLine(f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, bool(each.note))
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:

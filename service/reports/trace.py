@@ -37,6 +37,7 @@ def trace(recording: Recording) -> dict[str, Any]:
             }
             for message in recording.messages
         ],
+        **agent_messages(recording),
         "datalog": [
             {
                 "t": _finite(datum.t),
@@ -53,6 +54,23 @@ def trace(recording: Recording) -> dict[str, Any]:
         "sha256": recording.sha256,
         "sandbox": recording.sandbox,
     }
+
+
+def agent_messages(recording: Recording) -> dict[str, Any]:
+    """What the responder and its agents said to each other, under its key; nothing where there was nothing."""
+    told = [
+        {
+            "t": _finite(each.t),
+            "sender": each.sender,
+            "receiver": each.receiver,
+            "text": storable(each.text),
+            "message": each.message,
+            "reply_to": each.reply_to,
+            "note": each.note,
+        }
+        for each in recording.agent_messages
+    ]
+    return {"agent_messages": told} if told else {}
 
 
 def storable(text: str) -> str:

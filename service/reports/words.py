@@ -165,16 +165,36 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     }
 )
 
+#: Where an agent of the responder's failed.
+_AGENT_ERROR = VerdictWords(
+    "error in an agent",
+    "An agent of yours raised an error, so whoever asked it got no answer.",
+    "The error is in the agent that is named below, or in a function that it calls.",
+    "Call the agent's function yourself with the message that it was sent, and mend the line that is named.",
+    "bad",
+)
+
 
 def grade_words(grade: Grade) -> VerdictWords:
     """The words for a grade's verdict, for what was not submitted, or that there was nothing to run."""
-    if grade.missing:
-        words = _WITHOUT[grade.missing]
-        if grade.verdict is Verdict.FINISHED:
-            return words
-        ended = verdict_words(grade.verdict)
-        return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
-    return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+    if not grade.missing:
+        return _ended(grade) if grade.trials else _NO_ROBOT
+    words = _WITHOUT[grade.missing]
+    if grade.verdict is Verdict.FINISHED:
+        return words
+    ended = _ended(grade)
+    return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
+
+
+def _ended(grade: Grade) -> VerdictWords:
+    if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
+        return _AGENT_ERROR
+    return verdict_words(grade.verdict)
+
+
+def _is_of_an_agent(grade: Grade) -> bool:
+    faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
+    return bool(faults and faults[0].agent)
 
 
 def accuracy_words(grade: Grade) -> str:

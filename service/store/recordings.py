@@ -156,6 +156,7 @@ def _without_floods(recording: Recording) -> Recording:
             printed=recording.printed[:_TEXT_KEPT],
             datalog=recording.datalog[:_TEXT_KEPT],
             messages=recording.messages[:_TEXT_KEPT],
+            agent_messages=recording.agent_messages[:_TEXT_KEPT],
         ),
         f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
     )
@@ -163,11 +164,16 @@ def _without_floods(recording: Recording) -> Recording:
 
 def _without_words(recording: Recording) -> Recording:
     bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
+    outputs = (
+        replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
+    )
     cut = replace(
         bare,
         responder_output=recording.responder_output[:_TEXT_KEPT],
         responder_log=recording.responder_log[:_TEXT_KEPT],
         faults=recording.faults[:10],
+        agent_messages=(),
+        agent_outputs=tuple(outputs),
     )
     return _noted(cut, "what was printed, said and sent is left out")
 

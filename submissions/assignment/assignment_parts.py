@@ -20,6 +20,7 @@ from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_name
 from sim.motion import gap
 from sim.recording import Pose
 from sim.robot import usual_robot
+from submissions.assignment.agents import read_agents
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
 from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.problems import Problems
@@ -40,7 +41,7 @@ from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
-_TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
+_TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 
@@ -61,11 +62,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
+    agents, agents_sources = read_agents(document, parts, files, problems)
     _clear_beacons(scenarios, world, problems)
     around = Surroundings(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
         without=_nobodys(parts),
+        agents=frozenset(agents),
         files=files,
         aliases=head.aliases if head else {},
     )
@@ -77,6 +80,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     check_given(document, problems)
     given_parts = sources_of(criteria, files, problems)
     given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
+    given_parts |= agents_sources
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
@@ -84,7 +88,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         id=head.id,
         title=head.title,
         world=world,
-        parts=Parts(parts.program, parts.responder, str(parts.cell)),
+        parts=Parts(parts.program, parts.responder, str(parts.cell), MappingProxyType(dict(agents))),
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),

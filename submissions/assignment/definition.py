@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
@@ -45,6 +46,7 @@ class Parts:
     program: str = "student"
     responder: str = "student"
     cell: str = "last"  # of a notebook: which robot program is marked; ``last``, ``tag:NAME`` or a number from 1
+    agents: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))  # by name, those the responder asks
 
 
 @dataclass(frozen=True, slots=True)

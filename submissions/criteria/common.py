@@ -53,6 +53,7 @@ class Surroundings:
     scenarios: Sequence[Scenario] = ()
     ground: Floor | None = None
     without: frozenset[str] = frozenset()  # the parts, program and responder, that nobody writes
+    agents: frozenset[str] = frozenset()
     files: Mapping[str, bytes] = field(default_factory=dict)
     aliases: Mapping[str, Texts] = field(default_factory=dict)
     criteria: Sequence[Criterion] = ()

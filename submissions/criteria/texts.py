@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from submissions.criteria.asking import BetweenAgents
 from submissions.criteria.common import AmongMany, Criterion, NotBlank, SomeTextOrTexts, SomeTexts
 from submissions.criteria.expressions import usable
 
@@ -99,7 +100,7 @@ class Says(TextSequence):
     check: Literal["says"]
 
 
-class Messages(TextSequence):
+class Messages(BetweenAgents, TextSequence):
     """What the robot sends to the responder: texts like ``PY::0``; an image is the text ``IMG_DATA::...``.
 
     With ``json = true`` it is, instead, the robot's queue that is looked at: every answer that began with

@@ -8,7 +8,7 @@ from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Preamble, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
@@ -20,12 +20,18 @@ PROGRAM_LIMITS = ChildLimits(2.0, 128 << 20)
 RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
 
 
+def agent_spec(name: str, text: str, files: Mapping[str, bytes] | None, output_bytes: int) -> AgentSpec:
+    """A student's agent."""
+    return AgentSpec(Code(f"{name}.py", text), files or {}, RESPONDER_LIMITS, output_bytes)
+
+
 def run_program(
     runner: TrialRunner,
     program: str,
     start: Pose | None = None,
     *,
     responder: str | None = None,
+    agents: Mapping[str, str] | None = None,
     files: Mapping[str, bytes] | None = None,
     background: str = "Empty_Map",
     robot_name: str = "Default_Robot",
@@ -56,5 +62,6 @@ def run_program(
         seed=seed,
         child_seed=seed,
         physics=physics,
+        agents={name: agent_spec(name, text, files, output_bytes) for name, text in (agents or {}).items()},
     )
     return runner.run(spec, obstacles, meter)

@@ -34,6 +34,28 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
+COUNT = """
+import random, time
+for number in range(20):
+    print(f"PY::{number} {random.random()}")
+    time.sleep(random.uniform(0.2, 0.6))
+"""
+AGENTS = {
+    "agent": "import uuid\ndef agent(text): return [parser(text), uuid.uuid4().hex]",
+    "logger": "seen = []\ndef logger(entry):\n    seen.append(entry)\n    return len(seen)",
+    "parser": """
+import random, time
+def parser(text):
+    time.sleep(random.uniform(0, 0.05))
+    return [text, random.random(), time.time()]
+""",
+}
+ASKING = """
+import random
+def responder(text):
+    answer = agent(text)
+    return f"{answer} {logger(answer)} {random.random()}"
+"""
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
@@ -51,11 +73,15 @@ INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 60
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of three runs: a noisy line follower of 60 s, a conversation of 20 images, one by infrared."""
+    """The hash of one run: a follower of 60 s, a conversation of 20 images, one by infrared, or of three agents."""
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
-        assert recording.verdict is Verdict.TIME_LIMIT
+        assert recording.verdict is Verdict.TIME_LIMIT, recording.faults
         assert len(recording.ticks) == 1800
+    elif name == "agents":
+        recording = run_program(runner, COUNT, responder=ASKING, agents=AGENTS)
+        assert recording.verdict is Verdict.FINISHED
+        assert len(recording.agent_messages) == 120
     elif name == "infrared":
         start = Pose(1100, 571, 0)
         recording = run_program(runner, CALL_ROUND, start, noise=Noise(motor=20), responder=ANSWER, channel=INFRARED)
@@ -76,7 +102,7 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
-RUNS = ("follower", "talk", "infrared")
+RUNS = ("follower", "talk", "infrared", "agents")
 WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys

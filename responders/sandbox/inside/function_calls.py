@@ -6,6 +6,7 @@ What is called and what the value is worth is the worker's business, on the othe
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 from . import student_code
@@ -20,9 +21,14 @@ def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
     function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
+    return value_frame(lambda: function(*spec["arguments"], **spec["named"]), name)
+
+
+def value_frame(call: Callable[[], Any], name: str) -> Frame:
+    """What a call in the student's file ``name`` gives, or what went wrong instead."""
     try:
-        value = function(*spec["arguments"], **spec["named"])
-        text = _as_json(value)
+        value = call()
+        text = as_json(value)
     except BaseException as error:
         return {"do": "returned", "kind": "error", "error": student_code.describe(error, name)}
     if text is None:
@@ -32,7 +38,7 @@ def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
     return {"do": "returned", "kind": "value", "text": text}
 
 
-def _as_json(value: Any) -> str | None:
+def as_json(value: Any) -> str | None:
     """None for what JSON does not have; arrays are lists."""
     try:
         return json.dumps(value, allow_nan=False, default=_plain)

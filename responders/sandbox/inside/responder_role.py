@@ -14,7 +14,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, function_calls, model_files, refusals, student_code
+from . import determinism, function_calls, model_files, other_agents, refusals, student_code
 from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
 
@@ -30,6 +30,7 @@ class ResponderRole:
         self._spec = spec
         self._name: str = spec["name"]
         self._function: str | None = spec["function"]
+        self._own_name = "responder"
         self._units = 0
         self._namespace: dict[str, Any] = {}
         self._defines_msg = False
@@ -58,6 +59,7 @@ class ResponderRole:
         sys.modules["__main__"] = module
         self._namespace = module.__dict__
         self._namespace.update(roboSim=roboSim, eds=eds)
+        self._namespace.update(other_agents.functions(self._spec.get("agents", ()), self._wire, self._waited))
 
     def _serve(self) -> None:
         while True:
@@ -132,7 +134,7 @@ class ResponderRole:
         """Wrap what parser, agent and logger are bound to now, and the predict of every bound network."""
         for name, value in list(self._namespace.items()):
             if name in _NOTED:
-                if callable(value) and not hasattr(value, "_robomark_noted"):
+                if name != self._own_name and callable(value) and not hasattr(value, "_robomark_noted"):
                     self._namespace[name] = self._noted(name, value)
                 continue
             predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
@@ -176,6 +178,9 @@ class ResponderRole:
     def _sleep(self, units: int) -> None:
         self._units += units
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
+
+    def _waited(self, until: int) -> None:
+        self._units = max(self._units, until)
 
     def _emit(self, text: str) -> None:
         self._wire.send({"do": "print", "text": fitted(text)})

@@ -13,6 +13,7 @@ from fractions import Fraction
 from responders.message_format import JSON, PY
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed
+from service.grading.judging.asking import pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, failed, passed
@@ -270,8 +271,10 @@ def _instead(lines: Sequence[Line], deed: Deed) -> str:
 
 def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
-        sent = [Line(message.t, message.text) for message in recording.messages if message.sender == "robot"]
-        return judge_sequence(criterion, sent, _SEND, recording)
+        pair = pair_of(criterion, recording)
+        sent = [Line(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"]
+        deed = Deed(pair.teller, f"tell {pair.told}", f"told {pair.told}") if criterion.agents else _SEND
+        return judge_sequence(criterion, sent, deed, recording)
     arrived = [message for message in recording.messages if _joined(message)]
     as_arrived = [(message.delivered or 0.0, message.received) for message in arrived]
     outcome = judge_sequence(criterion, _lines(criterion, as_arrived), _RECEIVE, recording)

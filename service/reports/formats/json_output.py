@@ -14,7 +14,7 @@ from service.grading.grade import Accuracy, Grade
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
 from service.reports.rows import TableRow
-from service.reports.trace import storable
+from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
 from sim.recording import Message
 
@@ -49,6 +49,7 @@ def json_document(view: View) -> dict[str, Any]:
                 "sha256": trial.recording.sha256,
                 "spoken": [storable(line.text) for line in trial.recording.spoken],
                 "messages": [_message(message) for message in trial.recording.messages],
+                **agent_messages(trial.recording),
             }
             for trial in grade.trials
         ],

@@ -5,6 +5,7 @@ It decides what is told and what is left out; ``conversation.py`` draws it.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -27,7 +28,7 @@ Kind = Literal["message", "call", "return", "lost", "silence"]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One arrow: ``t`` (seconds) is when it started, None inside the responder, where no time passes."""
+    """One arrow: ``t`` (seconds) is when it started, None inside a process, where no time passes."""
 
     kind: Kind
     source: str
@@ -87,7 +88,8 @@ def conversation(
     if skipped:
         steps.append(Gap(skipped))
     named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
-    parties = tuple(party for party in PARTIES if party in named or party in ("robot", "responder"))
+    lanes = (*PARTIES, *(each.agent for each in recording.agent_outputs if each.agent not in _KNOWN))
+    parties = tuple(party for party in lanes if party in named or party in ("robot", "responder"))
     return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
 
 
@@ -153,7 +155,7 @@ def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, li
         message = recording.messages[exchange.sent]
         steps: list[Step | Gap] = [_crossing(message)]
         if message.delivered is not None:
-            made = list(_calls(call for call in recording.calls if call.message == exchange.sent))
+            made = list(_inside(recording, exchange.sent))
             steps += made[:MOST_CALL_STEPS]
             if len(made) > MOST_CALL_STEPS:
                 steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
@@ -174,6 +176,26 @@ def _crossing(message: Message) -> Step:
         return Step("lost", source, target, label, message.t, note or "not delivered")
     shown_at = message.t if message.sender == "robot" else message.delivered
     return Step("message", source, target, label, shown_at, note)
+
+
+def _inside(recording: Recording, message: int) -> Iterator[Step]:
+    """What was called, and what agents were asked, until the robot's message was answered."""
+    calls = sorted((call for call in recording.calls if call.message == message), key=_before)
+    told, shown_at = 0, recording.messages[message].t
+    for place, each in enumerate(recording.agent_messages):
+        if each.message == message:
+            until = bisect_right(calls, place, told, key=_before)
+            yield from _calls(calls[told:until])
+            told = until
+            kind: Kind = "call" if each.reply_to is None else "return"
+            label, t = message_words(each.text, 60), None if each.t == shown_at else each.t
+            yield Step(kind, each.sender, each.receiver, label, t, one_line(each.note, 30))
+            shown_at = each.t
+    yield from _calls(calls[told:])
+
+
+def _before(call: Call) -> int:
+    return call.before
 
 
 def _calls(calls: Iterable[Call]) -> Iterator[Step]:

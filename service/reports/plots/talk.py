@@ -1,4 +1,4 @@
-"""Who told whom how often in a trial: the robot, the responder, and what the responder called.
+"""Who told whom how often in a trial: the robot, the responder, its agents, and what these called.
 
 What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
 """
@@ -58,6 +58,8 @@ def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], boo
         yield (caller, callee, "call"), True
         if call.result != "None":  # a logger gives nothing back
             yield (callee, caller, "return"), True
+    for each in recording.agent_messages:
+        yield (each.sender, each.receiver, "call" if each.reply_to is None else "return"), True
 
 
 def party_of(name: str) -> str:
@@ -107,7 +109,8 @@ def _callees(recording: Recording) -> Mapping[str, str]:
     """What each name that was called is shown as."""
     networks = dict.fromkeys(call.callee for call in recording.calls if call.callee not in _NAMED)
     shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
-    return MappingProxyType(shown | {name: name for name in _NAMED})
+    agents = (each.agent for each in recording.agent_outputs)
+    return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})
 
 
 def _count(talk: Talk) -> str:
