@@ -13,11 +13,14 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
+from service.autograder import write_autograder
 from service.commands.example_table import catalogue_table, examples_table, measures_table
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
+from service.home_secret import secret_here
 from service.reports.readable import one_line, readable
+from service.settings import load_settings
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import EXAMPLES, EXPECTED, REFERENCE, add_expected
@@ -146,6 +149,17 @@ def export(
     with for_the_user():
         written = export_for_students(assignment, folder) if student else export_whole(assignment, folder)
     typer.echo(f"{folder}: {_count(written, 'file', 'files')}")
+
+
+@assignments_app.command()
+def autograder(
+    assignment: Which,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to make.")],
+) -> None:
+    """Make the folder that Gradescope takes as an autograder; it has this installation's secret in it."""
+    with for_the_user():
+        write_autograder(assignment, output, secret_here(load_settings()))
+    typer.echo(f"{output}: zip what is in it, and upload that to Gradescope")
 
 
 def _console() -> Console:

@@ -35,13 +35,15 @@ from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
 from service.reports.formats import FORMATS, Format
+from service.reports.rows import TableRow, missing_words
 from service.reports.written import prepare_folder, write_report
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment, find_in_catalogue
 from submissions.bundle import fit_parts, named_by, read_submission
-from submissions.names import alike, cannot_be_told
+from submissions.names import alike, cannot_be_told, shown_name
+from submissions.people import Student
 from submissions.raw_files import shown
 from submissions.submission import Submission
 
@@ -71,7 +73,16 @@ def grade(
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Grade submissions now; exit status 0 when all were graded, whatever the marks."""
+    """Grade submissions now; exit status 0 when all were graded, whatever the marks.
+
+    Several are one document in every format but text, also those that could not be graded, with the reason.
+    """
+    if assignment is not None:
+        # A mistake of the instructor's is no submission's.
+        find_assignment(assignment)
+    chosen = FORMATS[form]
+    together = chosen.table if len(submissions) > 1 else None
+    rows: list[TableRow[Grade]] = []
     if report is not None:
         prepare_folder(report)
     given = given_flags(
@@ -101,15 +112,27 @@ def grade(
                 graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
                 graded = replace(graded, notes=(*_tried(given), *graded.notes))
             except RobomarkError as error:
+                refused = isinstance(error, UsageError)
+                who = Student(shown_name(named_by(path)))
+                reason = str(error).removeprefix(f"{shown(path.name)}: ")
+                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
                 if len(submissions) == 1:
+                    if refused and chosen.refusal is not None:
+                        sys.stdout.write(chosen.refusal(row))
                     raise
+                rows.append(row)
                 print(f"robomark: {error}", file=sys.stderr)
                 worst = worst if worst is not None and not isinstance(worst, UsageError) else error
                 continue
-            _print(FORMATS[form], graded)
+            if together is None:
+                _print(chosen, graded)
+            missing = missing_words(graded.missing)
+            rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
             if report is not None:
                 written = write_report(report, graded, submission, named_by(path))
                 print(f"report: {written}", file=sys.stderr)
+    if together is not None:
+        sys.stdout.write(together(rows))
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")

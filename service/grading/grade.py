@@ -190,6 +190,7 @@ class Grade:
     sandbox: str
     grader_version: str
     notes: tuple[str, ...] = ()
+    missing: str = ""  # the file that was asked for and not submitted; what needs it has no marks
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
     cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
 

@@ -28,6 +28,7 @@ from sim.recording import BROWSER_TICK, TICK
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
+from submissions.bundle import PART_FILES
 from submissions.seeds import PUBLIC, Secret, child_seed
 from submissions.submission import Submission
 
@@ -66,14 +67,14 @@ def grade(
 
     Without a ``runner`` one is made for this grading and closed afterwards.
 
-    Raises UsageError when a part is missing that the assignment asks for, HostError when this machine fails,
+    Raises UsageError when no part is there that the assignment asks for, HostError when this machine fails,
     and whatever ``observe`` raises.
     """
     if runner is None:
         with TrialRunner() as own:
             return grade(submission, assignment, secret=secret, observe=observe, runner=own)
     plan = plan_run(submission, assignment, secret)
-    trials = tuple(assignment.trials(secret))
+    trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.heartbeat)
     results = _run_trials(plan, trials, runner, meter, watch)
@@ -91,6 +92,7 @@ def grade(
         sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code was run",
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *plan.notes, *plan.trial.notes_on_all(results), *_unjudged_notes(criteria)),
+        missing=PART_FILES[plan.missing] if plan.missing else "",
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 from responders.code import Code
 from responders.notebook_process import NotebookSpec
@@ -24,6 +24,7 @@ from sim.recording import Recording
 from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
+from submissions.bundle import Part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.helper_modules import modules_of
@@ -32,8 +33,6 @@ from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
 from submissions.submission import Notebook, Submission
-
-Part = Literal["program", "responder"]
 
 _MEGABYTE = 1 << 20
 _IGNORED = "the program's magic line is ignored"
@@ -65,8 +64,9 @@ class ProgramTrial:
 class RunPlan:
     """Who takes part in every trial, and what of the submission is looked at beside them.
 
-    ``program`` is None where no robot is run. ``answers`` is what answers it, unless ``trial`` sees to that;
-    ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the source reader takes them.
+    ``program`` is None where no robot is run; then there are no trials. ``answers`` is what answers it, unless
+    ``trial`` sees to that; ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the
+    source reader takes them.
     """
 
     assignment: Assignment
@@ -80,6 +80,7 @@ class RunPlan:
     own_files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))  # those submitted
     notes: tuple[str, ...] = ()
     submission: str = ""  # content hash
+    missing: Part | None = None  # asked for, and not submitted
     child_seed: int = 0  # of the chance that is the submission's own, and no trial's
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
     second_program: ProgramSpec | None = None  # where there are two robots
@@ -89,7 +90,7 @@ class RunPlan:
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
     """The plan for grading ``submission`` in the installation that has this secret.
 
-    Raises UsageError when a part is missing that the assignment asks for.
+    Raises UsageError when no part is there that the assignment asks for.
     """
     notebook = submission.notebook
     if notebook is not None and assignment.training is not None:
@@ -110,7 +111,11 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
 
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
-    asked = assignment.parts
+    asked, missing = assignment.parts, _missing(submission, assignment)
+    if missing == "program":
+        asked = replace(asked, program="none")
+    elif missing == "responder":
+        asked = replace(asked, responder="none")
     code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
     responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
     flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
@@ -120,7 +125,32 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
-    return replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
+    if missing == "program" and (asking := _stand_in(assignment)) is not None:
+        asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
+        plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
+    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
+    # What is sent to a responder that is not there is a message all the same.
+    return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
+
+
+def _stand_in(assignment: Assignment) -> ProgramSpec | None:
+    """A program that asks a responder all that it is judged by alone; None where that is nothing."""
+    texts = list(dict.fromkeys(text for criterion in assignment.criteria for text in criterion.questions))
+    if not texts:
+        return None
+    text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
+    return _program(Code("questions.py", text), Flags(), {}, assignment)
+
+
+def _missing(submission: Submission, assignment: Assignment) -> Part | None:
+    """The one part of two that was not submitted; with neither there is nothing to grade."""
+    asked = assignment.parts
+    if (asked.program, asked.responder) == ("student", "student"):
+        if submission.program is None and submission.responder is not None:
+            return "program"
+        if submission.responder is None and submission.program is not None:
+            return "responder"
+    return None
 
 
 def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:

@@ -20,11 +20,12 @@ from service.grading.judging.case import StaticAnalysis, as_had_by
 from service.grading.judging.code import calls_of
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
-from service.grading.run_plan import Part, RunPlan
+from service.grading.run_plan import RunPlan
 from sim.chance import Stream
 from sim.recorded import seconds_at
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment
+from submissions.bundle import Part
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 
 _MEGABYTE = 1 << 20
@@ -64,7 +65,7 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter:
                     had = as_had_by(criterion.robot, trial)
                     checks[criterion.id, place] = _check(criterion, had, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
-    return StaticAnalysis(answers, plan.flags, called, checks, sandbox)
+    return StaticAnalysis(answers, plan.flags, called, checks, sandbox, plan.missing)
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:

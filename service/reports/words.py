@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -145,6 +145,26 @@ _NO_ROBOT = VerdictWords(
 )
 
 
+#: Where there was a part to grade, and the other not.
+_WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
+    {
+        "robot.py": VerdictWords(
+            "no robot.py",
+            "There is no robot.py, so only your responder was graded, by itself.",
+            "The marks that need a robot program are missing for that alone.",
+            "Submit robot.py beside responder.py; if it is there, check its name.",
+            "bad",
+        ),
+        "responder.py": VerdictWords(
+            "no responder.py",
+            "There is no responder.py, so nothing answered your robot program, which was graded by itself.",
+            "The marks that need a responder are missing for that alone.",
+            "Submit responder.py beside robot.py; if it is there, check its name.",
+            "bad",
+        ),
+    }
+)
+
 #: Where an agent of the responder's failed.
 _AGENT_ERROR = VerdictWords(
     "error in an agent",
@@ -156,10 +176,20 @@ _AGENT_ERROR = VerdictWords(
 
 
 def grade_words(grade: Grade) -> VerdictWords:
-    """The words for a grade's verdict, or that there was nothing to run."""
+    """The words for a grade's verdict, for what was not submitted, or that there was nothing to run."""
+    if not grade.missing:
+        return _ended(grade) if grade.trials else _NO_ROBOT
+    words = _WITHOUT[grade.missing]
+    if grade.verdict is Verdict.FINISHED:
+        return words
+    ended = _ended(grade)
+    return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
+
+
+def _ended(grade: Grade) -> VerdictWords:
     if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
         return _AGENT_ERROR
-    return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+    return verdict_words(grade.verdict)
 
 
 def _is_of_an_agent(grade: Grade) -> bool:

@@ -104,6 +104,7 @@ def load(session: Session, job_id: str) -> Grade:
         sandbox=job.sandbox or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
+        missing=job.missing,
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
         cost=None if job.cost is None else decode(Cost, job.cost),
     )

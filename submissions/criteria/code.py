@@ -61,6 +61,11 @@ class SourceRules(Criterion):
 
     judges_runs: ClassVar[bool] = False
 
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The one that it reads."""
+        return frozenset({self.part})
+
     @field_validator("flags")
     @classmethod
     def _known_flags(cls, value: Texts) -> Texts:
@@ -135,6 +140,11 @@ class Functions(Criterion):
     at_least: float = Field(default=1.0, gt=0, le=1)
 
     judges_runs: ClassVar[bool] = False
+
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The one whose functions it calls."""
+        return frozenset({"responder"})
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """The responder whose functions it calls has to be there."""

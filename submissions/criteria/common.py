@@ -101,6 +101,18 @@ class Criterion(StrictTable):
         return False
 
     @property
+    def questions(self) -> Texts:
+        """The texts for a responder by whose answers alone it judges; without any it looks at the robot as well."""
+        return ()
+
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The parts without which there is nothing to look at."""
+        if self.questions:
+            return frozenset({"responder"})
+        return frozenset({"program", "responder"} if self.asks_responder else {"program"})
+
+    @property
     def result_needed(self) -> str | None:
         """The id of the criterion that has to be judged before it."""
         return None

@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from submissions.criteria.asking import BetweenAgents
-from submissions.criteria.common import SomeTextOrTexts
+from submissions.criteria.common import SomeTextOrTexts, Texts
 from submissions.criteria.texts import TextConditions
 
 
@@ -37,6 +37,11 @@ class Replies(BetweenAgents, TextConditions):
     def asks_responder(self) -> bool:
         """True: nothing else is looked at."""
         return True
+
+    @property
+    def questions(self) -> Texts:
+        """Those of ``expect``, unless it is agents that ask."""
+        return () if self.agents else tuple(self.expect)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

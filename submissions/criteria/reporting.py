@@ -37,6 +37,11 @@ class Reports(AmongMany):
     among: Annotated[Texts, NotBlank] = ()
     only: bool = False
 
+    @property
+    def asks_responder(self) -> bool:
+        """Whether it looks at answers alone."""
+        return self.source == "reply"
+
     @field_validator("expected", mode="plain")
     @classmethod
     def _rows(cls, value: object) -> object:

@@ -12,6 +12,7 @@ from responders.function_calls import Called, Returned
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.source_answers import SourceAnswers
 from submissions.assignment.definition import Assignment
+from submissions.bundle import Part
 from submissions.criteria import Criterion
 from submissions.magics import Flags
 
@@ -28,6 +29,7 @@ class StaticAnalysis:
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Returned] = field(default_factory=dict)
     sandbox: str = ""
+    missing: Part | None = None  # asked for, and not submitted
 
 
 @dataclass(frozen=True, slots=True)

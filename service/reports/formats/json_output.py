@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from service.grading.grade import Accuracy
-from service.reports.formats.registry import document, table
+from service.grading.grade import Accuracy, Grade
+from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
+from service.reports.rows import TableRow
 from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
 from sim.recording import Message, Recording
@@ -55,6 +56,7 @@ def json_document(view: View) -> dict[str, Any]:
         ],
         "accuracy": _accuracy(grade.accuracy),
         "notes": [storable(note) for note in grade.notes],
+        **({"missing": grade.missing} if grade.missing else {}),
         **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
 
@@ -65,10 +67,26 @@ def json_text(view: View) -> str:
     return json.dumps(json_document(view), indent=2, allow_nan=False) + "\n"
 
 
+@refusal("json")
+def json_refusal(row: TableRow[Grade]) -> str:
+    """Who was refused, and why."""
+    return json.dumps(_of_several(row.shown(staff_view)), indent=2) + "\n"
+
+
 @table("json", ".json", staff_view)
-def json_list(views: Sequence[View]) -> str:
-    """The documents of a batch, each with its student."""
-    return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+def json_list(rows: Sequence[TableRow[View]]) -> str:
+    """The documents of several, each with its student and file; without marks where there is no grade."""
+    return json.dumps([_of_several(row) for row in rows], indent=2) + "\n"
+
+
+def _of_several(row: TableRow[View]) -> dict[str, Any]:
+    student = row.student
+    who = {"student": student.id, "name": student.name, "email": student.email, "file": row.source}
+    why = {"reason": storable(row.reason)} if row.reason else {}
+    if row.grade is None:
+        none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
+        return {**who, **why, **none}
+    return {**who, **why, **json_document(row.grade)}
 
 
 def _said(recording: Recording) -> dict[str, Any]:

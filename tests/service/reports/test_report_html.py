@@ -221,5 +221,5 @@ def test_batch_index_links_and_escapes() -> None:
     assert reader.tags <= TAGS
     assert "2.5 / 8" in reader.text
     assert "0 / 8" in reader.text
-    assert "not graded yet" in reader.text
+    assert "not graded" in reader.text
     assert "3 of 4 graded" in reader.text
