@@ -25,6 +25,7 @@ import pytest
 from models import weights_bytes
 from notebook_builder import MESSAGING
 from responders import library
+from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook
 from responders.sandbox.running_child import ChildLimits
 from running import run_program
@@ -34,7 +35,7 @@ from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import differences, in_words
 from service.reports.plots.own_diagrams import draw_diagram
 from service.reports.plots.talk import talks
-from sim.recording import Pose, Recording, Verdict
+from sim.recording import LossReason, Pose, Recording, Verdict
 from submissions.assignment.examples import examples
 from submissions.diagram import Diagram
 from submissions.diagram_cells import diagrams_in
@@ -207,3 +208,26 @@ def test_9_block_diagram(executed: ExecutedNotebook) -> None:
 def test_10_sequence_diagrams(executed: ExecutedNotebook, cell: int, described: int, words: str) -> None:
     assert compared(DIAGRAMS[cell], run(executed, described)) == words
     draw_diagram(DIAGRAMS[cell], f"Cell {cell}", "", Highlights()).draw_without_rendering()
+
+
+@pytest.mark.parametrize(
+    ("start", "lost"),
+    [
+        (Pose(1200, 300, 0), ""),
+        (Pose(700, 300, 0), "out of range"),
+        (Pose(1200, 300, 180), "facing away"),
+    ],
+)
+def test_11_messages_are_lost_out_of_range_or_facing_the_wrong_way(
+    runner: TrialRunner, start: Pose, lost: LossReason
+) -> None:
+    """The echo's own program and responder, over an infrared link to a beacon at (1500, 300)."""
+    folder = examples("echo-responder") / "seed"
+    _, text = split_program((folder / "robot.py").read_text())
+    channel = Channel(link="infrared", beacon=(1500, 300), range=600, facing=90)
+    recording = run_program(
+        runner, text, start, responder=(folder / "responder.py").read_text(), channel=channel, seconds=20
+    )
+    assert [message.lost for message in recording.messages if message.sender == "robot"] == [lost] * 3
+    assert len(texts(recording, "responder")) == (0 if lost else 3)
+    assert recording.spoken[-1].text == "all done"
