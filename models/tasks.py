@@ -10,6 +10,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,21 @@ from models.preprocessing import Vector
 Examples = tuple[Vector, NDArray[np.int64]]
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How a network is fitted: one hidden layer, and stages of (step size of Adam, passes over all images)."""
+class Plan(Protocol):
+    """How a network is fitted, and what its file is."""
 
-    hidden: int
-    stages: tuple[tuple[float, int], ...]
-    decay: float  # the weight of the squared weights in what is minimised
-    seed: int
+    @property
+    def seed(self) -> int:
+        """What its chance comes from."""
+        ...
+
+    def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
+        """The file of a network for ``images`` of shape (n, inputs) and their class numbers; again the same bytes."""
+        ...
+
+    def architecture(self, inputs: int, classes: int) -> str:
+        """The layers in words."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

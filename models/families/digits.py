@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from models.images import LabelledPose
+from models.perceptrons import Perceptron
 from models.preprocessing import SIDE, Grey, features, luma
 from models.tasks import Examples, Plan, Task, Test, register
 from sim.chance import Stream
@@ -149,5 +150,5 @@ def _register(name: str, side: int, plan: Plan) -> None:
     )
 
 
-_register("digits", 14, Plan(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
-_register("digits-28", 28, Plan(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))
+_register("digits", 14, Perceptron(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
+_register("digits-28", 28, Perceptron(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))

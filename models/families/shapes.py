@@ -10,8 +10,9 @@ import itertools
 import numpy as np
 
 from models.images import LabelledPose, Photographer, Shift
+from models.perceptrons import Perceptron
 from models.preprocessing import features
-from models.tasks import Examples, Plan, Task, Test, register
+from models.tasks import Examples, Task, Test, register
 from sim.chance import Stream
 from sim.floors import SHAPES
 from sim.recording import Pose
@@ -55,7 +56,7 @@ TASK = register(
         words="Names the shape under the robot's left light sensor.",
         classes=SHAPES,
         side=14,
-        plan=Plan(hidden=40, stages=((1e-3, 60), (2e-4, 20)), decay=1e-3, seed=_SEED),
+        plan=Perceptron(hidden=40, stages=((1e-3, 60), (2e-4, 20)), decay=1e-3, seed=_SEED),
         examples=_examples,
         training_words=f"Simple_Shapes as the simulated left sensor sees it: every whole mm up to {max(_OFFSETS)} off "
         "each way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128",

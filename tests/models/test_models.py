@@ -16,7 +16,7 @@ from models.cards import CardCurve
 from models.evaluation import evaluate
 from models.families import digits, shapes
 from models.images import LabelledPose, Photographer, Shift
-from models.networks import read
+from models.perceptrons import read
 from models.preprocessing import features
 from models.tasks import tasks
 from models.training import train

@@ -22,7 +22,7 @@ import pytest
 
 from model_submissions_maker import FOLDER, TRACE, grading_requests
 from models import weights_bytes
-from models.networks import read
+from models.perceptrons import read
 from paths import ROOT
 from running import run_program
 from service.grading.grade import Grade
