@@ -88,6 +88,9 @@ def _curves(task: Task, network: Network, photographer: Photographer) -> Iterato
         for noise in task.test().noises_beside:
             words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
             yield _curve(task, network, photographer, words, values, Shift(noise=noise), axis)
+    for altered in task.test().altered:
+        tallies = tuple(_tally(task, network, list(altered.seen(value))) for value in altered.values)
+        yield CardCurve(altered.varied, altered.unit, altered.under, altered.values, tallies)
 
 
 def _curve(
@@ -102,8 +105,12 @@ def _curve(
     test = task.test()
     tallies = []
     for value in values:
-        found = list(photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws))
-        answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
-        right = sum(place.label == answer for (place, _), answer in zip(found, answers, strict=True))
-        tallies.append(Tally(int(right), len(found)))
+        found = photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws)
+        tallies.append(_tally(task, network, [(place.label, grey) for place, grey in found]))
     return CardCurve(*words, tuple(float(value) for value in values), tuple(tallies))
+
+
+def _tally(task: Task, network: Network, seen: Sequence[tuple[int, Grey]]) -> Tally:
+    answers = network.predict(np.array([features(grey, task.side) for _, grey in seen]))
+    right = sum(label == answer for (label, _), answer in zip(seen, answers, strict=True))
+    return Tally(int(right), len(seen))

@@ -7,7 +7,7 @@ All are trained and measured by the same code.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.images import LabelledPose
-from models.preprocessing import Vector
+from models.preprocessing import Grey, Vector
 
 Examples = tuple[Vector, NDArray[np.int64]]
 
@@ -39,11 +39,23 @@ class Plan(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Altered:
+    """A test of images that no packaged floor shows: what is varied over which values, and what is seen at each."""
+
+    varied: str
+    unit: str
+    under: str
+    values: tuple[float, ...]  # ascending
+    seen: Callable[[float], Iterable[tuple[int, Grey]]]  # the number of the class, and the focus
+
+
+@dataclass(frozen=True, slots=True)
 class Test:
     """Where a classifier is tested: ``places`` for its accuracy, some of them for its curves.
 
     ``noises`` are those at which its accuracy is counted, each (grey levels, draws at a place); ``noises_beside`` those
-    at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise.
+    at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise;
+    ``altered`` are curves beyond those.
     """
 
     places: tuple[LabelledPose, ...]
@@ -52,6 +64,7 @@ class Test:
     noises_beside: tuple[float, ...]
     draws: int
     words: str
+    altered: tuple[Altered, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
