@@ -22,7 +22,6 @@ _BATCH = 100
 _WARM_UP = 200  # steps until the whole step size is used
 #: Of Adam: how much of the mean slope and of the mean square of the slopes stays from step to step.
 _MEAN, _SQUARE = 0.9, 0.999
-_AVERAGE = 0.999  # how much of the averaged weights stays from step to step
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,10 @@ class Convolution:
             _slopes(layers, shown[rows], labels[rows])
             size = self.step * (1 + math.cos(math.pi * number / steps)) / 2 * min(1.0, (number + 1) / _WARM_UP)
             descent.step([slopes for layer in layers for slopes in layer.slopes], size)
-        descent.settle()
+        for layer in layers:
+            for weights in layer.weights:
+                # So that last bits do not show.
+                weights[...] = np.round(weights, _DECIMALS)
         return onnx_file(layers, side, classes)
 
     def architecture(self, inputs: int, classes: int) -> str:
@@ -85,36 +87,23 @@ class Convolution:
 
 
 class _Descent:
-    """Adam (D. Kingma, J. Ba, ICLR 2015) with decay of the weights (I. Loshchilov, F. Hutter, ICLR 2019).
-
-    The weights that remain are the average over the last steps.
-    """
+    """Adam (D. Kingma, J. Ba, ICLR 2015) with decay of the weights (I. Loshchilov, F. Hutter, ICLR 2019)."""
 
     def __init__(self, weights: Sequence[Floats], decay: float) -> None:
         self._weights, self._decay, self._steps = weights, decay, 0
         self._means = [np.zeros_like(each) for each in weights]
         self._squares = [np.zeros_like(each) for each in weights]
-        self._averages = [each.copy() for each in weights]
 
     def step(self, slopes: Sequence[Floats], size: float) -> None:
         """Take one step down ``slopes``, one a weight."""
         self._steps += 1
         corrected = size * math.sqrt(1 - _SQUARE**self._steps) / (1 - _MEAN**self._steps)
-        # As many steps count as there have been, so that the first weights are soon forgotten.
-        kept = min(_AVERAGE, 1 - 1 / self._steps)
-        moving = zip(self._weights, slopes, self._means, self._squares, self._averages, strict=True)
-        for weights, slope, mean, square, average in moving:
+        for weights, slope, mean, square in zip(self._weights, slopes, self._means, self._squares, strict=True):
             mean += (1 - _MEAN) * (slope - mean)
             square += (1 - _SQUARE) * (slope * slope - square)
             if weights.ndim > 1:
                 weights *= 1 - size * self._decay
             weights -= corrected * mean / (np.sqrt(square) + 1e-8)
-            average += (1 - kept) * (weights - average)
-
-    def settle(self) -> None:
-        """Put the averages for the weights, rounded, so that last bits do not show."""
-        for weights, average in zip(self._weights, self._averages, strict=True):
-            weights[...] = np.round(average, _DECIMALS)
 
 
 def _slopes(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:

