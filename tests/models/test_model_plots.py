@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,3 +103,21 @@ def test_the_list_has_every_model_with_its_interval() -> None:
     (line,) = [line for line in done.output.splitlines() if line.startswith("digits ")]
     for part in (f"{accuracy.share:.3f}", f"{low:.3f} to {high:.3f}", str(accuracy.n)):
         assert part in line
+
+
+def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
+    done = CliRunner().invoke(models_app, ["compare", "digits", "digits-cnn", "--report", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    (line,) = [line for line in done.output.splitlines() if line.strip().startswith("accuracy")]
+    for name in ("digits", "digits-cnn"):
+        accuracy = card(name).measured.accuracy
+        low, high = accuracy.interval
+        assert f"{accuracy.share:.3f} ({low:.3f} to {high:.3f})" in line
+    assert line.split()[-1] == str(accuracy.n)
+    assert (tmp_path / "digits-and-digits-cnn.png").exists()
+
+
+def test_classifiers_of_different_things_are_not_compared() -> None:
+    done = CliRunner().invoke(models_app, ["compare", "digits", "shapes"])
+    assert done.exit_code != 0
+    assert "digits, shapes cannot be compared; expected two or more models of the same things" in done.output
