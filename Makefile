@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
-.PHONY: setup demo test test-fast test-long test-all lint format bench lock wheel clean
+.PHONY: setup demo test test-fast test-long test-all lint format bench lock wheel image clean
 
 setup: $(VENV)/.ready
 
@@ -60,9 +60,18 @@ bench: setup
 wheel: setup
 	$(BIN)/python -m hatchling build -t wheel
 
-# Needs uv; the lock file names no package index.
+# Needs docker or podman.
+CONTAINERS := $(shell which docker podman 2>/dev/null | head -n 1)
+
+image: wheel
+	$(CONTAINERS) build -f deploy/Dockerfile -t robomark .
+
+# Needs uv; the lock files name no package index. The second is for images: what grading needs or may use, and nothing for tests.
+LOCK := uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11 pyproject.toml
+
 lock:
-	uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --extra test pyproject.toml -o requirements.lock
+	$(LOCK) --extra test -o requirements.lock
+	$(LOCK) --extra tflite --no-annotate -c requirements.lock -o deploy/requirements.lock
 
 clean:
 	rm -rf $(VENV) dist .mypy_cache .ruff_cache .pytest_cache robomark-demo

@@ -10,68 +10,116 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
 from types import MappingProxyType
-from typing import NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
-from sqlalchemy.exc import DBAPIError
+from typer.core import TyperGroup
 from typer.exceptions import TyperException
+from typer.main import get_command, get_group
 
 from service.home import keep_private
 from service.reports.readable import readable
 from sim.errors import Cancelled, RobomarkError, UsageError
 
 _CALLER, _OURS, _STOPPED = 2, 3, 130
+_CONTEXT = {"help_option_names": ["-h", "--help"]}
 
-#: Where each command is, in the order in which help lists them; a name that ends in ``_app`` is a group of commands.
-_COMMANDS: Mapping[str, str] = MappingProxyType(
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A command: ``module:name`` below ``service.commands``, and what the list of commands says of it."""
+
+    where: str
+    summary: str
+
+
+#: In the order in which help lists them; a name that ends in ``_app`` is a group of commands.
+_COMMANDS: Mapping[str, _Entry] = MappingProxyType(
     {
-        "run": "run:run",
-        "grade": "grade:grade",
-        "batch": "batch.app:batch_app",
-        "assignments": "assignments:assignments_app",
-        "models": "models:models_app",
-        "floors": "floors:floors",
-        "show": "operator:show",
-        "verify": "verify:verify",
-        "course": "course:course_app",
-        "up": "up:up",
-        "serve": "up:serve",
-        "worker": "operator:worker",
-        "doctor": "operator:doctor",
-        "db": "operator:database_app",
-        "sandbox": "sandbox:sandbox_app",
-        "demo": "demo:demo",
+        "run": _Entry("run:run", "Run a robot program or a notebook in the simulator."),
+        "grade": _Entry("grade:grade", "Grade submissions now."),
+        "batch": _Entry("batch.app:batch_app", "Grade many submissions through the queue."),
+        "assignments": _Entry("assignments:assignments_app", "List, show, check, make and export assignments."),
+        "models": _Entry("models:models_app", "List, train and evaluate classifiers."),
+        "floors": _Entry("floors:floors", "Draw every floor with its scale."),
+        "show": _Entry("operator:show", "Show a grade that is stored."),
+        "verify": _Entry("verify:verify", "Run a stored grading again and compare."),
+        "course": _Entry("course:course_app", "Say when and how often students may submit."),
+        "up": _Entry("up:up", "Bring up broker, workers and web server."),
+        "serve": _Entry("up:serve", "Answer on the web: health and metrics."),
+        "worker": _Entry("operator:worker", "Grade what is queued until told to stop."),
+        "doctor": _Entry("operator:doctor", "Look at everything that grading needs on this machine."),
+        "db": _Entry("database:database_app", "Look after the database."),
+        "sandbox": _Entry("sandbox:sandbox_app", "Show the sandbox round student code."),
+        "demo": _Entry("demo:demo", "Grade sample submissions through a real worker."),
     }
 )
 
 
-def commands(words: Sequence[str] = ()) -> typer.Typer:
-    """The command that ``words`` begins with, or all of them: only what is needed is imported, which takes a while."""
+class _Commands(TyperGroup):
+    """All commands by name and summary. One is imported when it is to run, which takes a while, and no other."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """The name, the command itself, and the words after it."""
+        name, listed, rest = super().resolve_command(ctx, args)
+        return name, listed if name is None else load_command(name), rest
+
+
+def load_command(name: str) -> Any:
+    """The command or group called ``name``, imported, as Typer runs it."""
+    module, _, attribute = _COMMANDS[name].where.partition(":")
+    found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
+    # Not before they are imported: what Python keeps of its modules is for the users that children run as, too.
+    keep_private()
+    app = typer.Typer(context_settings=_CONTEXT, rich_markup_mode=None, add_completion=False)
+    if attribute.endswith("_app"):
+        app.add_typer(found, name=name)
+        app.callback()(_nothing)
+        return get_group(app).commands[name]
+    app.command(name)(found)
+    return get_command(app)
+
+
+def _command_line() -> Any:
     app = typer.Typer(
         name="robomark",
+        cls=_Commands,
         help="Grades robot programs and responders of the RoboLab activities, without a screen.",
         no_args_is_help=True,
-        pretty_exceptions_enable=False,
-        add_completion=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        rich_markup_mode=None,
+        context_settings=_CONTEXT,
     )
-    app.callback()(_nothing)
-    for name in words[:1] if words and words[0] in _COMMANDS else _COMMANDS:
-        module, _, attribute = _COMMANDS[name].partition(":")
-        found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
-        if attribute.endswith("_app"):
-            app.add_typer(found, name=name)
-        else:
-            app.command(name)(found)
-    return app
+    app.callback()(_root)
+    for name, entry in _COMMANDS.items():
+        app.command(name, help=entry.summary)(_nothing)
+    return get_command(app)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        # Finding it costs more than all the rest of a --help.
+        from service.version import GRADER_VERSION
+
+        print(f"robomark {GRADER_VERSION}")
+        raise typer.Exit
+
+
+def _root(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end."),
+    ] = False,
+) -> None:
+    """What comes before the command."""
 
 
 def _nothing() -> None:
-    """Keeps a lone command a command of ``robomark``."""
+    """Stands for a command that is only listed."""
 
 
 def main() -> NoReturn:
@@ -81,10 +129,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
-        command = commands(sys.argv[1:])
-        # Not before they are imported: what Python keeps of its modules is for the users that children run as, too.
-        keep_private()
-        ending = command(standalone_mode=False)
+        ending = _command_line()(prog_name="robomark", standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
         _end(str(error), _CALLER)
@@ -96,18 +141,22 @@ def main() -> NoReturn:
         _end_misspelt(error)
     except (typer.Abort, KeyboardInterrupt):
         _end("stopped", _STOPPED)
-    except (BrokenPipeError, SystemExit):
-        # Typer itself ends so, and only so, when nobody reads what it prints.
+    except BrokenPipeError:
         _end_unread()
-    except DBAPIError as error:
-        _debug()
-        _end(f"the database would not do it: {error.orig}; robomark doctor looks at it", _OURS)
+    except SystemExit as ended:
+        # Typer itself ends so: after it has completed a word for the shell, or when nobody reads what it prints.
+        if not ended.code:
+            raise
+        _end_unread()
     except OSError as error:
         _debug()
         where = "" if error.filename is None else f"{error.filename}: "
         _end(f"the machine would not do it: {where}{error.strerror or error}", _OURS)
     except Exception as error:
         _debug()
+        database = sys.modules.get("sqlalchemy.exc")
+        if database is not None and isinstance(error, database.DBAPIError):
+            _end(f"the database would not do it: {error.orig}; robomark doctor looks at it", _OURS)
         _end(
             f"something went wrong in Robomark itself, not in your files: {type(error).__name__}: {error} "
             "(set ROBOMARK_DEBUG=1 to see where)",

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from service.grading.grade import Grade
 from submissions.assignment.definition import Assignment
+from submissions.diagram_cells import diagrams_in
+from submissions.submission import Submission
 
 
-def draw(grade: Grade, assignment: Assignment) -> dict[str, bytes]:
-    """Every plot of the grade, name -> PNG; floors of the assignment's own are drawn as such."""
+def draw(grade: Grade, assignment: Assignment, submission: Submission) -> dict[str, bytes]:
+    """Every plot of the grade, name -> PNG; floors of the assignment's own, and a notebook's diagrams, as such."""
     # A worker that only grades need not load the drawing library.
     from service.reports.plots.drawn import draw_all
     from sim.floors import floor_from_image
@@ -19,4 +21,4 @@ def draw(grade: Grade, assignment: Assignment) -> dict[str, bytes]:
     images = {}
     if world.image is not None:
         images[world.background] = floor_from_image(world.background, world.image).pixels
-    return draw_all(grade, images)
+    return draw_all(grade, images, diagrams_in(submission.notebook).cells)

@@ -39,7 +39,7 @@ def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: 
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
         assignment = intake.load_assignment(session, line.id) if drawn is None else None
     if assignment is not None:
-        drawn = draw(grade, assignment)
+        drawn = draw(grade, assignment, submission)
     found = drawn or {}
     view = student_view(grade, released) if line.staff_only is None else staff_view(grade)
     return Written(write_page(folder, f"{stem}.html", report(view, found, submission)), found)

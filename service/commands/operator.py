@@ -1,10 +1,8 @@
-"""``robomark worker``, ``doctor``, ``show`` and ``db``: running the service and looking into it."""
+"""``robomark worker``, ``doctor`` and ``show``: running the service and looking into it."""
 
 from __future__ import annotations
 
-import sqlite3
 import sys
-from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -24,15 +22,12 @@ from service.report_files import write_report
 from service.reports.formats.text import plain_text
 from service.reports.view import staff_view
 from service.reports.written import file_stem
-from service.settings import Settings, load_settings
+from service.settings import load_settings
 from service.store import batches, results
 from service.store.batches import JobLine
-from service.store.engine import open_engine, open_store
-from service.store.migrate import current_revision, newest_revision
+from service.store.engine import open_store
 from service.store.states import JobState
-from sim.errors import HostError, UsageError
-
-database_app = typer.Typer(help="Look after the database.", no_args_is_help=True)
+from sim.errors import HostError
 
 
 def worker(
@@ -95,43 +90,6 @@ def show(
             with for_the_user():
                 path.write_bytes(data)
             print(f"plot: {path}")
-
-
-@database_app.command()
-def upgrade() -> None:
-    """Bring the tables up to this release; every command does it when it starts."""
-    settings = load_settings()
-    open_store(settings).close()
-    print(f"the database is at revision {newest_revision()}")
-
-
-@database_app.command()
-def backup(file: Annotated[Path, typer.Argument(help="The copy to make; it must not exist.")]) -> None:
-    """Copy the SQLite database while it is in use; the copy is whole, can be opened as it is, and is for you alone."""
-    settings = load_settings()
-    source = _sqlite_file(settings)
-    if file.exists():
-        raise UsageError(f"{file} exists already; name a new file")
-    if not source.exists():
-        raise UsageError(f"there is no database yet at {source}")
-    try:
-        with closing(sqlite3.connect(source)) as live, closing(sqlite3.connect(file)) as copy:
-            live.backup(copy)
-    except sqlite3.Error as error:
-        file.unlink(missing_ok=True)
-        raise HostError(f"the database cannot be copied to {file}: {error}") from None
-    engine = open_engine(f"sqlite:///{file.absolute()}")
-    try:
-        print(f"{file}: {file.stat().st_size} bytes, revision {current_revision(engine)}")
-    finally:
-        engine.dispose()
-
-
-def _sqlite_file(settings: Settings) -> Path:
-    url = open_engine(settings.database).url
-    if url.get_backend_name() != "sqlite" or not url.database:
-        raise UsageError("only a SQLite database is copied by this command; for PostgreSQL use pg_dump")
-    return Path(url.database)
 
 
 def _not_graded(line: JobLine) -> str:

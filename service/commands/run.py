@@ -16,7 +16,7 @@ from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.grade import warn_of_no_sandbox
-from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_notebook
+from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
@@ -24,6 +24,7 @@ from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.trace import trace
+from service.reports.written import prepare_folder
 from sim.errors import UsageError
 from sim.floors import floor
 from sim.recorded import floor_of
@@ -80,6 +81,9 @@ def run(
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
+    diagrams: Annotated[
+        Path | None, typer.Option(help="Draw the diagrams of a notebook's cells into this folder, as PNG.")
+    ] = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
     ] = False,
@@ -87,6 +91,8 @@ def run(
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
     if image is not None and image.suffix.lower() != ".png":
         raise UsageError(f"--picture {image}: expected a name that ends in .png")
+    if diagrams is not None:
+        prepare_folder(diagrams)
     values = {
         "b": background,
         "r": robot_setup,
@@ -111,9 +117,12 @@ def run(
         with TrialRunner(NONE if unsafe else FULL) as runner:
             executed = run_notebook(notebook, _files_beside(program), limits, last, runner)
         show_notebook(executed, _show)
+        show_diagrams(notebook, diagrams)
         if executed.runs:
             _keep(executed.runs[-1].recording, program.name, seed, trace_file, image)
         return
+    if diagrams is not None:
+        raise UsageError(f"{program.name} is not a notebook and draws no diagrams; leave --diagrams out")
     flags, text = _program(program)
     flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
     chosen = setup(flags)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import typer
 
@@ -14,11 +15,16 @@ from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
+from service.reports.plots.diagram_parts import Highlights
+from service.reports.plots.own_diagrams import draw_diagram, title_of_cell
+from service.reports.plots.style import png
 from service.reports.readable import readable
+from service.reports.written import write_file
 from sim.floors import floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
+from submissions.diagram_cells import diagrams_in
 from submissions.magics import Flags, Setup
 from submissions.marked_cell import sites
 from submissions.submission import Notebook
@@ -90,3 +96,17 @@ def show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None])
         typer.echo(f"{executed.stopped.place}: {executed.stopped.verdict}: {executed.stopped.message}", err=True)
     if not executed.runs:
         typer.echo("note: no robot was started: no cell begins with %%sim_magic_preloaded", err=True)
+
+
+def show_diagrams(notebook: Notebook, folder: Path | None) -> None:
+    """The diagrams of the notebook's cells as files, if there is a folder for them, and which cannot be drawn."""
+    found = diagrams_in(notebook)
+    for problem in found.problems:
+        typer.echo(f"note: {readable(problem, 400)}", err=True)
+    if folder is None:
+        if found.cells:
+            typer.echo("note: the notebook has diagrams; --diagrams FOLDER draws them", err=True)
+        return
+    for cell in found.cells:
+        figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())
+        typer.echo(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', png(figure))}", err=True)

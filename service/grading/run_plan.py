@@ -23,6 +23,7 @@ from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
+from submissions.diagram_cells import diagrams_in
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of
@@ -93,6 +94,7 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     else:
         plan = _of_files(submission, assignment)
     seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    plan = replace(plan, notes=(*plan.notes, *diagrams_in(notebook).problems))
     return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
 
 

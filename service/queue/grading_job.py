@@ -74,8 +74,8 @@ def plot_next(store: Store, settings: Settings) -> str | None:
         return None
     with store.reading() as session:
         graded = results.load(session, job_id)
-        assignment = intake.load_assignment(session, job_id)
-    drawn = draw(graded, assignment)
+        asked = intake.load_grading_request(session, job_id)
+    drawn = draw(graded, asked.assignment, asked.submission)
     _persistent(lambda: plots.finish(store, job_id, drawn), settings.lease_seconds)
     return job_id
 

@@ -10,12 +10,15 @@ from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
 from service.reports.faults import FaultGroup, fault_groups
-from service.reports.plots.drawn import Plot, plots_of
+from service.reports.plots.drawn import plots_of
+from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
+from service.reports.plots.plot import Plot
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import VerdictWords, cost_words, grade_words, verdict_words
 from sim.recording import Fault, Message, Recording, Verdict
+from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
@@ -106,6 +109,7 @@ class Page:
     classification: tuple[Plot, ...]
     recognition: tuple[RecognitionTable, ...]
     scenes: tuple[Scene, ...]
+    diagrams: tuple[OwnDiagram, ...]
     trials: tuple[TrialLine, ...]
     more_trials: int
     notes: tuple[str, ...]
@@ -135,6 +139,7 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
         classification=tuple(plot for plot in plots if not plot.scenario),
         recognition=recognition_tables(grade),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
+        diagrams=own_diagrams(grade, diagrams_in(submission.notebook).cells) if submission is not None else (),
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),

@@ -16,6 +16,7 @@ from service.reports.html import report
 from service.reports.plots.drawn import draw_all
 from service.reports.view import student_view
 from sim.errors import UsageError
+from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
 #: Of a name, in a file's name; a file system allows 255 for all of it.
@@ -59,11 +60,16 @@ def prepare_folder(folder: Path) -> None:
 
 def write_page(folder: Path, name: str, page: str) -> Path:
     """Write one page. Raises UsageError when the folder cannot be written to."""
+    return write_file(folder, name, page.encode())
+
+
+def write_file(folder: Path, name: str, data: bytes) -> Path:
+    """Write one file. Raises UsageError when the folder cannot be written to."""
     path = folder / name
     try:
         with for_the_user():
             folder.mkdir(parents=True, exist_ok=True)
-            path.write_text(page, encoding="utf-8")
+            path.write_bytes(data)
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
     return path
@@ -71,5 +77,6 @@ def write_page(folder: Path, name: str, page: str) -> Path:
 
 def write_report(folder: Path, grade: Grade, submission: Submission, written: str) -> Path:
     """Draw the plots of a grade and write the report, called after the student as the name was written; where it is."""
-    page = report(student_view(grade), draw_all(grade), submission)
+    plots = draw_all(grade, cells=diagrams_in(submission.notebook).cells)
+    page = report(student_view(grade), plots, submission)
     return write_page(folder, f"{file_stem(written)}.html", page)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from command import robomark
 from models import weights_bytes
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
 from service.grading.grade import Grade
@@ -115,7 +116,7 @@ def test_the_course_notebook_gets_full_marks_for_each_of_its_programs(
     assert "Parsed: {'typ': 'PY', 'obj': [1, 2, 3]}" in recording.responder_output
     assert "Response: Python saw >> 4 << that..." in recording.responder_output
     assert recording.responder_log.startswith("# Responder logfile\n# ---")
-    assert sum("diagrams are not drawn here" in note for note in result.notes) == 4
+    assert not any("diag" in note for note in result.notes)
     assert marks == sum(each.max_marks for each in result.criteria)
 
 
@@ -136,7 +137,7 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     shutil.copy(MESSAGING, tmp_path)
     command = "from service.cli import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", command, "run", "messaging.ipynb", "-x", "360", "--picture", "p.png"],
+        [sys.executable, "-c", command, "run", "messaging.ipynb", "-x", "360", "--picture", "p.png", "--diagrams", "d"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -150,7 +151,16 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     assert "(says) Is that a upwards facing triangle" in done.stdout
     # The flags of the command line are those of the last run.
     assert done.stdout.count("(says) Is that a left facing triangle") == 1
-    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    images = [tmp_path / "p.png", *(tmp_path / "d" / f"cell-{number}.png" for number in (2, 7, 15, 27))]
+    assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
+    assert len(list((tmp_path / "d").iterdir())) == 4
+
+
+def test_a_robot_program_draws_no_diagrams(tmp_path: Path) -> None:
+    (tmp_path / "robot.py").write_text("say('hello')")
+    done = robomark("run", tmp_path / "robot.py", "--diagrams", tmp_path / "d")
+    assert done.returncode == 2
+    assert "robot.py is not a notebook and draws no diagrams; leave --diagrams out" in done.stderr
 
 
 # Which run is marked.
@@ -350,7 +360,11 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunne
         ("%%bash\nls", "cell 2, line 1: %%bash was refused"),
         ("pip install torch", "cell 2, line 1: %pip was refused: packages cannot be installed here"),
         ("%pip install torch", "cell 2, line 1: %pip was refused"),
-        ("%%seqdiag\na -> b;", "cell 2, line 1: %%seqdiag was skipped: diagrams are not drawn here"),
+        ("%%nwdiag\na -> b;", "cell 2, line 1: %%nwdiag was skipped: only %%blockdiag and %%seqdiag are drawn here"),
+        (
+            "%%seqdiag\n# one\na -> -> b;",
+            "cell 2, line 3: '->' stands here, expected the name of an actor; the diagram",
+        ),
         ("%run other.py", "cell 2, line 1: %run was skipped: it is not known here"),
         ("%%nonsense\nhello", "cell 2, line 1: %%nonsense was skipped"),
         ("1 +", "cell 2, line 1: SyntaxError: invalid syntax; the other cells were run all the same"),

@@ -1,15 +1,45 @@
-"""The course notebook on messaging: its programs and responders, unchanged, behave as it says."""
+"""The course notebook on messaging: each system in it behaves as its text says, run from its own cells, unchanged.
+
+The systems, with the sections of the notebook that they come from:
+
+1. a parser of messages (5.1.2)
+2. an echo responder with a logger (5.1.2)
+3. a JSON responder with an agent, which passes state (5.1.3)
+4. an image parser, and the data of images (5.1.4)
+5. an agent with a multi-layer perceptron (5.2.1)
+6. a robot that acts on the agent's answer (5.2.1)
+7. shapes at random places (5.2.1)
+8. rules in place of the network (5.3)
+9. a block diagram of the architecture (5.1.1)
+10. sequence diagrams of the protocol (5.1.2, 5.1.3, 5.1.5)
+11. messages that get lost out of range or facing the wrong way (5.1)
+12. a convolutional network in place of the perceptron (5)
+
+Of the last two the notebook has only the words, and no program; the tests are numbered as the systems are.
+"""
 
 from __future__ import annotations
 
 import pytest
 
 from models import weights_bytes
+from notebook_builder import MESSAGING
+from responders import library
+from responders.notebook_executor import ExecutedNotebook
+from responders.sandbox.running_child import ChildLimits
 from running import run_program
+from service.commands.run_notebook import LastRun, RunLimits, run_notebook
 from service.grading.trial_runner import TrialRunner
+from service.reports.plots.diagram_parts import Highlights
+from service.reports.plots.difference import differences, in_words
+from service.reports.plots.own_diagrams import draw_diagram
+from service.reports.plots.talk import talks
 from sim.recording import Pose, Recording, Verdict
 from submissions.assignment.examples import examples
-from submissions.magics import setup, split_program
+from submissions.diagram import Diagram
+from submissions.diagram_cells import diagrams_in
+from submissions.magics import Flags, setup, split_program
+from submissions.notebook import read_notebook
 
 NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
 SHAPES = (
@@ -20,56 +50,116 @@ SHAPES = (
     "upwards facing triangle",
     "diamond",
 )
+NOTEBOOK = read_notebook(MESSAGING.read_bytes(), MESSAGING.name).notebook
+DIAGRAMS = {cell.cell: cell.diagram for cell in diagrams_in(NOTEBOOK).cells}
 
 
-def driven(runner: TrialRunner, name: str, start: Pose | None = None) -> Recording:
-    grading_request = examples(name) / "seed"
-    flags, text = split_program((grading_request / "robot.py").read_text())
-    chosen = setup(flags)
+@pytest.fixture(scope="module")
+def executed(runner: TrialRunner) -> ExecutedNotebook:
+    """The whole notebook, from top to bottom."""
+    limits = RunLimits(ChildLimits(10.0, 512 << 20), ChildLimits(5.0, 128 << 20), 1_000_000, 60)
+    return run_notebook(NOTEBOOK, NETWORK, limits, LastRun(Flags(), 0, 0), runner)
+
+
+def run(executed: ExecutedNotebook, cell: int) -> Recording:
+    """The run that a cell starts."""
+    (recording,) = (each.recording for each in executed.runs if each.cell == cell)
+    assert recording.verdict is Verdict.FINISHED
+    return recording
+
+
+def texts(recording: Recording, sender: str) -> list[str]:
+    return [message.text for message in recording.messages if message.sender == sender]
+
+
+def calls(recording: Recording) -> list[tuple[str, str]]:
+    return [(call.caller, call.callee) for call in recording.calls]
+
+
+def compared(diagram: Diagram, recording: Recording) -> str:
+    found = differences(diagram, talks(recording))
+    assert found is not None
+    return in_words(found)
+
+
+def driven(runner: TrialRunner, start: Pose, responder: str = "") -> Recording:
+    """The last program of the notebook, from another place, with its own responder or another."""
+    folder = examples("shape-recognition") / "seed"
+    flags, text = split_program((folder / "robot.py").read_text())
     return run_program(
         runner,
         text,
-        start or chosen.pose,
-        background=chosen.background,
-        responder=(grading_request / "responder.py").read_text(),
+        start,
+        background=setup(flags).background,
+        responder=responder or (folder / "responder.py").read_text(),
         files=NETWORK,
     )
 
 
-def test_echo(runner: TrialRunner) -> None:
-    recording = driven(runner, "echo-responder")
+def test_it_runs_from_top_to_bottom(executed: ExecutedNotebook) -> None:
+    assert (executed.raised, executed.stopped, executed.notes) == ((), None, ())
+    assert [each.cell for each in executed.runs] == [12, 20, 25, 31, 32, 33, 34]
+
+
+def test_1_parser(executed: ExecutedNotebook) -> None:
+    assert (
+        """
+Original: PY::[1, 2, 3]
+Parsed: [1, 2, 3]
+Type: <class 'list'>
+
+Original: PY:: {'int': 1, 'str': 'string'}
+Parsed: {'int': 1, 'str': 'string'}
+Type: <class 'dict'>
+
+Original: PY::my message
+Parsed: my message
+Type: <class 'str'>
+
+Original: my message
+"""
+        in executed.output
+    )
+
+
+def test_2_echo_and_logger(executed: ExecutedNotebook) -> None:
+    recording = run(executed, 12)
     assert [(message.sender, message.text) for message in recording.messages] == [
         line
         for number in (0, 2, 4)
         for line in (("robot", f"PY::{number}"), ("responder", f"Python saw >> {number} << that..."))
     ]
     assert [line.text for line in recording.spoken] == ["all done"]
-    assert recording.responder_log.count("---") == 3
-    assert recording.responder_log.startswith("Received message: 0\nResponse: Python saw >> 0 << that...\n")
-    assert recording.verdict is Verdict.FINISHED
+    assert calls(recording) == [("responder", "parser"), ("responder", "logger")] * 3
+    shown = executed.output.split("--- cell 13 ---\n")[1].split("--- cell")[0]
+    assert shown.startswith("# Responder logfile\n# -----------------\nReceived message: 0\n")
+    assert shown.count("---\n") == 3 + 1
 
 
-def test_json(runner: TrialRunner) -> None:
-    recording = driven(runner, "json-queue")
+def test_3_state_is_passed_by_agent_and_json(executed: ExecutedNotebook) -> None:
+    recording = run(executed, 20)
     queues = [line.text for line in recording.printed if line.text.startswith("Message queue")]
     assert [queue.count("Py saw") for queue in queues] == [0, 1, 1, 2, 2, 3]
+    assert texts(recording, "responder")[0] == 'JSON::{"message": "Py saw: 0"}'
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
-    assert "Received message: PY::4" in recording.responder_log
-    assert recording.verdict is Verdict.FINISHED
+    assert calls(recording) == [("responder", "parser"), ("responder", "agent"), ("responder", "logger")] * 3
+    assert 'Response: JSON::{"message": "Py saw: [1, 2, 3]"}' in executed.output
 
 
-def test_image_data(runner: TrialRunner) -> None:
-    recording = driven(runner, "image-parser")
-    answers = [message.text for message in recording.messages if message.sender == "responder"]
+def test_4_image_parser_and_image_data(executed: ExecutedNotebook) -> None:
+    assert "Parsed: {'typ': 'IMG_DATA', 'obj': {'k1': [1, 2, 3], 'k2': [4, 5, 6]}}" in executed.output
+    recording = run(executed, 25)
+    answers = texts(recording, "responder")
     assert answers[0] == """JSON::{"message": "Py saw: {'typ': 'PY', 'obj': {'test_key': 'test value'}}"}"""
     assert answers[1].startswith("""JSON::{"message": "Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,""")
-    assert recording.verdict is Verdict.FINISHED
+    assert len(recording.images) == 1
 
 
-def test_shape_from_520_900(runner: TrialRunner) -> None:
-    recording = driven(runner, "shape-recognition")
-    assert recording.spoken[-1].text == "Is that a upwards facing triangle"
-    assert [(call.caller, call.callee) for call in recording.calls] == [
+def test_5_network_in_the_agent(executed: ExecutedNotebook) -> None:
+    saw = 'JSON::{"message": {"report": "Agent says: I saw %s", "shape": "%s"}}'
+    assert texts(run(executed, 31), "responder") == [saw % (("upwards facing triangle",) * 2)]
+    assert texts(run(executed, 32), "responder") == [saw % (("square",) * 2)]
+    assert calls(run(executed, 31)) == [
         ("responder", "parser"),
         ("agent", "MLP"),
         ("responder", "agent"),
@@ -77,8 +167,43 @@ def test_shape_from_520_900(runner: TrialRunner) -> None:
     ]
 
 
+def test_6_the_robot_acts_on_the_answer(executed: ExecutedNotebook) -> None:
+    assert [line.text for line in run(executed, 33).spoken] == ["Is that a upwards facing triangle"]
+
+
 @pytest.mark.parametrize(("number", "shape"), list(enumerate(SHAPES)))
-def test_every_shape(runner: TrialRunner, number: int, shape: str) -> None:
-    recording = driven(runner, "shape-recognition", Pose(200 + 80 * number, 900, 0))
+def test_7_every_shape_that_chance_may_choose(runner: TrialRunner, number: int, shape: str) -> None:
+    recording = driven(runner, Pose(200 + 80 * number, 900, 0))
     assert recording.spoken[-1].text == f"Is that a {shape}"
     assert recording.images[0].truth == shape
+
+
+def test_8_rules_in_place_of_the_network(runner: TrialRunner) -> None:
+    recording = driven(runner, Pose(520, 900, 0), library.source("rule_responder.py"))
+    assert recording.spoken[-1].text == "Is that a upwards facing triangle"
+    assert ("agent", "MLP") not in calls(recording)
+
+
+def test_9_block_diagram(executed: ExecutedNotebook) -> None:
+    blocks = DIAGRAMS[2]
+    assert [actor.label for actor in blocks.actors] == ["Robot", "Python message\nhandler", "Neural network"]
+    assert [(arrow.source, arrow.target, arrow.heads) for arrow in blocks.arrows] == [
+        ("robot", "python", "both"),
+        ("python", "mlp", "both"),
+    ]
+    assert compared(blocks, run(executed, 33)) == "parser, agent and logger took part and are not drawn."
+    draw_diagram(blocks, "Cell 2", "", Highlights()).draw_without_rendering()
+
+
+@pytest.mark.parametrize(
+    ("cell", "described", "words"),
+    [
+        (7, 12, "It shows what happened."),
+        # The text has the agent call the parser; its program calls the one with what the other gave.
+        (15, 20, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),
+        (27, 33, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),
+    ],
+)
+def test_10_sequence_diagrams(executed: ExecutedNotebook, cell: int, described: int, words: str) -> None:
+    assert compared(DIAGRAMS[cell], run(executed, described)) == words
+    draw_diagram(DIAGRAMS[cell], f"Cell {cell}", "", Highlights()).draw_without_rendering()

@@ -198,10 +198,8 @@ def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> Non
 
 
 def test_run_takes_every_flag_of_the_magics() -> None:
-    from typer.main import get_command
+    from service.command_line import load_command
 
-    from service.command_line import commands
-
-    options = {name for option in get_command(commands()).commands["run"].params for name in option.opts}  # type: ignore[attr-defined]
+    options = {name for option in load_command("run").params for name in option.opts}
     assert {f"-{letter}" for letter in LETTERS} <= options
     assert {f"--{name}" for name in LETTERS.values()} <= options

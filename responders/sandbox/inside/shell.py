@@ -14,7 +14,9 @@ from . import refusals
 from .cell_source import python_source
 
 _ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
-_DIAGRAMS = ("blockdiag", "seqdiag", "actdiag", "nwdiag", "packetdiag", "rackdiag")
+#: Drawn from the text of their cells, by the report.
+_DIAGRAMS = frozenset(("blockdiag", "seqdiag"))
+_NO_DIAGRAMS = frozenset(("actdiag", "nwdiag", "packetdiag", "rackdiag"))
 #: What only sets up or shows something in a browser.
 _WITHOUT_EFFECT = frozenset(
     (
@@ -102,7 +104,9 @@ class Shell:
         if name in self._cells:
             return self._cells[name](line, body)
         if name in _DIAGRAMS:
-            return self._requester.note(f"%%{name} was skipped: diagrams are not drawn here")
+            return None
+        if name in _NO_DIAGRAMS:
+            return self._requester.note(f"%%{name} was skipped: only %%blockdiag and %%seqdiag are drawn here")
         return self._without(name, f"%%{name}")
 
     def magic(self, arg_s: str) -> Any:

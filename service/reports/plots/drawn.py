@@ -5,48 +5,34 @@ The drawing is in one module a plot; nothing here is random, timed or kept betwe
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Literal
 
 from matplotlib.figure import Figure
 
 from service.grading.grade import AccuracyCurve, CriterionResult, Grade
+from service.reports.plots.blocks import draw_blocks
 from service.reports.plots.confusion import draw_confusion
 from service.reports.plots.conversation import draw_conversation
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.misread import draw_misread, misread
+from service.reports.plots.own_diagrams import draw_own, own_diagrams
 from service.reports.plots.path import Pixels, draw_path
+from service.reports.plots.plot import Plot, hidden_suffix, slug, title_of, trial_name
 from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
 from service.reports.plots.sensor import draw_sensors
 from service.reports.plots.style import png
+from service.reports.plots.talk import block_diagram, talks
 from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
-from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
+from service.reports.view import scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.recorded import floor_of
 from sim.recording import Recording
+from submissions.diagram_cells import DiagramCell
 from submissions.sweep import CONDITIONS, Varied
 
-Kind = Literal["path", "sensors", "conversation", "confusion", "curves", "track", "misread", "predictions"]
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
-
-
-@dataclass(frozen=True, slots=True)
-class Plot:
-    """One plot of a grade. ``subject`` indexes the grade's trials, or its criteria where no scenario is given.
-
-    ``name`` ends in ``-staff`` if the plot shows anything that a student may not see before publication.
-    """
-
-    name: str
-    kind: Kind
-    subject: int
-    scenario: str  # empty for what a criterion pools
-    title: str
-    caption: str
-    alt: str
 
 
 def plots_of(grade: Grade) -> tuple[Plot, ...]:
@@ -54,8 +40,10 @@ def plots_of(grade: Grade) -> tuple[Plot, ...]:
     return (*_classifications(grade), *_trials(grade))
 
 
-def draw_all(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[str, bytes]:
-    """Every plot of ``grade`` for staff and for the student, name -> PNG.
+def draw_all(
+    grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES, cells: Sequence[DiagramCell] = ()
+) -> dict[str, bytes]:
+    """Every plot of ``grade``, and the diagrams of the notebook's ``cells``, for staff and student, name -> PNG.
 
     ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
     y = 1143 mm; a floor that is in neither is drawn white.
@@ -65,6 +53,10 @@ def draw_all(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[st
         for plot in plots_of(view.grade):
             if plot.name not in drawn:
                 drawn[plot.name] = png(_draw(view.grade, plot, images))
+        for own in own_diagrams(view.grade, cells):
+            for plot in own.plots:
+                if plot.name not in drawn:
+                    drawn[plot.name] = png(draw_own(own, view.grade, plot))
     return drawn
 
 
@@ -76,6 +68,10 @@ def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
         return draw_sensors(grade.trials[plot.subject], plot.title)
     if plot.kind == "conversation":
         return draw_conversation(grade.trials[plot.subject], plot.title)
+    if plot.kind == "talk":
+        trial = grade.trials[plot.subject]
+        told = block_diagram(talks(trial.recording))
+        return draw_blocks(told, plot.title, f"trial {trial.index + 1}; counts of texts and calls", Highlights())
     result = grade.criteria[plot.subject]
     if plot.kind == "confusion" and result.accuracy is not None:
         return draw_confusion(result, result.accuracy, plot.title)
@@ -114,12 +110,12 @@ def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
 
 def _classifications(grade: Grade) -> Iterator[Plot]:
     for index, result in enumerate(grade.criteria):
-        suffix = _suffix(tells_of_hidden(grade, result))
+        suffix = hidden_suffix(tells_of_hidden(grade, result))
         accuracy = result.accuracy
         if accuracy is not None and accuracy.confusion:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
-                f"confusion-{_slug(result.id)}{suffix}", "confusion", index, "", _title(grade, "what was answered"),
+                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of(grade, "what was answered"),
                 f"What each image showed and what was answered, for “{one_line(result.title, 80)}”.",
                 f"Confusion matrix: {right} of {accuracy.n} images on the diagonal, accuracy {accuracy.value:.2f}, "
                 f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
@@ -133,11 +129,11 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 for prediction in wrong[:4]
             )
             yield Plot(
-                f"predictions-{_slug(result.id)}{suffix}",
+                f"predictions-{slug(result.id)}{suffix}",
                 "predictions",
                 index,
                 "",
-                _title(grade, "what the sensor saw"),
+                title_of(grade, "what the sensor saw"),
                 "What the left light sensor sent, whole and in the focus that a network is shown. "
                 "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
                 f"{shown} sensor images, {len(wrong)} of {len(result.predictions)} answered wrongly"
@@ -155,7 +151,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
             for curve in result.curves
         )
         yield Plot(
-            f"curves-{_slug(result.id)}{suffix}", "curves", index, "", _title(grade, "robustness"),
+            f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of(grade, "robustness"),
             f"How often images were named rightly as conditions got harder, for “{title}”.",
             f"Curves of accuracy. {told}.",
         )  # fmt: skip
@@ -163,7 +159,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
     if on_track:
         right = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
-            f"track-{_slug(result.id)}{suffix}", "track", index, "", _title(grade, "along the track"),
+            f"track-{slug(result.id)}{suffix}", "track", index, "", title_of(grade, "along the track"),
             "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
             "floor, and in all trials by the way driven.",
             f"{right} of {len(result.predictions)} images right along the track in {len(on_track)} trials.",
@@ -171,7 +167,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
     wrong = misread(result.predictions)
     if wrong:
         yield Plot(
-            f"misread-{_slug(result.id)}{suffix}", "misread", index, "", _title(grade, "what was misread"),
+            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of(grade, "what was misread"),
             "Images that were misread, each beside the nearest one of the same truth that was read rightly, and the "
             "nearest right one of what it was taken for.",
             f"{len(wrong)} of {len(result.predictions)} images were misread.",
@@ -183,8 +179,8 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         index = worst_trial(grade, scenario)
         trial = grade.trials[index]
         recording = trial.recording
-        name = f"{_slug(scenario)}-{trial.index + 1}{_suffix(is_for_staff(trial.visibility))}"
-        title = _title(grade, scenario)
+        name = trial_name(trial)
+        title = title_of(grade, scenario)
         start, end = recording.start, recording.end
         yield Plot(
             f"path-{name}", "path", index, scenario, f"{title}: path",
@@ -214,23 +210,19 @@ def _conversations(grade: Grade) -> Iterator[Plot]:
         messages = trial.recording.messages
         sent = sum(message.sender == "robot" for message in messages)
         lost = sum(message.delivered is None for message in messages)
-        suffix = _suffix(is_for_staff(trial.visibility))
+        name = trial_name(trial)
         yield Plot(
-            f"conversation-{_slug(trial.scenario)}-{trial.index + 1}{suffix}", "conversation", index, trial.scenario,
-            f"{_title(grade, trial.scenario)}: conversation",
+            f"conversation-{name}", "conversation", index, trial.scenario,
+            f"{title_of(grade, trial.scenario)}: conversation",
             f"Who told whom what in trial {trial.index + 1}; time goes down.",
             f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
             f"{lost} never arrived.",
         )  # fmt: skip
-
-
-def _title(grade: Grade, what: str) -> str:
-    return f"{one_line(grade.assignment_title, 32)}, {one_line(what, 24)}"
-
-
-def _suffix(hidden: bool) -> str:
-    return "-staff" if hidden else ""
-
-
-def _slug(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_.]+", "-", text)[:60].strip("-.") or "unnamed"
+        told = talks(trial.recording)
+        yield Plot(
+            f"talk-{name}", "talk", index, trial.scenario, f"{title_of(grade, trial.scenario)}: who told whom",
+            f"Who told whom how often in trial {trial.index + 1}; an arrow with two heads is a call that gave "
+            "something back.",
+            "Block diagram: "
+            + ", ".join(f"{each.source} to {each.target} {each.count}" for each in told if each.kind != "return") + ".",
+        )  # fmt: skip

@@ -23,6 +23,7 @@ from service.reports.readable import one_line
 #: Inches. On a phone the figure is shown about 3.6 inches wide, so 9 points still read as 6.
 WIDTH = 5.2
 DPI = 200
+_MOST_PIXELS = 6_000_000
 
 INK = "#1c2630"
 FAINT = "#5d6873"
@@ -37,9 +38,13 @@ _FONT = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 _BOLD = _FONT.with_name("DejaVuSans-Bold.ttf")
 
 
-def new_figure(height: float, title: str, subtitle: str = "") -> Figure:
-    """A white figure ``WIDTH`` x ``height`` inches with its title at the top left; ``HEAD`` inches are taken."""
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+def new_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
+    """A white figure ``width`` x ``height`` inches with its title at the top left; ``HEAD`` inches are taken.
+
+    One that would take too much memory is coarser.
+    """
+    dpi = min(DPI, math.sqrt(_MOST_PIXELS / (width * height)))
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     write(figure, 0.08, height - 0.08, one_line(title, 58), size=10.5, bold=True, va="top")
     if subtitle:
         write(figure, 0.08, height - 0.30, one_line(subtitle, 84), size=8, colour=FAINT, va="top")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 
 from command import robomark
 from service.cli import main
+from service.command_line import load_command
 from service.reports.formats import FORMATS
 from submissions.assignment.folder import assignment_folder
 
@@ -93,3 +96,29 @@ def test_a_title_is_no_markup_and_no_escape(tmp_path: Path) -> None:
     ended = robomark("assignments", "show", tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert ended.stdout.startswith(r"[/] [bold]x \x1b[31m (echo-responder), 10 marks")
+
+
+def test_the_version_and_the_list_of_commands_import_nothing_heavy() -> None:
+    code = (
+        "import sys; from service.cli import main\n"
+        "try:\n    main()\nexcept SystemExit as ended:\n    assert not ended.code\n"
+        "print(sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)"
+    )
+    for option, words in (("--help", "Commands:"), ("--version", "robomark ")):
+        ended = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True, check=True)
+        assert words in ended.stdout
+        heavy = {"numpy", "matplotlib", "sqlalchemy", "pybullet", "pydantic", "celery", "sklearn", "pandas", "rich"}
+        assert not heavy & set(ast.literal_eval(ended.stderr))
+
+
+def test_every_command_that_is_listed_can_be_loaded() -> None:
+    listed = robomark("--help").stdout.partition("Commands:")[2].split("\n  ")[1:]
+    names = [line.split()[0] for line in listed]
+    assert {"run", "grade", "batch", "db"} <= set(names)
+    for name in names:
+        assert load_command(name).help, name
+
+
+def test_the_shell_completes_commands_of_a_group() -> None:
+    ended = robomark(_ROBOMARK_COMPLETE="complete_bash", COMP_WORDS="robomark batch s", COMP_CWORD="2")
+    assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status"], "")

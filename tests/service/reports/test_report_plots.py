@@ -39,6 +39,8 @@ def test_names_of_all_plots() -> None:
         "sensors-each-shape-5",
         "conversation-each-shape-1",
         "conversation-each-shape-5",
+        "talk-each-shape-1",
+        "talk-each-shape-5",
     }
 
 

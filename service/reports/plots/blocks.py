@@ -1,0 +1,172 @@
+"""Draws a block diagram: a box an actor, arrows between them.
+
+Which level a box stands on is told by ``block_layout.py``; what it is a diagram of does not matter here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from matplotlib.figure import Figure
+
+from service.reports.plots.block_layout import layout_of
+from service.reports.plots.diagram_parts import (
+    CHARACTERS,
+    LINE_HEIGHT,
+    Highlights,
+    arrow_colour,
+    broken,
+    connect,
+    draw_actor,
+    frame,
+    label,
+)
+from service.reports.plots.style import HEAD, WIDTH, axes_at, new_figure
+from submissions.diagram import Diagram, DiagramArrow
+
+_MOST_ACROSS = 4  # levels that stand side by side; more of them go down the paper
+_BOX = 1.02  # inches, as the widest label
+_GAP = 0.44  # between boxes, where no label asks for more
+_ROW = 0.42  # between boxes that stand below each other
+_MARGIN = 0.16
+_FOOT = 0.28
+_TWO_WAYS = 0.07  # from the middle, where two arrows run between the same boxes
+#: How far a line may bend, to the left or to the right of its way, to get round a box.
+_BENDS = (0.0, 0.25, -0.25, 0.45, -0.45, 0.7, -0.7, 1.0, -1.0)
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """Inches: how large boxes are, where their centres are, and the paper."""
+
+    box: Point
+    centres: Mapping[str, Point]
+    width: float
+    height: float
+
+
+def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
+    """The block diagram, along the paper or, with many levels or long words at its arrows, down it."""
+    diagram = replace(diagram, steps=_merged(diagram))
+    sheet = _sheet(diagram)
+    figure = new_figure(HEAD + sheet.height + _FOOT, title, subtitle, sheet.width)
+    axes = axes_at(figure, 0, _FOOT, sheet.width, sheet.height)
+    axes.set_axis_off()
+    axes.set_xlim(0, sheet.width)
+    axes.set_ylim(0, sheet.height)
+    width, height = sheet.box
+    for group in diagram.groups:
+        at = [sheet.centres[name] for name in group.members]
+        if at:
+            left, low = min(x for x, _ in at) - width / 2 - 0.09, min(y for _, y in at) - height / 2 - 0.09
+            right, top = max(x for x, _ in at) + width / 2 + 0.09, max(y for _, y in at) + height / 2 + 0.22
+            frame(axes, left, low, right - left, top - low, group.colour, group.label)
+    patches = {}
+    for actor in diagram.actors:
+        x, y = sheet.centres[actor.name]
+        patches[actor.name] = draw_actor(
+            axes, actor, x, y, width, height, broken(actor.label, width - 0.1, 4), highlights
+        )
+    pairs = {(arrow.source, arrow.target) for arrow in diagram.arrows}
+    for number, arrow in enumerate(diagram.arrows):
+        shift = _TWO_WAYS if (arrow.target, arrow.source) in pairs else 0.0
+        if arrow.source == arrow.target:
+            continue
+        start, end, bend = _line(arrow, sheet, shift, 1 if number % 2 else -1)
+        connect(axes, arrow, start, end, highlights, (patches[arrow.source], patches[arrow.target]), bend)
+        signed = highlights.signed(arrow, broken(arrow.label, 2.0, 3))
+        x, y = _label_at(start, end, bend, signed if shift else ())
+        label(axes, x, y, signed, arrow_colour(arrow, highlights), va="center")
+    highlights.explain(figure)
+    return figure
+
+
+def _merged(diagram: Diagram) -> tuple[DiagramArrow, ...]:
+    """Arrows that would lie on each other as one, with the words of all."""
+    found: dict[tuple[str, str, str], DiagramArrow] = {}
+    for arrow in diagram.arrows:
+        key = (arrow.source, arrow.target, arrow.heads)
+        before = found.get(key)
+        words = [each.label for each in (before, arrow) if each is not None and each.label]
+        found[key] = replace(before or arrow, label=" / ".join(dict.fromkeys(words)))
+    return tuple(found.values())
+
+
+def _sheet(diagram: Diagram) -> _Sheet:
+    layout = layout_of(diagram)
+    levels = 1 + max(position.level for position in layout.values())
+    rows = 1 + int(2 * max(position.row for position in layout.values()))
+    words = max((len(line) for arrow in diagram.arrows for line in broken(arrow.label, 2.0, 3)), default=0)
+    gap = max(_GAP, words / CHARACTERS + 0.26)
+    down = diagram.portrait or levels > _MOST_ACROSS or _room(levels, gap) > WIDTH
+    across, below = (rows, levels) if down else (levels, rows)
+    width = max(WIDTH, _room(across, gap))
+    lines = max(len(broken(actor.label, _BOX - 0.1, 4)) for actor in diagram.actors)
+    framed = 0.24 if diagram.groups else 0.0
+    box = (_BOX, max(0.4, LINE_HEIGHT * lines + 0.2))
+    spread = (width - 2 * _MARGIN - _BOX) / max(1, across - 1)
+    step = (_BOX + gap if down else min(_BOX + 1.4, spread), box[1] + _ROW + framed)
+    height = box[1] + step[1] * (below - 1) + 2 * _MARGIN + framed
+    centres = {}
+    for name, position in layout.items():
+        level = position.level - (levels - 1) / 2
+        right, low = (position.row, level) if down else (level, position.row)
+        centres[name] = (width / 2 + right * step[0], height / 2 - low * step[1])
+    return _Sheet(box, centres, width, height)
+
+
+def _room(boxes: int, gap: float) -> float:
+    """Inches that boxes beside each other take."""
+    return boxes * _BOX + (boxes - 1) * gap + 2 * _MARGIN
+
+
+def _line(arrow: DiagramArrow, sheet: _Sheet, shift: float, side: int) -> tuple[Point, Point, float]:
+    """From where to where, moved aside where an arrow comes back, and how far it bends round what is in its way."""
+    (x, y), (to_x, to_y) = sheet.centres[arrow.source], sheet.centres[arrow.target]
+    length = max(1e-6, ((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5)
+    aside = (-(to_y - y) / length * shift, (to_x - x) / length * shift)
+    start, end = (x + aside[0], y + aside[1]), (to_x + aside[0], to_y + aside[1])
+    others = [at for name, at in sheet.centres.items() if name not in (arrow.source, arrow.target)]
+    for bend in (side * each for each in _BENDS):
+        if not any(_meets(at, start, end, bend, sheet.box) for at in others):
+            return start, end, bend
+    return start, end, 0.0
+
+
+def _on(start: Point, end: Point, bend: float, part: float) -> Point:
+    """A point on the curve that Matplotlib draws as ``arc3``, ``part`` of the way along it."""
+    control = (
+        (start[0] + end[0]) / 2 + bend * (end[1] - start[1]),
+        (start[1] + end[1]) / 2 - bend * (end[0] - start[0]),
+    )
+    a, b, c = (1 - part) ** 2, 2 * part * (1 - part), part**2
+    return a * start[0] + b * control[0] + c * end[0], a * start[1] + b * control[1] + c * end[1]
+
+
+def _meets(
+    box: Point,
+    start: Point,
+    end: Point,
+    bend: float,
+    size: Point,
+) -> bool:
+    for step in range(1, 24):
+        x, y = _on(start, end, bend, step / 24)
+        if abs(x - box[0]) < size[0] / 2 + 0.04 and abs(y - box[1]) < size[1] / 2 + 0.04:
+            return True
+    return False
+
+
+def _label_at(start: Point, end: Point, bend: float, beside: tuple[str, ...]) -> Point:
+    """The middle of the curve, or of the lines of a label ``beside`` it, on its left."""
+    x, y = _on(start, end, bend, 0.5)
+    if not beside:
+        return x, y
+    length = max(1e-6, ((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2) ** 0.5)
+    across, up = -(end[1] - start[1]) / length, (end[0] - start[0]) / length
+    half = max(map(len, beside)) / CHARACTERS / 2, LINE_HEIGHT * len(beside) / 2
+    away = abs(across) * half[0] + abs(up) * half[1] + 0.04
+    return x + across * away, y + up * away

@@ -1,0 +1,210 @@
+"""What block and sequence diagrams are drawn of: actors, arrows, labels, and what highlights a difference.
+
+Where they stand is the diagram's own business, ``blocks.py`` and ``lanes.py``.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import is_color_like, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch, Patch, PathPatch, Polygon, Rectangle
+from matplotlib.path import Path
+
+from service.reports.plots.style import FAINT, FAULT, INK, LEFT, RIGHT, RULE, drawable, font, write
+from service.reports.readable import one_line
+from submissions.diagram import DiagramActor, DiagramArrow
+
+#: Of 8 point type that fit into an inch.
+CHARACTERS = 14.9
+#: Inches that a line of a label takes.
+LINE_HEIGHT = 0.131
+_FILL = "#eef1f4"
+_DASHES: dict[str, Any] = {"solid": "solid", "dashed": (0, (3.2, 1.8)), "dotted": (0, (1.2, 1.6))}
+_HEADS = {"target": "-|>", "both": "<|-|>", "none": "-"}
+_HALF_TURN = np.linspace(0, np.pi, 24)
+_ROUND = ("roundedbox", "flowchart.terminator", "actor", "mail")
+_OVAL = ("ellipse", "circle", "cloud", "beginpoint", "endpoint")
+_DIAMOND = ("diamond", "minidiamond", "flowchart.condition")
+_BARE = ("none", "dots", "textbox")
+
+
+@dataclass(frozen=True, slots=True)
+class Highlights:
+    """Which actors and arrows (source, target) are highlighted as different, and how; by default none."""
+
+    actors: frozenset[str] = frozenset()
+    arrows: frozenset[tuple[str, str]] = frozenset()
+    colour: str = FAULT
+    sign: str = "✗"
+    words: str = ""
+
+    def on(self, arrow: DiagramArrow) -> bool:
+        """Whether an arrow is highlighted, for itself or for one of its ends."""
+        pair = (arrow.source, arrow.target)
+        turned = arrow.heads != "target" and pair[::-1] in self.arrows
+        return pair in self.arrows or turned or not self.actors.isdisjoint(pair)
+
+    def signed(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
+        """The label of an arrow, with the sign before it, for who does not tell the colours apart."""
+        return (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.on(arrow) else lines
+
+    def explain(self, figure: Figure) -> None:
+        """Tell what the sign means, at the foot of the figure, if it is in it."""
+        if self.actors or self.arrows:
+            write(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
+
+
+def broken(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
+    """A label broken into lines that are so wide; its own line breaks stay."""
+    width = max(4, int(inches * CHARACTERS))
+    kept = [one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
+    lines = [piece for line in kept for piece in textwrap.wrap(line, width) or [""]]
+    while lines and not lines[-1]:
+        lines.pop()
+    if len(lines) > most_lines:
+        lines = [*lines[: most_lines - 1], lines[most_lines - 1][: width - 1] + "…"]
+    return tuple(lines)
+
+
+def label(axes: Axes, x: float, y: float, lines: tuple[str, ...], colour: str, va: str = "bottom") -> None:
+    """The lines of a label, centred over ``x``, on white."""
+    if any(lines):
+        axes.text(
+            x, y, drawable("\n".join(lines)), font=font(8), color=colour, ha="center", va=va, parse_math=False,
+            linespacing=1.05, zorder=2.5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
+        )  # fmt: skip
+
+
+def draw_actor(
+    axes: Axes,
+    actor: DiagramActor,
+    x: float,
+    y: float,
+    width: float,
+    height: float,
+    lines: tuple[str, ...],
+    highlights: Highlights,
+) -> Patch:
+    """An actor with its centre at ``x``, ``y``; what arrows end at."""
+    different = actor.name in highlights.actors
+    fill = _usable(actor.colour, _FILL)
+    patch = _shape(actor.shape, x, y, width, height)
+    patch.set(
+        facecolor="white" if actor.shape in _BARE else fill,
+        edgecolor=highlights.colour if different else "white" if actor.shape in _BARE else FAINT,
+        linewidth=1.8 if different else 0.8,
+        linestyle=_DASHES["dashed"] if different else _DASHES[actor.line],
+        zorder=3,
+    )
+    axes.add_patch(patch)
+    ink = _usable(actor.text_colour, INK if actor.shape in _BARE or _is_light(fill) else "white")
+    axes.text(
+        x, y, drawable("\n".join(lines)), font=font(7.8, bold=True), color=ink, ha="center",
+        va="center" if len(lines) > 1 else "center_baseline", parse_math=False, linespacing=1.05, zorder=5,
+    )  # fmt: skip
+    if different:
+        axes.text(
+            x + width / 2, y + height / 2, highlights.sign, font=font(8.5, bold=True), color=highlights.colour,
+            ha="center", va="center", zorder=6,
+            bbox={"boxstyle": "circle,pad=0.12", "facecolor": "white", "edgecolor": highlights.colour},
+        )  # fmt: skip
+    return patch
+
+
+def arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
+    """The colour of an arrow, as it is highlighted, or as its text says, or as who sends it."""
+    if highlights.on(arrow):
+        return highlights.colour
+    if arrow.failed:
+        return FAULT
+    usual = {("robot", "responder"): LEFT, ("responder", "robot"): RIGHT}.get((arrow.source, arrow.target), INK)
+    return _usable(arrow.colour, usual)
+
+
+def connect(
+    axes: Axes,
+    arrow: DiagramArrow,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    highlights: Highlights,
+    ends: tuple[Patch | None, Patch | None] = (None, None),
+    bend: float = 0.0,
+) -> None:
+    """The line of an arrow with its heads, cut off at the patches it runs between."""
+    styles = {"target": "->", "both": "<->", "none": "-"} if arrow.open_head else _HEADS
+    style = "-" if arrow.failed else styles[arrow.heads]
+    line = "dotted" if arrow.failed else arrow.line
+    if line == "solid" or arrow.open_head or style == "-":
+        drawn = [(style, _DASHES[line], 1.9 if highlights.on(arrow) else 1.2)]
+    else:  # whose heads would be dashed too
+        drawn = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
+    for arrow_style, dashes, thick in drawn:
+        size = "head_length=4.6,head_width=2.6" if thick else "head_length=6.2,head_width=3.4"
+        sized = arrow_style if arrow_style == "-" else f"{arrow_style},{size}"
+        axes.add_patch(
+            FancyArrowPatch(
+                start, end, arrowstyle=sized, connectionstyle=f"arc3,rad={bend}", patchA=ends[0], patchB=ends[1],
+                shrinkA=0, shrinkB=0, mutation_scale=1, color=arrow_colour(arrow, highlights), linewidth=thick,
+                linestyle=dashes, joinstyle="miter", zorder=2,
+            )
+        )  # fmt: skip
+
+
+def frame(axes: Axes, x: float, y: float, width: float, height: float, colour: str, text: str) -> None:
+    """A group's frame, its lower left corner at ``x``, ``y``, with its label inside at the top."""
+    fill = _usable(colour, "#dbe6f0")
+    axes.add_patch(
+        FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0,rounding_size=0.08", facecolor=fill, alpha=0.45,
+                       edgecolor=RULE, linewidth=0.8, zorder=0)
+    )  # fmt: skip
+    axes.text(
+        x + width / 2, y + height - 0.04, drawable(one_line(text, 40)), font=font(7.6), color=INK, ha="center",
+        va="top", parse_math=False, zorder=1,
+    )  # fmt: skip
+
+
+def _shape(shape: str, x: float, y: float, width: float, height: float) -> Patch:
+    left, low = x - width / 2, y - height / 2
+    if shape in _ROUND:
+        return FancyBboxPatch((left, low), width, height, boxstyle=f"round,pad=0,rounding_size={min(0.16, height / 2)}")
+    if shape in _OVAL:
+        return Ellipse((x, y), width, height)
+    if shape in _DIAMOND:
+        return Polygon([(left, y), (x, low), (left + width, y), (x, low + height)])
+    if shape == "flowchart.input":
+        slant = height / 4
+        return Polygon(
+            [(left, low), (left + width - slant, low), (left + width, low + height), (left + slant, low + height)]
+        )
+    if shape == "note":
+        fold = height / 4
+        right, top = left + width, low + height
+        return Polygon([(left, low), (right, low), (right, top - fold), (right - fold, top), (left, top)])
+    if shape == "flowchart.database":
+        return _cylinder(left, low, width, height)
+    return Rectangle((left, low), width, height)
+
+
+def _cylinder(left: float, low: float, width: float, height: float) -> Patch:
+    """Body and lid; the lid is a line of its own, that closes nothing."""
+    x, y = left + width / 2 * (1 + np.cos(_HALF_TURN)), height / 11 * np.sin(_HALF_TURN)
+    bottom, top = low + height / 11, low + height * 10 / 11
+    body = [*zip(x, top + y, strict=True), *zip(x[::-1], bottom - y, strict=True), (x[0], top)]
+    lid = list(zip(x[::-1], top - y, strict=True))  # turned as the body is, or it would be a hole
+    codes = [Path.MOVETO, *[Path.LINETO] * (len(body) - 1), Path.MOVETO, *[Path.LINETO] * (len(lid) - 1)]
+    return PathPatch(Path([*body, *lid], codes))
+
+
+def _usable(colour: str, otherwise: str) -> str:
+    return colour if colour and is_color_like(colour.lower()) else otherwise
+
+
+def _is_light(colour: str) -> bool:
+    red, green, blue = to_rgb(colour.lower())
+    return 0.299 * red + 0.587 * green + 0.114 * blue > 0.55

@@ -1,0 +1,143 @@
+"""A notebook's own diagram against what happened: who and what is in one of them only. Shown, never marked.
+
+Actors are known by the words in their names and labels; drawing the differences is left to others.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from service.reports.plots.talk import Talk, party_of
+from service.reports.readable import one_line
+from submissions.diagram import Diagram, DiagramActor
+
+Pair = tuple[str, str]
+
+#: Words that tell which party an actor is; of two the upper one counts: a Python agent is the agent.
+_TOLD_BY: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        "logger": frozenset({"logger", "log", "logfile"}),
+        "parser": frozenset({"parser"}),
+        "agent": frozenset({"agent"}),
+        "network": frozenset({"mlp", "cnn", "network", "net", "nn", "classifier", "model"}),
+        "responder": frozenset({"responder", "pyresponder", "handler", "python", "notebook"}),
+        "robot": frozenset({"robot", "brick", "ev3", "simulator"}),
+    }
+)
+_WORD = re.compile(r"[a-z]+[0-9]*")
+_MOST_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Differences:
+    """Names as the diagram has them, for what it alone has, and as ``talks`` has them, for what happened besides.
+
+    An arrow at an actor that is itself in one of the two only is not told again. ``alike`` is the part of all arrows,
+    0 to 1, that is in both.
+    """
+
+    drawn_actors: tuple[str, ...] = ()
+    drawn_arrows: tuple[Pair, ...] = ()
+    happened_actors: tuple[str, ...] = ()
+    happened_arrows: tuple[Pair, ...] = ()
+    alike: float = 0.0
+
+    def __bool__(self) -> bool:
+        return bool(self.drawn_actors or self.drawn_arrows or self.happened_actors or self.happened_arrows)
+
+
+def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
+    """None for a diagram of something else: one in which fewer than two took part.
+
+    An arrow may stand for a way through actors that are not drawn, so that a diagram can leave out what goes on
+    inside, and one without a direction for either. What a call gave back need not be drawn.
+    """
+    party = {actor.name: party_of_actor(actor) for actor in diagram.actors}
+    drawn = {each for each in party.values() if each is not None}
+    happened = {party_of(name) for talk in told for name in (talk.source, talk.target)}
+    if len(drawn & happened) < 2:
+        return None
+    ways = _ways(told, drawn)
+    wrong: dict[Pair, None] = {}
+    covered: set[tuple[str | None, str | None]] = set()
+    for arrow in diagram.arrows:
+        pair = (party[arrow.source], party[arrow.target])
+        either = {pair} if arrow.heads == "target" else {pair, pair[::-1]}
+        covered |= either
+        if pair[0] != pair[1] and set(pair) <= happened and not either & ways:
+            wrong[arrow.source, arrow.target] = None
+    missing = [
+        (talk.source, talk.target)
+        for talk in told
+        if talk.kind != "return"
+        and {party_of(talk.source), party_of(talk.target)} <= drawn
+        and (party_of(talk.source), party_of(talk.target)) not in covered
+    ]
+    pairs = {(party_of(talk.source), party_of(talk.target)) for talk in told}
+    took_part = dict.fromkeys(name for talk in told for name in (talk.source, talk.target))
+    return Differences(
+        tuple(name for name, each in party.items() if each not in happened),
+        tuple(wrong),
+        tuple(name for name in took_part if party_of(name) not in drawn),
+        tuple(dict.fromkeys(missing)),
+        len(covered & pairs) / len(covered | pairs),
+    )
+
+
+def in_words(found: Differences) -> str:
+    """The differences as sentences."""
+    if not found:
+        return "It shows what happened."
+    told = []
+    if found.drawn_actors:
+        told.append(f"{_listed(found.drawn_actors)} took no part.")
+    if found.drawn_arrows:
+        told.append(f"{_listed(map(_arrow, found.drawn_arrows))} did not happen.")
+    if found.happened_actors:
+        verb = "is" if len(found.happened_actors) == 1 else "are"
+        told.append(f"{_listed(found.happened_actors)} took part and {verb} not drawn.")
+    if found.happened_arrows:
+        verb = "is" if len(found.happened_arrows) == 1 else "are"
+        told.append(f"{_listed(map(_arrow, found.happened_arrows))} happened and {verb} not drawn.")
+    return " ".join(told)
+
+
+def party_of_actor(actor: DiagramActor) -> str | None:
+    """Which party an actor is, by its name, or else by its label; None for one that is none of them."""
+    for text in (actor.name, actor.label):
+        words = set(_WORD.findall(text.lower()))
+        for party, told_by in _TOLD_BY.items():
+            if words & told_by:
+                return party
+    return None
+
+
+def _ways(told: Sequence[Talk], drawn: set[str]) -> set[tuple[str | None, str | None]]:
+    """From whom a text came to whom, at once or through parties that are not drawn."""
+    steps = {(party_of(talk.source), party_of(talk.target)) for talk in told}
+    ways: set[tuple[str | None, str | None]] = set()
+    for start in drawn:
+        reached, waiting = {start}, [start]
+        while waiting:
+            here = waiting.pop()
+            for target in {other for one, other in steps if one == here} - reached:
+                reached.add(target)
+                ways.add((start, target))
+                if target not in drawn:
+                    waiting.append(target)
+    return ways
+
+
+def _arrow(pair: Pair) -> str:
+    return f"{one_line(pair[0], 30)} → {one_line(pair[1], 30)}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Names as a sentence has them, few enough to be read."""
+    found = [one_line(name, 70) for name in names]
+    if len(found) > _MOST_NAMED:
+        found = [*found[: _MOST_NAMED - 1], f"{len(found) - _MOST_NAMED + 1} more"]
+    return " and ".join([", ".join(found[:-1]), found[-1]] if len(found) > 1 else found)

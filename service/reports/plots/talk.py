@@ -1,0 +1,114 @@
+"""Who told whom how often in a trial: the robot, the responder, and what the responder called.
+
+What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from service.reports.plots.sequence import PARTIES, SequenceDiagram, Step
+from service.reports.readable import one_line
+from sim.recording import Recording
+from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
+
+#: Networks that are counted by the names that they are bound to; those that are called later count as one.
+_MOST_NETWORKS = 4
+_OTHERS = "other networks"
+#: Of what was said, beside a diagram whose labels are words.
+_LONGEST_LABEL = 32
+_NAMED = frozenset(PARTIES) - {"network"}
+
+TalkKind = Literal["message", "call", "return"]
+
+
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """How often ``source`` told ``target`` something, and how often that got lost on the way."""
+
+    source: str
+    target: str
+    kind: TalkKind
+    count: int
+    lost: int = 0
+
+
+def talks(recording: Recording) -> tuple[Talk, ...]:
+    """Everything that was told, by who told whom; messages first."""
+    counts: Counter[tuple[str, str, TalkKind]] = Counter()
+    lost: Counter[tuple[str, str, TalkKind]] = Counter()
+    for talk, arrived in _told(recording):
+        counts[talk] += 1
+        lost[talk] += not arrived
+    return tuple(Talk(*talk, count, lost[talk]) for talk, count in counts.items())
+
+
+def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], bool]]:
+    """Each text and each call: who told whom, and whether it arrived."""
+    for message in recording.messages:
+        other = "responder" if message.sender == "robot" else "robot"
+        yield (message.sender, other, "message"), message.delivered is not None
+    names = _callees(recording)
+    for call in recording.calls:
+        caller, callee = names.get(call.caller, "responder"), names[call.callee]
+        yield (caller, callee, "call"), True
+        if call.result != "None":  # a logger gives nothing back
+            yield (callee, caller, "return"), True
+
+
+def party_of(name: str) -> str:
+    """The party that a name in ``talks`` belongs to; what is none of them by name is a network."""
+    return name if name in _NAMED else "network"
+
+
+def block_diagram(told: tuple[Talk, ...]) -> Diagram:
+    """The same as boxes and arrows with counts; a call that gave something back has an arrow at both ends."""
+    returned = {(talk.source, talk.target) for talk in told if talk.kind == "return"}
+    arrows = tuple(
+        DiagramArrow(
+            talk.source,
+            talk.target,
+            _count(talk),
+            heads="both" if talk.kind == "call" and (talk.target, talk.source) in returned else "target",
+        )
+        for talk in told
+        if talk.kind != "return"
+    )
+    named = dict.fromkeys(("robot", "responder", *(name for talk in told for name in (talk.source, talk.target))))
+    return Diagram("blockdiag", tuple(DiagramActor(name, name) for name in named), arrows)
+
+
+def sequence_diagram(told: SequenceDiagram) -> Diagram:
+    """What was told, with its words, as a sequence diagram that stands beside a notebook's own."""
+    return Diagram("seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_steps(told)))
+
+
+def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
+    for step in told.steps:
+        if not isinstance(step, Step):
+            yield Divider(f"{step.count} more {step.what}{'' if step.count == 1 else 's'}", delay=True)
+        elif step.kind == "silence":
+            yield Divider("no answer", delay=True)
+        else:
+            yield DiagramArrow(
+                step.source,
+                step.target,
+                one_line(step.label, _LONGEST_LABEL),
+                "dashed" if step.kind == "return" else "solid",
+                failed=step.kind == "lost",
+            )
+
+
+def _callees(recording: Recording) -> Mapping[str, str]:
+    """What each name that was called is shown as."""
+    networks = dict.fromkeys(call.callee for call in recording.calls if call.callee not in _NAMED)
+    shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
+    return MappingProxyType(shown | {name: name for name in _NAMED})
+
+
+def _count(talk: Talk) -> str:
+    return f"{talk.count}, {talk.lost} lost" if talk.lost else str(talk.count)

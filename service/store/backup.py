@@ -1,0 +1,130 @@
+"""Copies a whole database: into a SQLite file that can be opened as it is, and from one into an empty database.
+
+The two may be of different kinds, so a copy also moves an installation; removing what is old is ``purge.py``'s.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Column, Engine, Table, bindparam, delete, func, insert, select, update
+from sqlalchemy.engine import Connection
+from sqlalchemy.exc import OperationalError
+
+from service.store.engine import open_engine
+from service.store.migrate import current_revision, upgrade
+from service.store.models import Base, Course, Installation, Job
+from sim.errors import HostError, UsageError
+
+#: Some of them hold a recording each.
+_ROWS_AT_A_TIME = 50
+_EXPECTED = "expected a file that robomark db backup made"
+
+
+def back_up(source: Engine, file: Path) -> None:
+    """Copy a database, in use or not, into ``file``, which is this user's alone and must not exist.
+
+    Raises UsageError where it does, HostError where the copy cannot be made; nothing is left of it then.
+    """
+    if file.exists():
+        raise UsageError(f"{file} exists already; name a new file")
+    try:
+        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
+        if source.dialect.name == "sqlite":
+            _copy_file(Path(str(source.url.database)), file)
+        else:
+            with _opened(file) as target:
+                upgrade(target)
+                _copy_rows(source, target)
+    except (OSError, sqlite3.Error, OperationalError) as error:
+        file.unlink(missing_ok=True)
+        raise HostError(f"the database cannot be copied to {file}: {error}") from None
+    except BaseException:
+        file.unlink(missing_ok=True)
+        raise
+
+
+def restore(file: Path, target: Engine) -> None:
+    """Bring what a backup holds into an empty database of either kind; all of it or nothing.
+
+    A backup of an older release is brought up to this one on the way, and is not changed itself. Raises UsageError for
+    a file that is no backup, or a database that is not empty; HostError for a backup of a newer release.
+    """
+    if not file.is_file():
+        raise UsageError(f"{file}: does not exist, {_EXPECTED}")
+    with tempfile.TemporaryDirectory(prefix="robomark-restore-") as folder:
+        copy = Path(folder) / "copy.db"
+        try:
+            _copy_file(file, copy)
+        except sqlite3.Error as error:
+            raise UsageError(
+                f"{file}: cannot be read ({error}), expected a file that robomark db backup made"
+            ) from None
+        with _opened(copy) as source:
+            if current_revision(source) is None:
+                raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
+            upgrade(source)
+            _copy_rows(source, target)
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[Engine]:
+    engine = open_engine(f"sqlite:///{file.absolute()}")
+    try:
+        yield engine
+    finally:
+        engine.dispose()
+
+
+def _copy_file(source: Path, target: Path) -> None:
+    with (
+        closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as live,
+        closing(sqlite3.connect(target)) as copy,
+    ):
+        live.backup(copy)
+
+
+def _copy_rows(source: Engine, target: Engine) -> None:
+    """Every row of every table, as one moment has them."""
+    reading = source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source
+    with reading.connect() as rows, target.begin() as into:
+        if into.scalar(select(func.count()).select_from(Course)) or into.scalar(select(func.count()).select_from(Job)):
+            where = target.url.render_as_string(hide_password=True)
+            raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
+        # Each was made with its tables; the worlds of what is brought in follow from its own.
+        into.execute(delete(Installation))
+        for table in Base.metadata.sorted_tables:
+            _copy_table(table, rows, into)
+
+
+def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
+    """Rows that refer to others of their table may come before those, so they are told of them when all are there."""
+    own = [column for column in table.columns if any(key.column.table is table for key in column.foreign_keys)]
+    later: list[dict[str, Any]] = []
+    (key,) = table.primary_key.columns
+    found = rows.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table))
+    for some in found.mappings().partitions():
+        into.execute(insert(table), [_without(row, own) for row in some])
+        later += [
+            {"of": row[key.name], **{column.name: row[column.name] for column in own}}
+            for row in some
+            if any(row[column.name] is not None for column in own)
+        ]
+    if later:
+        values: dict[str, Any] = {column.name: bindparam(column.name) for column in own}
+        into.execute(update(table).where(key == bindparam("of")).values(values), later)
+    last = into.scalar(select(func.max(key)))
+    if into.dialect.name == "postgresql" and isinstance(last, int):
+        # What comes after is numbered on.
+        sequence = func.pg_get_serial_sequence(table.name, key.name)
+        into.execute(select(func.setval(sequence, last)))
+
+
+def _without(row: Mapping[Any, Any], columns: list[Column[Any]]) -> dict[str, Any]:
+    return dict(row) | {column.name: None for column in columns}

@@ -1,0 +1,348 @@
+"""From the text of a ``%%blockdiag`` or ``%%seqdiag`` cell to its diagram: the part of the language that teaching uses.
+
+The text is a student's: it is refused with a sentence that names the line, and what it may hold is counted. What sets
+sizes and types of letters is read and has no effect, for a report has its own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from sim.errors import UsageError
+from submissions.diagram import ActorGroup, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider, Heads
+from submissions.diagram_tokens import DiagramToken, mistake, tokens_of
+from submissions.diagram_vocabulary import (
+    ARROWS,
+    DIRECTIONS,
+    FRAGMENTS,
+    LINES,
+    OF_ACTORS,
+    OF_ARROWS,
+    OF_DIAGRAMS,
+    OF_GROUPS,
+    SHAPES,
+    meant,
+)
+
+MAX_ACTORS = 16
+MAX_STEPS = 80
+MAX_GROUPS = 8
+MAX_DEPTH = 8
+LONGEST_NAME = 80
+
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{3}(?:[0-9A-Fa-f]{3})?|[A-Za-z]{3,30}")
+
+Attributes = dict[str, str]
+
+
+def read_diagram(kind: DiagramKind, text: str, first_line: int = 1) -> Diagram:
+    """The diagram that ``text`` describes; its lines are counted from ``first_line``.
+
+    Raises UsageError, one sentence that begins with the line, for what is not in the language or is too much.
+    """
+    return _Reader(kind, tokens_of(text, first_line), first_line).diagram()
+
+
+class _Reader:
+    """Where the reading is, and what it has found so far."""
+
+    def __init__(self, kind: DiagramKind, tokens: Sequence[DiagramToken], first_line: int) -> None:
+        self._kind = kind
+        self._tokens = tokens
+        self._place = 0
+        self._last_line = tokens[-1].line if tokens else first_line
+        self._actors: dict[str, Attributes] = {}
+        self._steps: list[DiagramArrow | Divider] = []
+        self._groups: list[ActorGroup] = []
+        self._classes: dict[str, Attributes] = {}
+        self._settings: Attributes = {}
+
+    def diagram(self) -> Diagram:
+        """All of the text, with or without a frame such as ``seqdiag { }`` round it."""
+        framed = self._enter_frame()
+        self._statements(0)
+        if framed:
+            self._expect("}")
+        if self._place < len(self._tokens):
+            raise self._unexpected("the end of the text")
+        if not self._actors:
+            raise mistake(self._last_line, "there is nothing to draw, expected lines like a -> b;")
+        return Diagram(
+            self._kind,
+            tuple(self._actor(name, attributes) for name, attributes in self._actors.items()),
+            self._numbered(),
+            tuple(self._groups),
+            self._settings.get("orientation", "").lower() == "portrait",
+        )
+
+    def _enter_frame(self) -> bool:
+        words = [token.text for token in self._tokens[:3]]
+        for length in (1, 2, 3):
+            named = length == 1 or words[:1] in (["diagram"], [self._kind])
+            if words[length - 1 : length] == ["{"] and named:
+                self._place = length
+                return True
+        return False
+
+    # What is next.
+
+    def _next(self) -> DiagramToken | None:
+        return self._tokens[self._place] if self._place < len(self._tokens) else None
+
+    def _is(self, sign: str, ahead: int = 0) -> bool:
+        place = self._place + ahead
+        if place >= len(self._tokens):
+            return False
+        token = self._tokens[place]
+        return token.text == sign and token.kind == "sign"
+
+    def _take(self, sign: str) -> bool:
+        found = self._is(sign)
+        self._place += found
+        return found
+
+    def _expect(self, sign: str) -> None:
+        if not self._take(sign):
+            raise self._unexpected(sign)
+
+    def _word(self, what: str) -> str:
+        token = self._next()
+        if token is None or token.kind not in ("name", "text"):
+            raise self._unexpected(what)
+        self._place += 1
+        return token.text
+
+    def _unexpected(self, expected: str) -> UsageError:
+        token = self._next()
+        if token is None:
+            return mistake(self._last_line, f"the text ends here, expected {expected}")
+        return mistake(token.line, f"{token.text[:40]!r} stands here, expected {expected}")
+
+    def _line(self) -> int:
+        """The line of what was read last."""
+        return self._tokens[max(0, self._place - 1)].line if self._tokens else self._last_line
+
+    # Statements.
+
+    def _statements(self, depth: int) -> None:
+        self._check_depth(depth)
+        while (token := self._next()) is not None and not self._is("}"):
+            if self._take(";"):
+                continue
+            if token.kind == "divider":
+                self._place += 1
+                self._divide(token)
+            elif token.kind == "name" and token.text in ("class", "plugin") and not self._is("=", 1):
+                self._place += 1
+                self._class(token.text)
+            elif self._begins_group():
+                self._group(depth)
+            elif token.text in FRAGMENTS and self._begins_braces():
+                self._fragment(depth)
+            elif self._is("=", 1):
+                self._setting()
+            else:
+                self._actors_or_arrows(depth)
+
+    def _begins_group(self) -> bool:
+        token = self._next()
+        return token is not None and token.text == "group" and self._begins_braces()
+
+    def _begins_braces(self) -> bool:
+        """Whether a keyword is followed by braces, with a name before them or not."""
+        return self._is("{", 1) or (self._is("{", 2) and self._tokens[self._place + 1].kind in ("name", "text"))
+
+    def _check_depth(self, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            raise mistake(self._line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them")
+
+    def _divide(self, token: DiagramToken) -> None:
+        if self._kind != "seqdiag":
+            raise mistake(token.line, "a block diagram has no dividers, expected lines like a -> b;")
+        self._add(Divider(token.text[3:-3].strip(), delay=token.text.startswith("...")))
+
+    def _class(self, keyword: str) -> None:
+        name = self._word("the name of a class")
+        attributes = self._attributes(OF_ACTORS | OF_ARROWS if keyword == "class" else None, "a class")
+        self._classes[name] = attributes
+
+    def _fragment(self, depth: int) -> None:
+        kind = self._word("alt or loop")
+        label = "" if self._is("{") else self._word("a label")
+        self._expect("{")
+        self._add(Divider(f"{kind} {label}".strip()))
+        self._statements(depth + 1)
+        self._expect("}")
+        self._add(Divider(f"end of {kind}"))
+
+    def _setting(self) -> None:
+        name, value = self._assignment(OF_DIAGRAMS, "a diagram")
+        if name == "default_shape":
+            self._check_shape(value)
+        self._settings[name] = value
+
+    def _group(self, depth: int) -> list[str]:
+        """A frame round actors, with or without a name; those in frames inside it are its own too."""
+        self._word("group")
+        self._check_depth(depth)
+        label = "" if self._is("{") else self._word("{")
+        attributes: Attributes = {}
+        members: list[str] = []
+        self._expect("{")
+        while not self._take("}"):
+            if self._take(";"):
+                continue
+            if self._begins_group():
+                members += self._group(depth + 1)
+            elif self._is("=", 1):
+                name, value = self._assignment(OF_GROUPS, "a group")
+                attributes[name] = value
+            else:
+                members += self._actors_or_arrows(depth)
+        if len(self._groups) >= MAX_GROUPS:
+            raise mistake(self._line(), f"there are too many groups, expected at most {MAX_GROUPS}")
+        colour = _colour(attributes.get("color", self._settings.get("default_group_color", "")))
+        self._groups.append(ActorGroup(attributes.get("label", label), tuple(dict.fromkeys(members)), colour))
+        return members
+
+    def _actors_or_arrows(self, depth: int) -> list[str]:
+        """``a;`` or ``a, b [shape = box];`` or ``a -> b <- c [label = "x"];``; the actors that were named."""
+        chain = [self._names()]
+        signs: list[DiagramToken] = []
+        while (token := self._next()) is not None and token.kind == "arrow":
+            if token.text not in ARROWS[self._kind]:
+                raise self._unexpected(f"one of {' '.join(ARROWS[self._kind])}")
+            self._place += 1
+            signs.append(token)
+            chain.append(self._names())
+        if signs:
+            self._arrows(chain, signs, depth)
+        else:
+            attributes = self._attributes(OF_ACTORS, "an actor")
+            self._check_shape(attributes.get("shape", "box"))
+            for name in chain[0]:
+                self._actors[name].update(attributes)
+        return [name for names in chain for name in names]
+
+    def _arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[DiagramToken], depth: int) -> None:
+        attributes = self._attributes(OF_ARROWS, "an arrow")
+        returns: list[DiagramArrow] = []
+        for sign, left, right in zip(signs, chain[:-1], chain[1:], strict=True):
+            for one in left:
+                for other in right:
+                    arrow = self._arrow(one, sign.text, other, attributes)
+                    self._add(arrow)
+                    if sign.text == "=>" and self._kind == "seqdiag":
+                        label = attributes.get("return", "")
+                        returns.append(replace(arrow, source=other, target=one, label=label, line="dashed", note=""))
+        if self._is("{"):
+            self._expect("{")
+            self._statements(depth + 1)
+            self._expect("}")
+        for arrow in reversed(returns):
+            self._add(arrow)
+
+    def _arrow(self, one: str, sign: str, other: str, attributes: Attributes) -> DiagramArrow:
+        said = attributes.get("dir", "").lower()
+        sign = DIRECTIONS.get(said, said) if said else sign
+        back = sign.startswith("<") and sign != "<->"
+        heads: Heads = "both" if sign == "<->" else "none" if sign == "--" else "target"
+        dashed = "--" in sign and sign != "--"
+        side = next((name for name in ("leftnote", "rightnote", "note") if name in attributes), "")
+        return DiagramArrow(
+            other if back else one,
+            one if back else other,
+            attributes.get("label", ""),
+            LINES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
+            heads,
+            ">>" in sign or "<<" in sign or "async" in attributes,
+            "failed" in attributes,
+            _colour(attributes.get("color", "")),
+            attributes.get(side, ""),
+            "left" if side == "leftnote" else "right",
+        )
+
+    # Parts of statements.
+
+    def _names(self) -> list[str]:
+        """One actor or several, with commas between; they are there from now on."""
+        names = [self._name()]
+        while self._take(","):
+            names.append(self._name())
+        return names
+
+    def _name(self) -> str:
+        name = self._word("the name of an actor")
+        if not name.strip() or len(name) > LONGEST_NAME:
+            raise mistake(
+                self._line(), f"an actor's name is empty or too long, expected 1 to {LONGEST_NAME} characters"
+            )
+        self._actors.setdefault(name, {})
+        if len(self._actors) > MAX_ACTORS:
+            raise mistake(self._line(), f"there are too many actors, expected at most {MAX_ACTORS}")
+        return name
+
+    def _attributes(self, known: frozenset[str] | None, whose: str) -> Attributes:
+        """``[label = "x", failed]``, any number of times; with the class that they name taken apart."""
+        found: Attributes = {}
+        while self._take("["):
+            while not self._take("]"):
+                if self._take(",") or self._take(";"):
+                    continue
+                if self._is("=", 1):
+                    name, value = self._assignment(known, whose)
+                else:
+                    name, value = self._known(self._word("]"), known, whose), ""
+                found |= self._classes.get(value, {}) if name == "class" else {name: value}
+        return found
+
+    def _assignment(self, known: frozenset[str] | None, whose: str) -> tuple[str, str]:
+        name = self._known(self._word("the name of an attribute"), known, whose)
+        self._expect("=")
+        return name, self._word(f"what {name} is")
+
+    def _known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
+        if known is None or name in known:
+            return name
+        raise mistake(self._line(), f"{name[:40]!r} is no attribute of {whose}{meant(name, known, 'label or color')}")
+
+    def _check_shape(self, shape: str) -> None:
+        if shape not in SHAPES:
+            expected = meant(shape, SHAPES, "box, ellipse or diamond")
+            raise mistake(self._line(), f"there is no shape {shape[:40]!r}{expected}")
+
+    def _add(self, step: DiagramArrow | Divider) -> None:
+        if len(self._steps) >= MAX_STEPS:
+            raise mistake(self._line(), f"there are too many arrows, expected at most {MAX_STEPS}")
+        self._steps.append(step)
+
+    def _actor(self, name: str, attributes: Attributes) -> DiagramActor:
+        return DiagramActor(
+            name,
+            attributes.get("label", name),
+            attributes.get("shape", self._settings.get("default_shape", "box")),
+            _colour(attributes.get("color", self._settings.get("default_node_color", ""))),
+            _colour(attributes.get("textcolor", "")),
+            LINES.get(attributes.get("style", "").lower(), "solid"),
+        )
+
+    def _numbered(self) -> tuple[DiagramArrow | Divider, ...]:
+        if self._settings.get("autonumber", "false").lower() == "false":
+            return tuple(self._steps)
+        return tuple(_with_numbers(self._steps))
+
+
+def _with_numbers(steps: Iterable[DiagramArrow | Divider]) -> Iterable[DiagramArrow | Divider]:
+    number = 0
+    for step in steps:
+        if isinstance(step, DiagramArrow):
+            number += 1
+            step = replace(step, label=f"{number}. {step.label}".rstrip())
+        yield step
+
+
+def _colour(text: str) -> str:
+    """The colour as it is written, if it is written as one."""
+    return text if _COLOUR.fullmatch(text) else ""

@@ -1,0 +1,73 @@
+"""The words and signs of a diagram's text, each with its line.
+
+What they mean together is ``diagram_text.py``'s.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from sim.errors import UsageError
+
+MAX_CHARACTERS = 20_000
+
+_TOKEN = re.compile(
+    r"""
+      (?P<space>\s+)
+    | (?P<comment>(?://|\#)[^\n]*|/\*(?:[^*]|\*(?!/))*\*/)
+    | (?P<divider>===[^\n]*?===|\.\.\.[^\n]*?\.\.\.)
+    | (?P<text>"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')
+    | (?P<arrow><<--|<--|<<-|<->|<-|-->>|-->|->>|->|--|=>)
+    | (?P<sign>[{}\[\];,=])
+    | (?P<name>\w(?:[\w.]|-(?=\w))*)
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_ESCAPED = {"n": "\n", "\n": ""}
+_NEVER_ENDS = {'"': "a text in quotes", "'": "a text in quotes", "/": "a comment"}
+
+
+@dataclass(frozen=True, slots=True)
+class DiagramToken:
+    """A piece of the text: an arrow, a sign, a name, a text without its quotes, or a divider without its signs."""
+
+    kind: str
+    text: str
+    line: int
+
+
+def mistake(line: int, what: str) -> UsageError:
+    """What is wrong in a line, as an error."""
+    return UsageError(f"line {line}: {what}")
+
+
+def tokens_of(text: str, first_line: int = 1) -> list[DiagramToken]:
+    """The tokens of ``text``, without blanks and comments. Raises UsageError, naming the line, for other signs."""
+    if len(text) > MAX_CHARACTERS:
+        raise mistake(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
+    found: list[DiagramToken] = []
+    place, line = 0, first_line
+    while place < len(text):
+        match = _TOKEN.match(text, place)
+        if match is None:
+            raise mistake(line, _strange(text[place:]))
+        kind, piece = str(match.lastgroup), match[0]
+        if kind not in ("space", "comment"):
+            found.append(DiagramToken(kind, _content(kind, piece), line))
+        line += piece.count("\n")
+        place = match.end()
+    return found
+
+
+def _content(kind: str, piece: str) -> str:
+    if kind == "text":
+        return _ESCAPE.sub(lambda match: _ESCAPED.get(match[1], match[1]), piece[1:-1])
+    return piece
+
+
+def _strange(rest: str) -> str:
+    if rest[0] in _NEVER_ENDS and (rest[0] != "/" or rest.startswith("/*")):
+        return f"{_NEVER_ENDS[rest[0]]} never ends"
+    return f"{rest[0]!r} has no meaning here, expected a name, an arrow such as ->, or a text in quotes"

@@ -1,0 +1,57 @@
+"""What may be written in a diagram's text: attributes of actors, arrows, groups and diagrams, shapes, arrows.
+
+Most attributes set sizes or letters and have no effect here; they are known so that a misspelt one is not.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from submissions.diagram import Line
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_FONT = _words("class fontfamily fontsize fontstyle href")
+OF_ACTORS = _FONT | _words(
+    "label shape color textcolor style linecolor width height colwidth colheight numbered icon background description "
+    "rotate stacked"
+)
+OF_ARROWS = _FONT | _words(
+    "label color textcolor style dir hstyle folded nofolded thick async diagonal failed return activate noactivate "
+    "note leftnote rightnote"
+)
+OF_GROUPS = _FONT | _words("label color textcolor shape thick style orientation width height icon")
+OF_DIAGRAMS = _words(
+    "activation autonumber orientation edge_height edge_length edge_layout page_padding node_width node_height "
+    "span_width span_height default_fontsize default_fontfamily default_fontstyle default_shape default_node_color "
+    "default_node_style default_group_color default_linecolor default_textcolor default_note_color shape_namespace "
+    "width height"
+)
+SHAPES = _words(
+    "box square roundedbox circle ellipse diamond minidiamond note mail cloud actor dots beginpoint endpoint textbox "
+    "none flowchart.condition flowchart.database flowchart.input flowchart.loopin flowchart.loopout "
+    "flowchart.terminator"
+)
+LINES: Mapping[str, Line] = MappingProxyType(
+    {"solid": "solid", "dashed": "dashed", "dotted": "dotted", "none": "solid"}
+)
+#: The arrow that an arrow's ``dir`` means.
+DIRECTIONS = MappingProxyType({"forward": "->", "back": "<-", "both": "<->", "none": "--"})
+ARROWS = MappingProxyType(
+    {
+        "blockdiag": ("->", "<-", "<->", "--", "=>"),
+        "seqdiag": ("->", "<-", "-->", "<--", "->>", "<<-", "-->>", "<<--", "=>", "<->"),
+    }
+)
+FRAGMENTS = ("alt", "loop")
+
+
+def meant(word: str, known: frozenset[str], otherwise: str) -> str:
+    """The end of a sentence on a word that is not known: what was probably meant, or else what was expected."""
+    near = difflib.get_close_matches(word[:40], sorted(known), 1)
+    return f"; did you mean {near[0]}?" if near else f", expected one such as {otherwise}"

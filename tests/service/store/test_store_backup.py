@@ -1,0 +1,182 @@
+"""A backup holds everything and can be brought back into either kind of database; a purge takes what is old alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import func, select, update
+
+import report_builders
+from builders import grading_request, settings_in
+from databases import fresh_database
+from service.settings import Settings
+from service.store import jobs, regrades, results
+from service.store.backup import back_up, restore
+from service.store.engine import Store, open_engine, open_store
+from service.store.installation import secret_of
+from service.store.intake import accept_batch, accept_new
+from service.store.models import Artifact, Base, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
+from service.store.purge import Purged, purge
+from service.store.states import JobState
+from sim.errors import HostError, UsageError
+
+GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
+TABLES = Base.metadata.sorted_tables
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])
+def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
+    """Settings with another empty database of each kind."""
+    home = tmp_path / "elsewhere"
+    if request.param == "sqlite":
+        return settings_in(home)
+    return settings_in(home, database_url=fresh_database(request.getfixturevalue("postgresql")))
+
+
+def _batch(store: Store, name: str, *students: str) -> str:
+    batch = accept_new(store, name, [grading_request(each) for each in students], [("x", "is bad.")], max_attempts=3)
+    assert batch.batch is not None
+    _grade_all(store)
+    return batch.batch.id
+
+
+def _grade_all(store: Store) -> None:
+    while (claim := jobs.claim(store, "worker", 60)) is not None:
+        own = replace(GRADE, secret_sha256=secret_of(store).sha256)
+        jobs.finish(store, claim, results.prepare(own), datetime.now(UTC))
+
+
+def _filled(store: Store) -> str:
+    """Two students, a copy of a grade, a regrade, and one submission that still waits. The first batch."""
+    first = _batch(store, "first", "ada", "bob 🤖")
+    accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3)
+    regrades.regrade(store, first, None, max_attempts=3, actor="staff")
+    _grade_all(store)
+    accept_batch(store, "waits", [grading_request("mia")], [], max_attempts=3)
+    return first
+
+
+def _rows(store: Store) -> dict[str, list[Any]]:
+    with store.reading() as session:
+        return {
+            table.name: [tuple(row) for row in session.execute(select(table).order_by(*table.primary_key.columns))]
+            for table in TABLES
+        }
+
+
+def test_a_backup_brings_everything_back_into_either_kind(store: Store, elsewhere: Settings, tmp_path: Path) -> None:
+    _filled(store)
+    copy = tmp_path / "copy.db"
+    back_up(store.engine, copy)
+    with open_store(settings_in(tmp_path, database_url=f"sqlite:///{copy}")) as opened:
+        assert _rows(opened) == _rows(store)
+    with open_store(elsewhere) as other:
+        restore(copy, other.engine)
+        assert _rows(other) == _rows(store)
+        # What waited is graded there, and what comes in is numbered on.
+        _grade_all(other)
+        _batch(other, "later", "zoe")
+        with other.reading() as session:
+            assert session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.DONE)) == 7
+        with pytest.raises(UsageError, match="is not empty, expected one in which nothing was submitted yet"):
+            restore(copy, other.engine)
+
+
+def test_a_backup_is_for_its_user_alone_and_never_writes_over_another(store: Store, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.db"
+    back_up(store.engine, copy)
+    assert copy.stat().st_mode & 0o777 == 0o600
+    with pytest.raises(UsageError, match=r"copy.db exists already; name a new file"):
+        back_up(store.engine, copy)
+    with pytest.raises(HostError, match="cannot be copied to"):
+        back_up(store.engine, tmp_path / "nowhere" / "copy.db")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"hello, this is no database at all", "cannot be read"), (b"", "is no database of Robomark's")],
+)
+def test_what_is_no_backup_is_refused(content: bytes, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "copy.db"
+    file.write_bytes(content)
+    with (
+        open_store(settings_in(tmp_path / "home")) as store,
+        pytest.raises(UsageError, match=f"copy.db: {words}.*expected a file that robomark db backup made"),
+    ):
+        restore(file, store.engine)
+
+
+def test_a_backup_of_a_newer_release_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+    copy = tmp_path / "copy.db"
+    with open_store(settings_in(tmp_path / "home")) as store:
+        back_up(store.engine, copy)
+        engine = open_engine(f"sqlite:///{copy}")
+        with engine.begin() as connection:
+            connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
+        engine.dispose()
+        with pytest.raises(HostError, match="newer Robomark"):
+            restore(copy, store.engine)
+
+
+def _counts(store: Store) -> dict[str, int]:
+    with store.reading() as session:
+        found = {kind: session.scalar(select(func.count()).select_from(kind)) or 0 for kind in _COUNTED}
+    return {kind.__tablename__: count for kind, count in found.items()}
+
+
+_COUNTED = (Batch, SubmissionRow, Job, TrialRow, Artifact, Enrolment, Person)
+
+
+def _age(store: Store, *students: str) -> None:
+    """What these have submitted was submitted long ago."""
+    ids = select(Enrolment.id).where(Enrolment.student.in_(students))
+    then = datetime.now(UTC) - timedelta(days=400)
+    with store.transaction() as session:
+        session.execute(update(SubmissionRow).where(SubmissionRow.enrolment_id.in_(ids)).values(created_at=then))
+
+
+def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
+    _filled(store)
+    before = _counts(store)
+    long_ago = datetime.now(UTC) - timedelta(days=100)
+    _age(store, "eve", "mia")
+    # mia's still waits.
+    assert purge(store, long_ago, "staff", only_count=True) == Purged(1, 1, 1)
+    assert _counts(store) == before
+    assert purge(store, long_ago, "staff") == Purged(1, 1, 1)
+    after = _counts(store)
+    assert {name: before[name] - after[name] for name in before} == {
+        "batch": 1, "submission": 1, "job": 1, "trial": before["trial"] - after["trial"],
+        "artifact": before["artifact"] - after["artifact"], "enrolment": 1, "person": 1,
+    }  # fmt: skip
+    assert after["trial"] < before["trial"]
+    # Of the same students' newer work nothing is missing.
+    assert purge(store, long_ago, "staff") == Purged(0, 0, 0)
+
+
+def test_a_purge_keeps_what_a_later_grade_is_a_copy_of(store: Store) -> None:
+    _filled(store)
+    long_ago = datetime.now(UTC) - timedelta(days=100)
+    with store.reading() as session:
+        copied = session.scalars(select(Job.copied_from).where(Job.copied_from.is_not(None))).one()
+        source = session.scalars(
+            select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == copied)
+        ).one()
+    _age(store, source)
+    assert purge(store, long_ago, "staff").submissions == 0
+    _age(store, "eve")
+    assert purge(store, long_ago, "staff").submissions == 2
+
+
+def test_nothing_is_left_when_all_is_old(store: Store) -> None:
+    _filled(store)
+    jobs_left = purge(store, datetime.now(UTC) + timedelta(days=1), "staff")
+    # mia's submission waits, and stays with her.
+    assert jobs_left.submissions == 3
+    assert _counts(store) == {
+        "batch": 1, "submission": 1, "job": 1, "trial": 0, "artifact": 0, "enrolment": 1, "person": 1,
+    }  # fmt: skip
