@@ -20,6 +20,7 @@ from models.images import Photographer, Shift
 from service.commands.models import models_app
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+from sim.errors import UsageError
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +74,9 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
         "offset in x, mm",
         "offset in y, mm",
         "heading, degrees",
+        "turned image, degrees",
+        "size of the image, %",
+        "covered square, mm each way",
     ]
     assert texts(figure).count("n = 6 to 120 images a point") == 4
     line = figure.axes[1].lines[2]
@@ -119,5 +123,5 @@ def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
 
 def test_classifiers_of_different_things_are_not_compared() -> None:
     done = CliRunner().invoke(models_app, ["compare", "digits", "shapes"])
-    assert done.exit_code != 0
-    assert "digits, shapes cannot be compared; expected two or more models of the same things" in done.output
+    assert isinstance(done.exception, UsageError)
+    assert str(done.exception) == "digits, shapes cannot be compared; expected two or more models of the same things"
