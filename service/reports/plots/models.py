@@ -72,7 +72,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
             for varied, curves in panels.items()
         ],
         f"{evaluation.card.name}: how robust it is",
-        "what the left sensor sees when the robot stands beside the spot, or is noisy",
+        "what the left sensor sees, as one condition after another gets harder",
     )
 
 
