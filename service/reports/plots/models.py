@@ -87,7 +87,7 @@ def comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) 
             )
             for curves in found
         ],
-        " and ".join(names) + ": how robust they are",
+        f"{', '.join(names[:-1])} and {names[-1]}: how robust they are",
         "the same places and the same noise for each",
     )
     return png(figure)
