@@ -220,7 +220,8 @@ def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
 
 
 def test_an_unknown_model_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no model called 'shape'; expected one of digits, digits-28, digits-cnn, shapes"):
+    known = "digits, digits-28, digits-cnn, shapes"
+    with pytest.raises(UsageError, match=f"no model called 'shape'; expected one of {known}"):
         weights_bytes("shape")
     with pytest.raises(UsageError, match="no model called 'shape' to train; expected one of"):
         train("shape", tmp_path)

@@ -320,7 +320,7 @@ def test_tensorflow_lite_networks_read_digits_that_the_sensor_sees(kit: Kit, fil
     for number, label in enumerate(sheet.labels[:55]):
         row, column = divmod(number, 20)
         # The focus of the left light sensor where the course stands the robot, in the floor's image.
-        top, left = 1143 - 70 - 1004 + 100 * row, 73 + 100 * column
+        top, left = 56 + 100 * row, 73 + 100 * column
         image = Image.fromarray(sheet.pixels[top : top + 14, left : left + 14]).convert("L")
         results = kit.views.cnn_test_with_image(network, image, retval=True)
         right += network[1][int(results.argmax())] == label.label
