@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from responders import message_format, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
+from responders.link import link_of
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import Child
@@ -20,7 +21,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, SENSORS, TICK, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, SENSORS, Fault, Image, Line, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
@@ -58,8 +59,9 @@ class Bridge:
         self._meter = meter
         self.now = 0
         self.chain = Chain()
-        self.world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, self.chain, spec.physics)
-        self.conversation = Conversation(spec.channel, spec.seed, self.chain)
+        self.world = world_of(spec, arena, camera, self.chain)
+        link = link_of(spec.channel, arena, lambda: self.world.pose)
+        self.conversation = Conversation(spec.channel, spec.seed, self.chain, link)
         self.printed: list[Line] = []
         self.spoken: list[Line] = []
         self.images: list[Image] = []
@@ -93,8 +95,11 @@ class Bridge:
                 "name": spec.program.code.name,
                 "text": spec.program.code.text,
                 "preamble": spec.program.preamble,
+                "modules": dict(spec.program.modules),
+                "tick": spec.tick,
                 "sensors": list(SENSORS),
                 "seed": Stream(spec.child_seed, "program").integer(0),
+                "number": spec.number,
             }
         )
         while True:
@@ -115,28 +120,6 @@ class Bridge:
             tuple((datum.name, datum.value, datum.simtime, datum.t) for datum in data if datum is not None),
             tuple(f"{side} {csv} {tick}" for side, csv, tick in images),
         )
-
-    def robot_state(self) -> dict[str, Any]:
-        """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
-        world, readings = self.world, self.world.readings()
-        state: dict[str, Any] = {
-            "x": world.pose.x,
-            "y": world.pose.y,
-            "angle": math.radians(world.pose.heading),
-            "ultrasonic": readings["ultrasonic"],
-            "gyro": readings["gyro"],
-            "penDown": self._spec.pen_down,
-            "_sensorNoise": self._spec.noise.light,
-            "_wheelNoise": self._spec.noise.motor,
-        }
-        for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
-            rgb = readings[side]
-            state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
-            state[f"{side}_light_raw"] = rgb
-            state[f"{side}_light"] = int(rgb[0])
-            state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
-            state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
-        return state
 
     def _serve(self, frame: wire.Frame) -> None:
         match frame["do"]:
@@ -164,7 +147,7 @@ class Bridge:
                     self._advance(_READ)
                 self._reply(None)
             case "stuck":
-                self._never_waits(frame["line"])
+                self._never_waits(frame["line"], frame["file"])
             case "refused":
                 if len(self.notes) < _MOST_NOTES:
                     self.notes.append(refusal("program", frame))
@@ -174,12 +157,12 @@ class Bridge:
         self._free_acts = 0
         end = self.now + units
         last = min(end, self._limit)
-        due = (self.world.clock + 1) * TICK
+        tick = self._spec.tick
+        due = (self.world.clock + 1) * tick
         while due <= last:
             self.now = due
-            self._arrived += self.conversation.deliver(due)
-            self.world.tick()
-            due += TICK
+            self._tick()
+            due += tick
             if self.world.clock % 3000 == 0:
                 self._meter.heartbeat()
         if end > self._limit:
@@ -188,6 +171,14 @@ class Bridge:
             raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
         self.now = end
 
+    def _tick(self) -> None:
+        self.take_arrivals()
+        self.world.tick()
+
+    def take_arrivals(self) -> None:
+        """What has arrived by now goes to the program with the next reply."""
+        self._arrived += self.conversation.deliver(self.now)
+
     def _reply(self, value: Any) -> None:
         self._child.send({"t": self.now, "v": value}, self._arrived)
         self._arrived = []
@@ -195,7 +186,7 @@ class Bridge:
     def _read(self, what: str, times: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
         end = self.now + times * _READ
-        known = self._told_in == end // TICK
+        known = self._told_in == end // self._spec.tick
         if known:
             self._free_acts = 0
             self.now = end
@@ -265,10 +256,10 @@ class Bridge:
         sent = self.conversation.send(text, self.now)
         for copy in range(sent.copies):
             if self._responder is not None:
-                answer = self._responder.answer(text, self.now, sent.message, self.collected())
+                answer = self._responder.answer(sent.text, self.now, sent.message, self.collected())
             else:
                 self._meter.keep(len(_PINGPONG) + len(text))
-                answer = Answer(_PINGPONG + text)
+                answer = Answer(_PINGPONG + sent.text)
             self.conversation.answer(sent, copy, answer)
         return sent.message
 
@@ -323,10 +314,38 @@ class Bridge:
     def _free_act(self) -> None:
         self._free_acts += 1
         if self._free_acts > _FREE_ACTS:
-            self._never_waits(None)
+            self._never_waits(None, None)
 
-    def _never_waits(self, line: int | None) -> NoReturn:
+    def _never_waits(self, line: int | None, file: str | None) -> NoReturn:
         where = "this loop never waits" if line is not None else "the program never waits"
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
-        fault = Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", f"{where}, so the world cannot move", line, hint)
-        raise _Cut(fault)
+        sentence = f"{where}, so the world cannot move"
+        raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
+
+
+def world_of(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:
+    """The world that a trial begins in."""
+    return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
+
+
+def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
+    """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
+    readings = world.readings()
+    state: dict[str, Any] = {
+        "x": world.pose.x,
+        "y": world.pose.y,
+        "angle": math.radians(world.pose.heading),
+        "ultrasonic": readings["ultrasonic"],
+        "gyro": readings["gyro"],
+        "penDown": spec.pen_down,
+        "_sensorNoise": spec.noise.light,
+        "_wheelNoise": spec.noise.motor,
+    }
+    for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
+        rgb = readings[side]
+        state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
+        state[f"{side}_light_raw"] = rgb
+        state[f"{side}_light"] = int(rgb[0])
+        state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
+        state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
+    return state

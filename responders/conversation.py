@@ -9,6 +9,8 @@ import heapq
 from dataclasses import dataclass, replace
 
 from responders.channel import Channel, ChannelOfTrial
+from responders.link import ChannelLink, Contact
+from responders.message_format import queue_entry
 from sim.recording import SECOND, Fault, Message
 from sim.world import Chain
 
@@ -20,7 +22,8 @@ class Sent:
     message: int
     number: int
     t: int
-    copies: int  # how often it reaches the responder
+    text: str  # as it reaches the responder
+    copies: int  # how often it does
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,25 +37,47 @@ class Answer:
     note: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    """What arrives of an answer: what joins the queue, and its text where the channel corrupted it."""
+
+    entry: str | None
+    corrupted: str | None
+
+
 class Conversation:
     """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: Chain) -> None:
+    def __init__(self, channel: Channel, seed: int, chain: Chain, link: ChannelLink) -> None:
         self._channel = ChannelOfTrial(channel, seed)
         self._chain = chain
-        self._under_way: list[tuple[int, int, str | None]] = []  # due, index of the message, what joins the queue
+        self.link = link
+        self._under_way: list[tuple[int, int, _UnderWay]] = []  # due, index of the message
         self._texts = 0
         self.messages: list[Message] = []
         self.faults: list[Fault] = []
 
     def send(self, text: str, now: int) -> Sent:
         """The robot says ``text``; it reaches the responder at once, as often as it is copied on its way."""
-        copies = self._channel.copies(self._texts)
-        sent = Sent(len(self.messages), self._texts, now, copies)
-        note = "" if copies == 1 else "duplicated" if copies else "lost"
-        self.messages.append(Message(now / SECOND, "robot", text, now / SECOND if copies else None, note=note))
+        contact = self.link.contact()
+        copies = 0 if contact.lost else self._channel.copies(self._texts)
+        corrupted = self._channel.corrupted(text, self._texts) if copies else None
+        message = Message(
+            now / SECOND,
+            "robot",
+            text,
+            now / SECOND if copies else None,
+            note="" if copies == 1 else "duplicated" if copies else "lost",
+            lost="" if copies else contact.lost or "chance",
+            distance=contact.distance,
+            angle=contact.angle,
+            arrived_as=corrupted,
+        )
+        sent = Sent(len(self.messages), self._texts, now, message.received, copies)
+        self.messages.append(message)
         self._texts += 1
         self._chain.add("message", now, text.encode())
+        self._chain_befell(now, contact, corrupted)
         return sent
 
     def answer(self, sent: Sent, copy: int, answer: Answer) -> None:
@@ -64,20 +89,37 @@ class Conversation:
         arrivals = self._channel.arrivals(sent.number, copy, sent.t, answer.slept)
         said = Message((sent.t + answer.slept) / SECOND, "responder", answer.text, None, sent.message, answer.note)
         if not arrivals:
-            self.messages.append(replace(said, note=said.note or "lost"))
+            self.messages.append(replace(said, note=said.note or "lost", lost="chance"))
         for place, due in enumerate(arrivals):
-            heapq.heappush(self._under_way, (due, len(self.messages), answer.entry))
+            corrupted = self._channel.corrupted_answer(answer.text, sent.number, copy, place)
+            entry = answer.entry if corrupted is None or answer.entry is None else _entry_of(corrupted)
+            heapq.heappush(self._under_way, (due, len(self.messages), _UnderWay(entry, corrupted)))
             self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
 
+    def pass_on(self, sent: Sent, entry: str | None, other: Conversation) -> tuple[int, ...]:
+        """A text of this robot's sets out to the other one; the indices of its copies among the other's messages.
+
+        ``entry`` is what joins the other's queue, as JSON.
+        """
+        message = self.messages[sent.message]
+        self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
+        first = len(other.messages)
+        for copy, due in enumerate(self._channel.one_way(sent.number, sent.t, sent.copies)):
+            heapq.heappush(other._under_way, (due, len(other.messages), _UnderWay(entry, message.arrived_as)))
+            note = "duplicated" if copy else ""
+            other.messages.append(Message(sent.t / SECOND, "partner", message.text, None, note=note))
+        return tuple(range(first, len(other.messages)))
+
     def deliver(self, now: int) -> list[str]:
-        """Everything due at the tick at ``now`` arrives, in order; what joins the robot's queue of it, as JSON."""
+        """Everything due at the tick at ``now`` arrives, in order; what joins the robot's queue of it, as JSON.
+
+        What is due while the robot is out of the link's reach is lost.
+        """
         arrived = []
         while self._under_way and self._under_way[0][0] <= now:
-            _, index, entry = heapq.heappop(self._under_way)
-            message = self.messages[index] = replace(self.messages[index], delivered=now / SECOND)
-            self._chain.add("answer", now, message.text.encode())
-            if entry is not None:
-                arrived.append(entry)
+            _, index, under_way = heapq.heappop(self._under_way)
+            if self._arrives(index, now, under_way.corrupted) and under_way.entry is not None:
+                arrived.append(under_way.entry)
         return arrived
 
     def finish(self) -> None:
@@ -85,3 +127,29 @@ class Conversation:
         for _, index, _ in self._under_way:
             self.messages[index] = replace(self.messages[index], note="undelivered")
         self._under_way.clear()
+
+    def _arrives(self, index: int, now: int, corrupted: str | None) -> bool:
+        contact = self.link.contact()
+        message = replace(self.messages[index], distance=contact.distance, angle=contact.angle)
+        if contact.lost:
+            self.messages[index] = replace(message, note=message.note or "lost", lost=contact.lost)
+        else:
+            self.messages[index] = replace(message, delivered=now / SECOND, arrived_as=corrupted)
+            self._chain.add("answer", now, message.text.encode())
+        self._chain_befell(now, contact, corrupted)
+        return not contact.lost
+
+    def _chain_befell(self, now: int, contact: Contact, corrupted: str | None) -> None:
+        """Into the chain goes what only an infrared link or a corrupting channel does to a text."""
+        if contact.lost:
+            self._chain.add("lost", now, contact.lost.encode())
+        elif corrupted is not None:
+            self._chain.add("corrupted", now, corrupted.encode())
+
+
+def _entry_of(corrupted: str) -> str | None:
+    """What joins the robot's queue of an answer that was JSON before it was corrupted; nothing if it no longer is."""
+    try:
+        return queue_entry(corrupted)
+    except ValueError:
+        return None

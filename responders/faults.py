@@ -40,12 +40,16 @@ def surprise(error: Exception) -> Surprise:
 
 
 def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
-    """The fault of a child that was stopped, or ended, at ``now`` in units of simulated time."""
+    """The fault of a child that was stopped, or ended, at ``now`` in units of simulated time.
+
+    ``who`` is the program, the responder, or the name of an agent; so it is below.
+    """
     verdict = stop.verdict
-    if who == "responder" and verdict is Verdict.PROGRAM_ERROR:
+    if who != "program" and verdict is Verdict.PROGRAM_ERROR:
         verdict = Verdict.RESPONDER_ERROR
     cause = stop.cause if isinstance(stop, Surprise) else ""
-    return Fault(now / SECOND, verdict, _who(who), f"the {who} was stopped: {stop.message}", stop.line, staff=cause)
+    sentence = f"the {who} was stopped: {stop.message}"
+    return _fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
 
 
 def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
@@ -53,21 +57,33 @@ def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
     if error["type"] == "MemoryError" or out_of_memory:
         sentence = f"the {who} asked for more memory than it may have"
-        return Fault(now / SECOND, Verdict.MEMORY_LIMIT, _who(who), sentence, error["line"])
-    verdict = Verdict.RESPONDER_ERROR if who == "responder" else Verdict.PROGRAM_ERROR
+        return _fault(now, Verdict.MEMORY_LIMIT, who, sentence, error["line"], file=error["file"] or "")
+    verdict = Verdict.PROGRAM_ERROR if who == "program" else Verdict.RESPONDER_ERROR
     words = error["text"]
     sentence = f"{error['type']}: {words}" if words else str(error["type"])
     hint = ""
     if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
-    return Fault(now / SECOND, verdict, _who(who), sentence, error["line"], hint)
+    return _fault(now, verdict, who, sentence, error["line"], hint, file=error["file"] or "")
 
 
 def refusal(who: str, frame: wire.Frame) -> str:
     """What the sandbox refused, as a sentence for the report."""
-    where = f"line {frame['line']} of the {who}" if frame["line"] is not None else f"the {who}"
+    where = f"line {frame['line']} of {frame['file'] or f'the {who}'}" if frame["line"] is not None else f"the {who}"
     return f"{where}: {frame['what'][:200]}"
 
 
-def _who(who: str) -> Any:
-    return "responder" if who == "responder" else "program"
+def _fault(
+    now: int,
+    verdict: Verdict,
+    who: str,
+    sentence: str,
+    line: int | None,
+    hint: str = "",
+    staff: str = "",
+    file: str = "",
+) -> Fault:
+    if who == "program":
+        return Fault(now / SECOND, verdict, "program", sentence, line, hint, staff=staff, file=file)
+    agent = "" if who == "responder" else who
+    return Fault(now / SECOND, verdict, "responder", sentence, line, hint, staff=staff, agent=agent, file=file)

@@ -106,3 +106,15 @@ def queue_entry(text: str) -> str:
         return json.dumps(parsed_answer(text), separators=(",", ":"), ensure_ascii=False)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def passed_on(text: str) -> str:
+    """What a robot's text adds to the queue of the other robot, as JSON.
+
+    It is the object after ``PY::JSON::`` or ``IMG_DATA::``, else the text after ``PY::``. Raises ValueError as
+    ``parsed_answer``.
+    """
+    if text.startswith(IMG_DATA):
+        return text.removeprefix(f"{IMG_DATA}::")
+    said = text.removeprefix(PY)
+    return queue_entry(said) if said.startswith(JSON) else json.dumps(said)

@@ -10,17 +10,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
-from responders.bridge import Bridge
+from responders.bridge import Bridge, robot_state, world_of
+from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, read_log, recording_of
+from responders.trial import MOST_NOTES, recording_of
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.motion import Rectangle
 from sim.recording import SECOND, Fault, Recording, Verdict
-from sim.world import Chain, World
+from sim.world import Chain
 
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
@@ -55,6 +56,9 @@ class PlannedRun:
 
 class RunPlanner(Protocol):
     """Decides what magics come to."""
+
+    def standing(self) -> PlannedRun:
+        """How the robot stands that does not run."""
 
     def call(self, call: MagicCall) -> PlannedRun:
         """Say what a magic comes to: a run, notes, or nothing."""
@@ -135,7 +139,7 @@ def execute_notebook(
 def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str) -> Recording:
     """The recording of a run that did not come about: the robot stands where it would have started."""
     chain = Chain()
-    world = World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain)
+    world = world_of(spec, arena, camera, chain)
     return Recording(
         background=spec.floor.name,
         start=spec.pose,
@@ -173,7 +177,9 @@ class _Execution:
         self.runs: list[Run] = []
 
     def perform(self, frame: wire.Frame) -> dict[str, Any]:
-        """Do what a magic asks; the frame that lets the notebook go on."""
+        """Do what a magic asks, or say how the robot stands; the frame that lets the notebook go on."""
+        if frame["do"] == "state":
+            return {"do": "state", "state": self._state()}
         cell, line = self._process.place(frame["line"])
         call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
         planned = self._planner.call(call)
@@ -187,7 +193,13 @@ class _Execution:
             return _done()
         bridge = self._run(cell, planned, planned.spec)
         logged = bridge.collected()
-        return _done(bridge.now, logged.data, logged.images, bridge.robot_state())
+        return _done(bridge.now, logged.data, logged.images, robot_state(bridge.world, planned.spec))
+
+    def _state(self) -> dict[str, Any]:
+        standing = self._planner.standing()
+        assert standing.spec is not None
+        ground = self._ground(standing.spec, standing.obstacles)
+        return robot_state(world_of(standing.spec, *ground, Chain()), standing.spec)
 
     def finish(self) -> None:
         """Run what the planner has for the end."""

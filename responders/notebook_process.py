@@ -60,7 +60,7 @@ class NotebookProcess(ResponderProcess):
         self.stopped: Fault | None = None
 
     def execute(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
-        """Execute all cells; ``perform`` does what a magic that starts a robot asks, and gives the frame of reply."""
+        """Execute all cells; ``perform`` does what a magic asks of the robot, and gives the reply."""
         assert self._child is not None
         try:
             self._child.send(
@@ -83,10 +83,12 @@ class NotebookProcess(ResponderProcess):
             self._stopped(stop, 0)
         except Exception as error:
             self._stopped(surprise(error), 0)
+        finally:
+            self._tell_what_was_not_run()
 
     def placed(self, fault: Fault) -> Fault:
         """A fault of the process with the cell, and the line in it, where that is known."""
-        if fault.who != "responder" or fault.line is None or fault.cell is not None:
+        if fault.who != "responder" or fault.line is None or fault.cell is not None or fault.file:
             return fault
         cell, line = self.place(fault.line)
         return replace(fault, cell=cell, line=line)
@@ -98,11 +100,17 @@ class NotebookProcess(ResponderProcess):
         cell = bisect.bisect_right(self._first_lines, line)
         return cell, line - self._first_lines[cell - 1] + 1
 
-    def note(self, line: int | None, sentence: str) -> None:
-        """Keep a sentence for the report, with the place that it is about."""
-        cell, number = self.place(line)
+    def note(self, line: int | None, sentence: str, file: str | None = None) -> None:
+        """Keep a sentence for the report, with the place that it is about; ``file`` lies beside the notebook."""
+        cell, number = self.place(line) if file is None else (self._cell, line)
         where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
-        self._note(f"{where}: {sentence}")
+        self._note(f"{where}{f' of {file}' if file else ''}: {sentence}")
+
+    def _tell_what_was_not_run(self) -> None:
+        first, last = self._cell + 1, len(self._notebook.cells)
+        if self.stopped is not None and first <= last:
+            which = f"cell {last} was" if first == last else f"cells {first} to {last} were"
+            self._note(f"{which} not run: the notebook was stopped in cell {self._cell}")
 
     def _take_cell(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
         # Each costs output, so that a process cannot send these for ever.
@@ -115,12 +123,13 @@ class NotebookProcess(ResponderProcess):
                 fault = replace(fault, message=fault.message.replace("the responder asked", "it asked", 1))
                 self.raised.append(replace(fault, cell=fault.cell or self._cell))
                 self._note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
-            case "magic":
+            case "magic" | "state":
                 self._magics += 1
                 if self._magics > _MOST_MAGICS:
                     sentence = f"the notebook called %sim_magic more than {_MOST_MAGICS} times"
                     raise ChildStopped(Verdict.OUTPUT_LIMIT, sentence)
-                self.missing = None if frame["missing"] is None else frame["missing"][:400]
+                if frame["do"] == "magic":
+                    self.missing = None if frame["missing"] is None else frame["missing"][:400]
                 reply = perform(frame)
                 if self._child is not None:
                     self._child.send(reply)
@@ -130,11 +139,11 @@ class NotebookProcess(ResponderProcess):
     def _take(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "refused":
-                self.note(frame["line"], frame["what"][:200])
+                self.note(frame["line"], frame["what"][:200], frame["file"])
             case "note":
                 # A responder may call magics too.
                 self._spend("", "sent")
-                self.note(frame["line"], frame["text"][:400])
+                self.note(frame["line"], frame["text"][:400], frame["file"])
             case _:
                 super()._take(frame)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from responders import message_format, wire
 from responders.conversation import Answer
@@ -17,6 +18,9 @@ from responders.sandbox.running_child import Child
 from responders.trial_spec import ResponderSpec
 from sim.chance import Stream
 from sim.recording import SECOND, Call, Fault, Verdict
+
+if TYPE_CHECKING:
+    from responders.agents import Agents
 
 _MOST_NOTES = 200
 #: Of the calls that are shown, and of the characters of each of their parts.
@@ -38,9 +42,22 @@ class ResponderProcess:
     """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
 
     _schema = wire.RESPONDER
+    _who = "responder"
 
-    def __init__(self, spec: ResponderSpec, sandboxes: Sandboxes, folder: Path, seed: int, meter: JobMeter) -> None:
+    def __init__(
+        self,
+        spec: ResponderSpec,
+        sandboxes: Sandboxes,
+        folder: Path,
+        seed: int,
+        meter: JobMeter,
+        agents: Agents | None = None,
+    ) -> None:
+        """``agents`` are the others that it may ask."""
         self._spec = spec
+        self._agents = agents
+        if agents is not None:
+            self._schema = wire.RESPONDER_WITH_AGENTS
         self._folder = folder
         self._meter = meter
         self.output: list[str] = []
@@ -48,7 +65,8 @@ class ResponderProcess:
         self.calls: list[Call] = []
         self.notes: list[str] = []
         self._message = -1  # the index of the one that is being answered
-        self._slept = 0  # since it was asked for that answer
+        self._asked_at = 0  # when it was asked for that answer
+        self._slept = 0  # since then
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
         self._child: Child | None = sandboxes.spawn("responder", spec.limits, folder, meter)
@@ -59,14 +77,7 @@ class ResponderProcess:
         """Run the module. The fault that kept it from answering, if any."""
         assert self._child is not None
         try:
-            self._child.send(
-                {
-                    "name": self._spec.code.name,
-                    "text": self._spec.code.text,
-                    "seed": Stream(self._seed, "responder").integer(0),
-                    "function": self._spec.function,
-                }
-            )
+            self._child.send(self._beginning())
             frame = self._until("ready")
         except ChildStopped as stop:
             return self._stopped(stop, 0)
@@ -74,23 +85,36 @@ class ResponderProcess:
             return self._stopped(surprise(error), 0)
         if frame["error"] is not None:
             self.close()
-            return error_fault(frame["error"], 0, "responder")
+            return error_fault(frame["error"], 0, self._who)
         return None
+
+    def _beginning(self) -> dict[str, Any]:
+        """The first frame for the child."""
+        names = {"agents": self._agents.others("responder")} if self._agents is not None else {}
+        return {
+            "name": self._spec.code.name,
+            "text": self._spec.code.text,
+            "seed": Stream(self._seed, "responder").integer(0),
+            "function": self._spec.function,
+            **names,
+        }
 
     @property
     def alive(self) -> bool:
         """Whether there is a child that can answer."""
         return self._child is not None
 
-    def answer(self, text: str, t: int, message: int, collected: Collected) -> Answer:
-        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one."""
+    def answer(self, text: str, t: int, message: int, collected: Collected, sender: int | None = None) -> Answer:
+        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one.
+
+        ``sender`` is the number of the robot that says it, where there are two.
+        """
         if self._child is None:
             return Answer()
-        self._message, self._slept = message, 0
+        self._message, self._asked_at, self._slept = message, t, 0
         try:
-            self._child.send(
-                {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
-            )
+            frame = {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
+            self._child.send(frame if sender is None else {**frame, "sender": sender})
             return self._answer(self._until("answer"), t)
         except ChildStopped as stop:
             return Answer(fault=self._stopped(stop, t))
@@ -127,7 +151,8 @@ class ResponderProcess:
         return Answer(fault=self._protocol_fault(t, f"the responder returned {what}"))
 
     def _protocol_fault(self, t: int, sentence: str) -> Fault:
-        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence)
+        agent = "" if self._who == "responder" else self._who
+        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, agent=agent)
 
     def _until(self, last: str) -> wire.Frame:
         assert self._child is not None
@@ -143,15 +168,21 @@ class ResponderProcess:
             case "print":
                 self._print(frame["text"])
             case "refused":
-                self._note(refusal("responder", frame))
+                self._note(refusal(self._who, frame))
             case "sleep":
                 self._slept += frame["units"]
             case "call":
                 if len(self.calls) < _MOST_CALLS:
-                    words = (frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result"))
-                    self.calls.append(Call(self._message, frame["depth"], *words))
+                    words = {name: frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result")}
+                    before = len(self._agents.messages) if self._agents is not None else 0
+                    self.calls.append(Call(self._message, frame["depth"], before=before, **words))
+            case "ask" if self._agents is not None and self._child is not None:
+                told = self._agents.ask(self._who, frame, self._asked_at + self._slept, self._message)
+                self._slept += told.slept
+                now = self._asked_at + self._slept
+                self._child.send({"do": "told", "t": now, "kind": told.kind, "text": told.text})
             case kind:
-                raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the responder's process sent a stray {kind} frame")
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the {self._who}'s process sent a stray {kind} frame")
 
     def _note(self, sentence: str) -> None:
         if len(self.notes) < _MOST_NOTES and sentence not in self.notes:
@@ -164,8 +195,8 @@ class ResponderProcess:
     def _spend(self, text: str, did: str) -> None:
         self._output_left -= len(text.encode("utf-8", "replace")) + 1
         if self._output_left < 0:
-            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the responder {did} more than {self._spec.output_bytes} bytes")
+            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the {self._who} {did} more than {self._spec.output_bytes} bytes")
 
     def _stopped(self, stop: ChildStopped, t: int) -> Fault:
         self.close()
-        return stopped(stop, "responder", t)
+        return stopped(stop, self._who, t)

@@ -5,24 +5,20 @@ Nothing outlives a trial but its recording; what the program and the responder d
 
 from __future__ import annotations
 
-import os
-import stat
 from dataclasses import replace
-from pathlib import Path
 
 from responders import message_format
+from responders.agents import agents_beside
 from responders.bridge import Bridge
-from responders.faults import stopped
+from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.meter import JobMeter
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict
 
-_LOG_FILE = "logger.txt"
-_LOG_BYTES = 1 << 20
 MOST_NOTES = 40
 
 
@@ -37,10 +33,10 @@ def run_trial(
 
     Raises HostError when the machine, not the student, fails.
     """
-    with sandboxes.private_folder() as folder:
+    with sandboxes.private_folder() as folder, agents_beside(spec, sandboxes, meter) as agents:
         responder = None
         if spec.responder is not None:
-            responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter)
+            responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter, agents)
         try:
             program = sandboxes.spawn("robot", spec.program.limits, meter=meter)
             try:
@@ -53,19 +49,23 @@ def run_trial(
             if responder is not None:
                 responder.close()
         log, unread = read_log(folder, meter) if responder is not None else ("", None)
+        if agents is not None:
+            agents.finish(bridge.chain, bridge.now)
     bridge.conversation.finish()
-    faults = [each for each in (unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
+    of_agents = agents.faults if agents is not None else ()
+    faults = [each for each in (*of_agents, unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
     faults.sort(key=lambda each: each.t)
     recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
     if responder is None:
         return recording
-    return replace(
+    recording = replace(
         recording,
         calls=tuple(responder.calls),
         responder_output="\n".join(responder.output),
         responder_log=log,
-        notes=(*recording.notes, *responder.notes)[:MOST_NOTES],
+        notes=(*recording.notes, *responder.notes, *(agents.notes if agents is not None else ()))[:MOST_NOTES],
     )
+    return recording if agents is None else agents.told(recording)
 
 
 def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
@@ -89,6 +89,7 @@ def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], san
         touches=tuple(world.touches),
         faults=faults,
         obstacles=world.obstacles,
+        beacon=spec.channel.beacon,
         label_patches=spec.floor.label_patches,
         sheet=spec.floor.sheet,
         robot=spec.robot.name,
@@ -96,23 +97,3 @@ def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], san
         sandbox=sandbox,
         notes=tuple(bridge.notes)[:MOST_NOTES],
     )
-
-
-def read_log(folder: Path, meter: JobMeter) -> tuple[str, Fault | None]:
-    """The responder's logger.txt, read after its process is gone: a regular file only, no link, capped and paid for."""
-    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
-    except OSError:
-        return "", None
-    finally:
-        os.close(directory)
-    with os.fdopen(fd, "rb") as file:
-        if not stat.S_ISREG(os.fstat(fd).st_mode):
-            return "", None
-        data = file.read(_LOG_BYTES)
-    try:
-        meter.keep(len(data))
-    except ChildStopped as stop:
-        return "", stopped(stop, "responder", 0)
-    return data.decode("utf-8", "replace"), None

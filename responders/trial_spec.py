@@ -1,4 +1,4 @@
-"""What a trial depends on, as plain values: the two parts of a submission, the robot on its floor, channel and seeds.
+"""What a trial depends on, as plain values: the parts of a submission, the robot on its floor, channel and seeds.
 
 Nothing here runs; ``trial.py`` makes a recording of it.
 """
@@ -6,15 +6,17 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
+from sim.chance import Stream
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import Pose
+from sim.recording import TICK, Pose
 from sim.robot import Robot
 from sim.world import Noise
 
@@ -23,12 +25,13 @@ Preamble = Literal["none", "imports", "preloaded"]
 
 @dataclass(frozen=True, slots=True)
 class ProgramSpec:
-    """A robot program and what it may use."""
+    """A robot program and what it may use; ``modules`` are texts that it can import, by their names."""
 
     code: Code
     preamble: Preamble
     limits: ChildLimits
     output_bytes: int
+    modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +46,32 @@ class ResponderSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class AgentSpec(ResponderSpec):
+    """What the responder and the other agents ask: an agent of the student's, or one that is ``given``."""
+
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PartnerSpec:
+    """The second robot of a trial: its program, and where it starts. All else is as the first one has it.
+
+    A program that the assignment has ``given`` may run until the time is up, and its chance is the world's: the same
+    for every submission.
+    """
+
+    program: ProgramSpec
+    pose: Pose
+    pen_down: bool = False
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``."""
+    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``.
+
+    With a ``partner`` there are two robots, and without a responder each has the other to talk to.
+    """
 
     program: ProgramSpec
     responder: ResponderSpec | None
@@ -59,3 +86,20 @@ class TrialSpec:
     child_seed: int  # of the chance that the children see; the world's is ``seed``
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
+    tick: int = TICK  # how long one lasts, units of simulated time
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name
+    partner: PartnerSpec | None = None
+    number: int = 1  # of the robot: what its program is told that it is
+
+    def of_partner(self, partner: PartnerSpec) -> TrialSpec:
+        """The same trial as the second robot has it, with chance of its own."""
+        return replace(
+            self,
+            program=partner.program,
+            pose=partner.pose,
+            pen_down=partner.pen_down,
+            seed=Stream(self.seed, "second robot").integer(0),
+            child_seed=Stream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
+            partner=None,
+            number=2,
+        )

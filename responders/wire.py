@@ -57,14 +57,22 @@ def _or_none(check: Check) -> Check:
 def _error(value: object) -> bool:
     return (
         isinstance(value, dict)
-        and value.keys() == {"type", "text", "line"}
+        and value.keys() == {"type", "text", "line", "file"}
         and isinstance(value["type"], str)
         and isinstance(value["text"], str)
         and _line(value["line"])
+        and _file(value["file"])
     )
 
 
+def _module_file(value: object) -> bool:
+    return isinstance(value, str) and value.endswith(".py") and value[:-3].isidentifier() and len(value) <= 200
+
+
 _line = _or_none(_whole(0, 10**7))
+_file = _or_none(_module_file)
+#: Where in the student's files: a line, and the file if it is not the one that is run.
+_PLACE: Mapping[str, Check] = MappingProxyType({"line": _line, "file": _file})
 _port = _one_of("outB", "outC")
 _units = _whole(0, 10**15)
 
@@ -97,7 +105,7 @@ BATTERY: Schema = MappingProxyType(
     }
 )
 
-_REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, "line": _line}, {})
+_REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_PLACE}, {})
 
 #: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
 ROBOT: Schema = MappingProxyType(
@@ -127,8 +135,8 @@ ROBOT: Schema = MappingProxyType(
             {},
         ),
         "until_said": ({}, {}),
-        "stuck": ({"line": _line}, {}),
-        "busy": ({"line": _line}, {}),
+        "stuck": (_PLACE, {}),
+        "busy": (_PLACE, {}),
         "end": ({"error": _or_none(_error)}, {}),
     }
 )
@@ -140,7 +148,7 @@ RESPONDER: Schema = MappingProxyType(
         "ready": ({"error": _or_none(_error)}, {}),
         "print": ({"text": _text}, {}),
         "sleep": ({"units": _units}, {}),
-        "busy": ({"line": _line}, {}),
+        "busy": (_PLACE, {}),
         "call": (
             {
                 "depth": _whole(0, 1000),
@@ -164,7 +172,7 @@ NOTEBOOK: Schema = MappingProxyType(
         **RESPONDER,
         "cell": ({"place": _whole(0, 10**5)}, {}),
         "raised": ({"error": _error}, {}),
-        "note": ({"text": _text, "line": _line}, {}),
+        "note": ({"text": _text, **_PLACE}, {}),
         "magic": (
             {
                 "name": _one_of("sim_magic", "sim_magic_imports", "sim_magic_preloaded"),
@@ -175,6 +183,7 @@ NOTEBOOK: Schema = MappingProxyType(
             },
             {},
         ),
+        "state": ({}, {}),
         "executed": ({"missing": _or_none(_text)}, {}),
     }
 )
@@ -190,10 +199,29 @@ CALLS: Schema = MappingProxyType(
     }
 )
 
-#: Kinds that hold numbers and words of the schema alone. Nothing a child has worded is kept of them, and honest
-#: programs send thousands; every other frame is paid for before it is handed on.
+_ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"agent": _text, "arguments": _text, "named": _text}, {})
+
+#: What a responder's process may say whose submission has agents, and what such an agent's process may.
+RESPONDER_WITH_AGENTS: Schema = MappingProxyType({**RESPONDER, "ask": _ASK})
+AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
+
+#: Kinds that hold numbers and words of the schema alone, or are a child's last. Nothing else that a child has worded is
+#: kept of them, and honest programs send thousands; every other frame is paid for before it is handed on.
 NOTHING_KEPT = frozenset(
-    {"read", "wait", "motor", "motor_state", "paid_motor", "until", "until_said", "stuck", "busy", "sleep", "cell"}
+    {
+        "read",
+        "wait",
+        "motor",
+        "motor_state",
+        "paid_motor",
+        "until",
+        "until_said",
+        "stuck",
+        "busy",
+        "sleep",
+        "cell",
+        "state",
+    }
 )
 
 #: The field that each kind of answer must have.

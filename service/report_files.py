@@ -5,20 +5,23 @@ What a report says is decided there, and nothing there reads the database; what 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
 from service.plotting import draw
-from service.reports.html import BatchRow, batch_index, report
+from service.reports.html import BatchRow, batch_index, refusal_page, report
+from service.reports.rows import ReportPage, missing_words
 from service.reports.view import staff_view, student_view
-from service.reports.written import file_stems, write_page
-from service.store import intake, plots, policies, results
+from service.reports.written import file_stems, refused_stems, write_page
+from service.store import intake, plots, policies, rankings, results
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.states import JobState, PlotState
+from service.store.states import PlotState
 from sim.recording import Verdict
+from submissions.people import Refusal
 
 _INDEX = "index.html"
 
@@ -33,6 +36,63 @@ class Written:
 
 def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: str) -> Written:
     """The page of one graded job, called by ``stem``. Raises UsageError when the folder cannot be written to."""
+    html, drawn = _page(store, line, grade)
+    return Written(write_page(folder, f"{stem}.html", html), drawn)
+
+
+def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal]) -> Iterator[ReportPage]:
+    """A page for each of the graded jobs, then one for each who was refused."""
+    for line in lines:
+        with store.reading() as session:
+            grade = results.load(session, line.id)
+        yield ReportPage(row_of(line, grade), _page(store, line, grade)[0])
+    for refusal in refusals:
+        row = refused_row(refusal)
+        yield ReportPage(row, refusal_page(row))
+
+
+def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Sequence[Refusal], folder: Path) -> Path:
+    """A page for each graded job and each who was refused, and one that lists them all; where that one is.
+
+    Pages are named after the student, and after the assignment where one student has several. Raises UsageError when
+    the folder cannot be written to.
+    """
+    graded = [line for line in lines if not why_not_shown(line)]
+    names = [(line.student, line.assignment) for line in graded]
+    stems = [*file_stems(names), *refused_stems([(refusal.source, refusal.student.id) for refusal in refusals])]
+    pages = report_pages(store, graded, refusals)
+    paths = [write_page(folder, f"{stem}.html", page.html) for stem, page in zip(stems, pages, strict=True)]
+    own = {line.id: path.name for line, path in zip(graded, paths, strict=False)}
+    rows = [
+        BatchRow(
+            line.student,
+            line.marks,
+            line.max_marks,
+            None if line.verdict is None else Verdict(line.verdict),
+            own.get(line.id),
+            why_not_shown(line) or missing_words(line.missing),
+            line.name if line.name != line.student else "",
+        )
+        for line in lines
+    ]
+    rows += [
+        BatchRow(
+            refusal.student.id or refusal.source,
+            report=path.name,
+            note=f"not taken in: {refusal.sentence}",
+            name=refusal.student.name if refusal.student.name != refusal.student.id else "",
+        )
+        for refusal, path in zip(refusals, paths[len(graded) :], strict=True)
+    ]
+    sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
+    rows.sort(key=lambda row: row.student)
+    with store.reading() as session:
+        ranks = rankings.rank_tables(session, lines)
+    return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
+
+
+def _page(store: Store, line: JobLine, grade: Grade) -> tuple[str, Mapping[str, bytes]]:
+    """The page of one graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         released = policies.released(session, line.id)
@@ -42,50 +102,4 @@ def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: 
         drawn = draw(grade, assignment, submission)
     found = drawn or {}
     view = student_view(grade, released) if line.staff_only is None else staff_view(grade)
-    return Written(write_page(folder, f"{stem}.html", report(view, found, submission)), found)
-
-
-def write_reports(store: Store, lines: Sequence[JobLine], folder: Path) -> list[Path]:
-    """A page for each graded job, named after its student, and after its assignment where one student has several.
-
-    Raises UsageError when the folder cannot be written to.
-    """
-    stems = file_stems([(line.student, line.assignment) for line in lines])
-    paths = []
-    for line, stem in zip(lines, stems, strict=True):
-        with store.reading() as session:
-            grade = results.load(session, line.id)
-        paths.append(write_report(store, line, grade, folder, stem).path)
-    return paths
-
-
-def write_batch(
-    store: Store, title: str, lines: Sequence[JobLine], problems: Sequence[tuple[str, str]], folder: Path
-) -> Path:
-    """A page for each graded job, and one that lists them all with what was refused; where that one is.
-
-    Raises UsageError when the folder cannot be written to.
-    """
-    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
-    paths = write_reports(store, graded, folder)
-    pages = {line.id: path.name for line, path in zip(graded, paths, strict=True)}
-    rows = [
-        BatchRow(
-            line.student,
-            line.marks,
-            line.max_marks,
-            None if line.verdict is None else Verdict(line.verdict),
-            pages.get(line.id),
-            line.error or _remark(line),
-        )
-        for line in lines
-    ]
-    rows += [BatchRow(name, note=f"not taken in: {sentence}") for name, sentence in problems]
-    sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
-    return write_page(folder, _INDEX, batch_index(rows, title, sandbox))
-
-
-def _remark(line: JobLine) -> str:
-    if line.staff_only is not None:
-        return f"for staff only: {line.staff_only}"
-    return "" if line.state is JobState.DONE else line.state.value
+    return report(view, found, submission), found

@@ -9,7 +9,7 @@ import math
 
 from sim.bullet import Client, pb
 from sim.camera import HEIGHT, WIDTH
-from sim.motion import FreeMotion, Motion, Physics, Rectangle, SolidMotion, add_block, gap, walls
+from sim.motion import FreeMotion, Motion, Physics, Rectangle, SolidMotion, add_block, add_body, gap, place_body, walls
 from sim.rigid_wheels import RigidWheels
 from sim.robot import Robot
 from sim.trigonometry import round_half_up, sincos
@@ -18,7 +18,7 @@ _METRE = 0.001
 _RANGE = 2550.0  # mm
 _RAYS = tuple(math.radians(angle) for angle in (0, 7, -7, 14, -14, 21, -21))
 _HORIZONTAL, _VERTICAL = 2, 4  # collision groups of the edges that run along x and along y
-_TOUCH = 0.5  # mm: Bullet lets a body that is pressed against a wall rest a fraction of a millimetre before it
+TOUCH = 0.5  # mm: Bullet lets a body that is pressed against a wall rest a fraction of a millimetre before it
 
 
 class Arena:
@@ -89,6 +89,10 @@ class Arena:
                 groups |= group
         if not groups:
             return _RANGE
+        return self._nearest_hit(x, y, heading, forward, groups)
+
+    def _nearest_hit(self, x: float, y: float, heading: float, forward: float, groups: int) -> float:
+        """Where the first of the rays meets something of these collision groups, mm in whole ones."""
         sine, cosine = sincos(heading)
         start = ((x + cosine * forward) * _METRE, (y + sine * forward) * _METRE, 0.0)
         ends = []
@@ -100,39 +104,38 @@ class Arena:
         nearest = min(hit[2] for hit in hits)
         return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
 
+    def stands_between(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Whether the straight way from one place to another, mm, meets an edge of the floor or of an obstacle.
+
+        Walls and obstacles are higher than whatever looks across, so the height of the ray makes no difference.
+        """
+        ray = [(x * _METRE, y * _METRE, 0.0) for x, y in (start, end)]
+        edges = _HORIZONTAL | _VERTICAL
+        ((body, *_),) = pb.rayTestBatch(ray[:1], ray[1:], collisionFilterMask=edges, physicsClientId=self._client.id)
+        return bool(body >= 0)
+
     def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """The names of the walls and obstacles that the robot's body overlaps, or comes within half a millimetre of."""
-        near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + _TOUCH]
+        near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + TOUCH]
         if not near:
             return ()
         body = self._body(robot)
-        half = sincos(heading / 2)
-        pb.resetBasePositionAndOrientation(
-            body, (x * _METRE, y * _METRE, 0), (0, 0, half[0], half[1]), physicsClientId=self._client.id
-        )
-        return tuple(
-            name
-            for name, block in near
-            if pb.getClosestPoints(body, block, _TOUCH * _METRE, physicsClientId=self._client.id)
-        )
+        place_body(body, x, y, heading, self._client)
+        return tuple(name for name, block in near if self._meet(body, block))
+
+    def _meet(self, body: int, other: int) -> bool:
+        return bool(pb.getClosestPoints(body, other, TOUCH * _METRE, physicsClientId=self._client.id))
 
     def _body(self, robot: Robot) -> int:
         if robot.name not in self._bodies:
-            length = robot.front - robot.back
-            shape = pb.createCollisionShape(
-                pb.GEOM_BOX,
-                halfExtents=[length / 2 * _METRE, robot.half_width * _METRE, 0.03],
-                collisionFramePosition=[(robot.front + robot.back) / 2 * _METRE, 0, 0],
-                physicsClientId=self._client.id,
-            )
-            body = pb.createMultiBody(0, shape, physicsClientId=self._client.id)
-            pb.setCollisionFilterGroupMask(body, -1, 1, 1, physicsClientId=self._client.id)
-            self._bodies[robot.name] = body
+            self._bodies[robot.name] = self._group(add_body(robot, self._client, 0), 1)
         return self._bodies[robot.name]
 
     def _add_block(self, box: Rectangle) -> int:
-        body = add_block(box, self._client)
-        pb.setCollisionFilterGroupMask(body, -1, 1, 1, physicsClientId=self._client.id)
+        return self._group(add_block(box, self._client), 1)
+
+    def _group(self, body: int, group: int, mask: int = 1) -> int:
+        pb.setCollisionFilterGroupMask(body, -1, group, mask, physicsClientId=self._client.id)
         return body
 
     def _add_edges(self, lines: list[Rectangle], group: int) -> int:

@@ -79,22 +79,17 @@ class SolidMotion:
     remembers can differ from one worker to another.
     """
 
-    def __init__(self, robot: Robot, obstacles: tuple[Rectangle, ...]) -> None:
+    def __init__(self, robot: Robot, obstacles: tuple[Rectangle, ...], partner: Partner | None = None) -> None:
         self._free = FreeMotion(robot)
         self._reach = robot.reach
+        self._partner = partner
         self._boxes = (*walls().values(), *obstacles)
         self._client = Client()
         client = self._client.id
         for box in self._boxes:
             add_block(box, self._client)
-        length = robot.front - robot.back
-        shape = pb.createCollisionShape(
-            pb.GEOM_BOX,
-            halfExtents=[length / 2 * _METRE, robot.half_width * _METRE, 0.03],
-            collisionFramePosition=[(robot.front + robot.back) / 2 * _METRE, 0, 0],
-            physicsClientId=client,
-        )
-        self._body = pb.createMultiBody(1, shape, physicsClientId=client)
+        self._partners_body = add_body(partner.robot, self._client, 0) if partner is not None else -1
+        self._body = add_body(robot, self._client, 1)
         pb.changeDynamics(
             self._body,
             -1,
@@ -126,14 +121,14 @@ class SolidMotion:
         """The new x and y, mm, and the turn, radians; Bullet is asked only near a wall or an obstacle."""
         new_x, new_y, turned = self._free.moved(x, y, heading, left, right)
         far = self._reach + math.hypot(new_x - x, new_y - y)
-        if all(gap(box, x, y) > far for box in self._boxes):
+        partner = self._partner
+        if all(gap(box, x, y) > far for box in self._boxes) and (partner is None or partner.gap(x, y) > far):
             return new_x, new_y, turned
         client = self._client.id
-        half = sincos(heading / 2)
         pb.restoreState(self._state, physicsClientId=client)
-        pb.resetBasePositionAndOrientation(
-            self._body, (x * _METRE, y * _METRE, 0), (0, 0, half[0], half[1]), physicsClientId=client
-        )
+        if partner is not None:
+            place_body(self._partners_body, partner.x, partner.y, partner.heading, self._client)
+        place_body(self._body, x, y, heading, self._client)
         pb.resetBaseVelocity(
             self._body,
             ((new_x - x) * _METRE / _TICK, (new_y - y) * _METRE / _TICK, 0),
@@ -146,6 +141,20 @@ class SolidMotion:
         # A contact may have come and gone within the tick, so it is the outcome that tells, not the contacts left.
         free = math.hypot(met_x - new_x, met_y - new_y) < _UNTOUCHED and abs(met_turn - turned) < _UNTOUCHED
         return (new_x, new_y, turned) if free else (round(met_x, 6), round(met_y, 6), round(met_turn, 9))
+
+
+@dataclass(slots=True)
+class Partner:
+    """The other robot on a floor and where it is now, mm and radians: a body in the way, which nothing here moves."""
+
+    robot: Robot
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+    def gap(self, x: float, y: float) -> float:
+        """The least that a point can be away from its body, mm, however it stands."""
+        return math.hypot(x - self.x, y - self.y) - self.robot.reach
 
 
 def turn_between(heading: float, quaternion: tuple[float, float, float, float]) -> float:
@@ -171,6 +180,27 @@ def add_block(box: Rectangle, client: Client) -> int:
     shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=[width / 2, height / 2, 0.1], physicsClientId=client.id)
     body: int = pb.createMultiBody(0, shape, basePosition=[x + width / 2, y + height / 2, 0], physicsClientId=client.id)
     return body
+
+
+def add_body(robot: Robot, client: Client, mass: float, half_height: float = 0.03) -> int:
+    """Put a robot's body, a box, into a client's world; its Bullet number. Without mass it stays where it is placed."""
+    length = robot.front - robot.back
+    shape = pb.createCollisionShape(
+        pb.GEOM_BOX,
+        halfExtents=[length / 2 * _METRE, robot.half_width * _METRE, half_height],
+        collisionFramePosition=[(robot.front + robot.back) / 2 * _METRE, 0, 0],
+        physicsClientId=client.id,
+    )
+    body: int = pb.createMultiBody(mass, shape, physicsClientId=client.id)
+    return body
+
+
+def place_body(body: int, x: float, y: float, heading: float, client: Client) -> None:
+    """Put a body with the middle of its axle at (x, y) mm; heading in radians."""
+    half = sincos(heading / 2)
+    pb.resetBasePositionAndOrientation(
+        body, (x * _METRE, y * _METRE, 0), (0, 0, half[0], half[1]), physicsClientId=client.id
+    )
 
 
 def gap(box: Rectangle, x: float, y: float) -> float:

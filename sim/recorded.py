@@ -6,10 +6,8 @@ Whatever is drawn or judged of it is the service's.
 from __future__ import annotations
 
 from sim.floors import Floor, floor, names
-from sim.recording import Pose, Recording
+from sim.recording import SECOND, Fault, Pose, Recording, Verdict
 from sim.robot import ROBOTS, Robot
-
-TICKS_PER_SECOND = 30
 
 
 def floor_of(recording: Recording) -> Floor | None:
@@ -24,14 +22,27 @@ def robot_of(recording: Recording) -> Robot:
     return ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
 
 
-def seconds_at(tick: float) -> float:
+def faults_of(recording: Recording) -> tuple[Fault, ...]:
+    """The faults of all robots, the earliest first; of the same moment, the first robot's."""
+    partners = recording.partner.faults if recording.partner is not None else ()
+    return tuple(sorted((*recording.faults, *partners), key=lambda fault: fault.t))
+
+
+def verdict_of(recording: Recording) -> Verdict:
+    """How the trial ended: by the earliest fault of any robot."""
+    if recording.partner is None:
+        return recording.verdict
+    return next((fault.verdict for fault in faults_of(recording)), Verdict.FINISHED)
+
+
+def seconds_at(recording: Recording, tick: int) -> float:
     """When a tick was done."""
-    return tick / TICKS_PER_SECOND
+    return tick * recording.ticks.length / SECOND
 
 
-def ticks_until(t: float) -> int:
+def ticks_until(recording: Recording, t: float) -> int:
     """How many ticks were done at ``t`` seconds."""
-    return int(t * TICKS_PER_SECOND + 1e-6)
+    return int(t * recording.ticks.per_second + 1e-6)
 
 
 def pose_after(recording: Recording, tick: int) -> Pose:
@@ -45,4 +56,4 @@ def pose_after(recording: Recording, tick: int) -> Pose:
 
 def pose_at(recording: Recording, t: float) -> Pose:
     """Where the robot was at ``t`` seconds: its pose after the last tick until then."""
-    return pose_after(recording, ticks_until(t))
+    return pose_after(recording, ticks_until(recording, t))

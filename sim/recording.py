@@ -22,6 +22,8 @@ Integers = NDArray[np.int64]
 #: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
 SECOND = 3_000_000
 TICK = SECOND // 30
+#: A tick in the original's browser, whose timer leaves out what is less than a millisecond.
+BROWSER_TICK = SECOND // 1000 * 33
 MILLISECOND = SECOND // 1000
 #: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
 SENSOR_SIDE = 20
@@ -61,7 +63,7 @@ _WHEELS = Panel("Wheel encoders, degrees", height=0.75, rank=1)
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """One row a tick; row i is the state after tick i+1, at (i+1)/30 s. All arrays have n rows.
+    """One row a tick; row i is the state after tick i+1. All arrays have n rows.
 
     A column that is not given is not known. This is the table of columns: what the chain packs, what a program can
     read, what the store keeps, what traces and plots show is taken from here.
@@ -105,6 +107,7 @@ class Ticks:
     )
     left_pixels: int = 305  # how many pixels the sums are over
     right_pixels: int = 305
+    length: int = TICK  # of a tick, units of simulated time
 
     def __post_init__(self) -> None:
         for each in COLUMNS:
@@ -121,7 +124,12 @@ class Ticks:
     @property
     def t(self) -> Floats:
         """Seconds, shape (n,)."""
-        return np.arange(1, len(self.x) + 1) / 30.0
+        return np.arange(1, len(self.x) + 1) * self.length / SECOND
+
+    @property
+    def per_second(self) -> float:
+        """How many there are in a second."""
+        return SECOND / self.length
 
     @property
     def left_rgb(self) -> Floats:
@@ -148,20 +156,63 @@ class Line:
     text: str
 
 
+#: Why the channel lost a text; empty where it did not.
+LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """One text that crossed the bridge.
 
     ``t`` is when it was sent; ``delivered`` when it arrived, None if it never did. ``reply_to`` is the index, in
     the recording's messages, of the text that it answers. ``note`` says what befell it: lost, duplicated, malformed.
+    ``distance`` (mm) and ``angle`` (degrees, to the left above 0) are from the robot to the other end of an infrared
+    link when the text set out or, of an answer, when it came or was lost.
     """
 
     t: float
-    sender: Literal["robot", "responder"]
+    sender: Literal["robot", "responder", "partner"]  # the partner is the other robot, where there are two
     text: str
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
+    lost: LossReason = ""  # recordings of earlier releases say so in their note alone
+    distance: float | None = None
+    angle: float | None = None
+    arrived_as: str | None = None  # where the channel corrupted it
+    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
+
+    @property
+    def received(self) -> str:
+        """The text as it arrived, if it did."""
+        return self.text if self.arrived_as is None else self.arrived_as
+
+
+@dataclass(frozen=True, slots=True)
+class AgentMessage:
+    """One text between the responder and an agent, or between two agents, while the robot's message was answered.
+
+    ``message`` is the index of that one, -1 while the responder was loaded. ``reply_to`` is the index, in the
+    recording's agent messages, of what it answers; ``note`` says of a question why it got no answer.
+    """
+
+    t: float
+    sender: str
+    receiver: str
+    text: str  # what was sent, if it was a text; else as JSON has it
+    message: int
+    reply_to: int | None = None
+    note: str = ""
+    is_text: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class AgentOutput:
+    """What an agent printed, and what it wrote to its logger.txt."""
+
+    agent: str
+    printed: str
+    log: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +243,7 @@ class Call:
     callee: str  # parser, agent, logger, or the name bound to a network
     argument: str  # shortened repr
     result: str  # shortened repr
+    before: int = 0  # how many agent messages there were when it ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,28 +269,36 @@ class Touch:
 class Fault:
     """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one.
 
-    In a notebook the line is that of a cell, both counted from 1.
+    In a notebook the line is that of a cell, both counted from 1; with a ``file`` it is that of a file beside.
     """
 
     t: float
     verdict: Verdict
-    who: Literal["program", "responder", "bridge", "host", "assignment"]
+    who: Literal["program", "second program", "responder", "bridge", "host", "assignment"]
     message: str
     line: int | None = None
     hint: str = ""
     cell: int | None = None
     staff: str = ""  # what our own code stumbled over, for staff to look at
+    agent: str = ""  # which agent of the responder's it was, if not the responder itself
+    file: str = ""  # the Python file beside the program, responder or notebook that the line is in
 
     @property
     def place(self) -> str:
-        """``line 3`` or ``cell 7, line 3``; empty where neither is known."""
-        cell = [f"cell {self.cell}"] if self.cell is not None else []
-        return ", ".join(cell + ([f"line {self.line}"] if self.line is not None else []))
+        """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty where none is known."""
+        within = [self.agent] if self.agent else []
+        within += [f"cell {self.cell}"] if self.cell is not None else []
+        beside = f" of {self.file}" if self.file else ""
+        return ", ".join(within + ([f"line {self.line}{beside}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message."""
+    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message.
+
+    Of two robots each has a recording: this is the first one's, with the second's as its ``partner``. What is in it is
+    its own robot's, but for ``sha256``, which is over both, and what the responder printed and logged.
+    """
 
     background: str
     start: Pose
@@ -257,6 +317,7 @@ class Recording:
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
+    beacon: tuple[float, float] | None = None  # the other end of an infrared link
     label_patches: bool = True  # whether the floor showed its grey label patches
     sheet: int = 0  # the seed of the digits on it, for a digit sheet
     robot: str = "Default_Robot"
@@ -265,3 +326,6 @@ class Recording:
     responder_log: str = ""  # what the responder wrote to logger.txt
     sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())
+    agent_messages: tuple[AgentMessage, ...] = ()
+    agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
+    partner: Recording | None = None

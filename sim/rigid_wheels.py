@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from sim.bullet import Client, pb
-from sim.motion import Rectangle, add_block, turn_between
+from sim.motion import Partner, Rectangle, add_block, add_body, place_body, turn_between
 from sim.robot import Robot
 from sim.trigonometry import sincos
 
@@ -28,7 +28,7 @@ class RigidWheels:
     machines that do (x86-64 with FMA), not on all machines.
     """
 
-    def __init__(self, robot: Robot, blocks: tuple[Rectangle, ...] = ()) -> None:
+    def __init__(self, robot: Robot, blocks: tuple[Rectangle, ...] = (), partner: Partner | None = None) -> None:
         self._radius = robot.wheel_diameter / 2
         self._client = Client()
         client = self._client.id
@@ -45,6 +45,8 @@ class RigidWheels:
         pb.changeDynamics(ground, -1, lateralFriction=1, physicsClientId=client)
         for box in blocks:
             add_block(box, self._client)
+        self._partner = partner
+        self._partners_body = add_body(partner.robot, self._client, 0, 0.1) if partner is not None else -1
         self._body = self._build(robot)
         # Bullet tells where the centre of mass is, not where the middle of the axle is.
         self._mass_ahead = robot.back / 6
@@ -68,6 +70,9 @@ class RigidWheels:
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Where Bullet has rolled the robot after a tick; ``x`` and ``y`` are where it was put or got to before."""
         client = self._client.id
+        if self._partner is not None:
+            partner = self._partner
+            place_body(self._partners_body, partner.x, partner.y, partner.heading, self._client)
         pb.setJointMotorControlArray(
             self._body,
             [_LEFT, _RIGHT],

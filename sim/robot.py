@@ -52,7 +52,6 @@ class Robot:
         return math.hypot(max(self.front, -self.back), self.half_width)
 
 
-WIDE_EYES = "Default_Robot_Wide_Eyes"
 _DEFAULT = Robot()
 _SMALL = Robot(
     name="Small_Robot",
@@ -67,11 +66,18 @@ _SMALL = Robot(
     half_width=50,
 )
 
-ROBOTS: Mapping[str, Robot] = MappingProxyType(
+#: What choosing the background Radial_grey makes of each robot: its light sensors are 60 mm to either side.
+WIDENED: Mapping[str, str] = MappingProxyType(
+    {
+        "Default_Robot": "Default_Robot_Wide_Eyes",
+        "Small_Robot": "Small_Robot_Widest_Eyes",
+        "Small_Robot_Wide_Eyes": "Small_Robot_Widest_Eyes",
+        "Sensor_Diameter_Config": "Sensor_Diameter_Config_Wide_Eyes",
+    }
+)
+_COURSES: Mapping[str, Robot] = MappingProxyType(
     {
         "Default_Robot": _DEFAULT,
-        # What choosing the background Radial_grey makes of the default robot; no flag of the course's asks for it.
-        WIDE_EYES: replace(_DEFAULT, name=WIDE_EYES, left_light=LightSensor(-60, 30), right_light=LightSensor(60, 30)),
         "Small_Robot": _SMALL,
         "Small_Robot_Wide_Eyes": replace(
             _SMALL,
@@ -89,6 +95,16 @@ ROBOTS: Mapping[str, Robot] = MappingProxyType(
 )
 
 
+def _widened(robot: Robot) -> Robot:
+    left, right = replace(robot.left_light, x=-60), replace(robot.right_light, x=60)
+    return replace(robot, name=WIDENED[robot.name], left_light=left, right_light=right)
+
+
+ROBOTS: Mapping[str, Robot] = MappingProxyType(
+    {**_COURSES, **{wide.name: wide for wide in map(_widened, _COURSES.values())}}
+)
+
+
 def robot(name: str) -> Robot:
     """The robot called ``name``. Raises UsageError for a name that RoboLab does not have."""
     try:
@@ -99,4 +115,4 @@ def robot(name: str) -> Robot:
 
 def usual_robot(background: str) -> str:
     """The name of the robot that stands on a background unless another is asked for (robolab section 1.1)."""
-    return WIDE_EYES if background == "Radial_grey" else "Default_Robot"
+    return WIDENED["Default_Robot"] if background == "Radial_grey" else "Default_Robot"

@@ -21,7 +21,7 @@ from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Drive
 from sim.motion import COURSE_PHYSICS, Physics
-from sim.recording import COLUMNS, SENSORS, TICK, Pose, Ticks, Touch
+from sim.recording import COLUMNS, SECOND, SENSORS, TICK, Pose, Ticks, Touch
 from sim.robot import Robot
 from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
@@ -78,8 +78,11 @@ class World:
         seed: int,
         chain: Chain,
         physics: Physics = COURSE_PHYSICS,
+        tick: int = TICK,
     ) -> None:
+        """``tick`` is how long one lasts, units of simulated time; the equations know only thirtieths of a second."""
         self.robot = robot
+        self._tick = tick
         self.clock = 0
         self.drive = Drive(
             robot,
@@ -115,16 +118,23 @@ class World:
         return Pose(self.drive.x, self.drive.y, self.drive.heading_degrees)
 
     def tick(self) -> None:
-        """Advance a thirtieth of a second."""
+        """Advance one tick."""
+        self.sense(self.move())
+
+    def move(self) -> bool:
+        """The first half of a tick: the wheels turn. Whether the robot is elsewhere, or stands otherwise, then."""
         self.clock += 1
         drive = self.drive
         x, y, heading = drive.x, drive.y, drive.heading
         drive.tick(self.clock)
-        moved = x != drive.x or y != drive.y or heading != drive.heading
+        return x != drive.x or y != drive.y or heading != drive.heading
+
+    def sense(self, moved: bool) -> None:
+        """The second half, once all that shares the floor has moved: the sensors look, and the row is written."""
         self._sense(moved, listen=self.clock % 3 == 0)
         row = _row_of(self)
         self._rows.append(row)
-        self._chain.add_row(_ROW.pack(self.clock * TICK, *row[:_CHAINED]))
+        self._chain.add_row(_ROW.pack(self.clock * self._tick, *row[:_CHAINED]))
 
     def readings(self) -> dict[str, Any]:
         """What each sensor gives a program, as of the last tick."""
@@ -168,6 +178,7 @@ class World:
             },
             left_pixels=self._lights[0].pixels,
             right_pixels=self._lights[1].pixels,
+            length=self._tick,
         )
 
     def _sense(self, moved: bool, listen: bool) -> None:
@@ -190,5 +201,5 @@ class World:
         touching = self._arena.touching(self.robot, self.drive.x, self.drive.y, self.drive.heading)
         for what in touching:
             if what not in self._touching:
-                self.touches.append(Touch(self.clock / 30, what, self.pose))
+                self.touches.append(Touch(self.clock * self._tick / SECOND, what, self.pose))
         self._touching = touching

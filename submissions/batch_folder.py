@@ -20,14 +20,16 @@ from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
-from submissions.bundle import fit_parts, named_by, read_submission
+from submissions.bundle import fit_parts, read_submission, submission_of
+from submissions.downloads import IGNORED, StudentFiles, is_one_students, student_files
 from submissions.grading_request import GradingRequest
 from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
-from submissions.raw_files import shown
+from submissions.people import People, Refusal, Student
+from submissions.raw_files import read_listed, shown
 from submissions.roster import RosterRow, file_inside, read_roster
+from submissions.submission import Submission
 
 _PARTS = {"robot.py", "program.py", "responder.py"}
-_IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
 _MOST_ENTRIES = 50_000
 _MOST_BYTES = 4_000_000_000
 _CHUNK = 1 << 20
@@ -35,10 +37,10 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class BatchContents:
-    """What a batch would take in, and the rows it would not: name, sentence."""
+    """What a batch would take in, and what it would not."""
 
     grading_requests: tuple[GradingRequest, ...]
-    problems: tuple[tuple[str, str], ...]
+    refusals: tuple[Refusal, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,51 +48,88 @@ class _Row:
     """A row by the name it is spoken of, its student as written, and how it is read; that raises UsageError."""
 
     name: str
-    student: str
+    student: Student
+    assignment: str
     read: Callable[[], GradingRequest]
+    problem: str = ""
 
 
-def read_batch(path: Path, assignment: str | None) -> BatchContents:
+def read_batch(path: Path, assignment: str | None, people: People | None = None) -> BatchContents:
     """Read every submission of a folder, zip or CSV roster.
 
-    In a folder or zip a subfolder, a .py or a .zip is one student's, and without ``assignment`` each submission names
-    its own. A roster names student and file; ``assignment`` is for the rows that name none. Raises UsageError when
+    A folder or zip is a download of Moodle's, Gradescope's or nbgrader's, or has a subfolder, a .py or a .zip for each
+    student; without ``assignment`` each submission names its own. A roster names student and file; ``assignment`` is
+    for the rows that name none. Who it is that a row names is looked up in ``people``. Raises UsageError when
     ``path`` or ``assignment`` itself cannot be used.
     """
     asked = None if assignment is None else find_assignment(assignment)
     if path.is_file() and path.suffix.lower() == ".csv":
         find = cache(partial(_roster_assignment, path.parent))
         return _read(
-            _Row(
-                shown(f"line {row.line}: {row.student}" if row.student else f"line {row.line}"),
+            _row(
+                shown(f"line {row.line}: {row.student.id}" if row.student.id else f"line {row.line}"),
                 row.student,
+                people if row.student.id else None,
+                row.assignment or (asked.id if asked else ""),
                 partial(_roster_request, path.parent, row, asked, find),
+                row.problem,
             )
             for row in read_roster(path)
         )
     with _opened(path) as folder:
         find_own = cache(find_in_catalogue)
         return _read(
-            _Row(shown(entry.name), named_by(entry), partial(_request, entry, asked, find_own))
-            for entry in _entries(folder)
+            _row(
+                found.source,
+                found.student,
+                people,
+                asked.id if asked else "",
+                partial(_request, found, folder.name, asked, find_own),
+                found.problem,
+                found.number,
+            )
+            for found in _found(folder, asked)
         )
+
+
+def _row(
+    name: str,
+    written: Student,
+    people: People | None,
+    assignment: str,
+    read: Callable[[Student], GradingRequest],
+    problem: str,
+    number: str = "",
+) -> _Row:
+    student = written
+    try:
+        student = people.find(written, number) if people is not None else written
+    except UsageError as error:
+        problem = problem or str(error)
+    return _Row(name, student, assignment, partial(read, student), problem)
 
 
 def _read(rows: Iterable[_Row]) -> BatchContents:
     rows = list(rows)
-    near = alike(row.student for row in rows if row.student)
+    near = alike(row.student.id for row in rows if row.student.id)
     found: list[GradingRequest | str] = []
     for row in rows:
         try:
-            if row.student in near:
-                raise UsageError(f"{cannot_be_told(near[row.student])}; expected names that can be told apart.")
+            if row.problem:
+                raise UsageError(row.problem)
+            if row.student.id in near:
+                raise UsageError(f"{cannot_be_told(near[row.student.id])}; expected names that can be told apart.")
             found.append(row.read())
         except UsageError as error:
-            found.append(" ".join(str(error).split()))
+            found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
     found = _one_each(rows, found)
     return BatchContents(
         tuple(each for each in found if isinstance(each, GradingRequest)),
-        tuple((row.name, each) for row, each in zip(rows, found, strict=True) if isinstance(each, str)),
+        tuple(
+            Refusal(row.name, each, row.student, row.assignment)
+            for row, each in zip(rows, found, strict=True)
+            if isinstance(each, str)
+        ),
     )
 
 
@@ -118,32 +157,38 @@ def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> li
     return left
 
 
-def _request(entry: Path, asked: Assignment | None, find: Callable[[str], Assignment]) -> GradingRequest:
-    length = len(shown_name(named_by(entry)))
+def _request(
+    found: StudentFiles, folder: str, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
+) -> GradingRequest:
+    length = len(shown_name(student.id))
     if not 0 < length <= LONGEST_NAME:
         raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
-    if asked is not None:
-        return GradingRequest(
-            read_submission(entry, asked=asked.parts), asked, shown(entry.name), written=named_by(entry)
-        )
-    submission = read_submission(entry)
-    if submission.assignment is None:
-        raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
-    own = find(submission.assignment)
-    return GradingRequest(fit_parts(submission, own.parts), own, shown(entry.name), written=named_by(entry))
+    submission, own = _submission(found, folder, asked, student), asked
+    if own is None:
+        if submission.assignment is None:
+            raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
+        own = find(submission.assignment)
+        submission = fit_parts(submission, own.parts)
+    return GradingRequest(submission, own, found.source, found.submitted_at, student)
+
+
+def _submission(found: StudentFiles, folder: str, asked: Assignment | None, student: Student) -> Submission:
+    parts = None if asked is None else asked.parts
+    if isinstance(found.files, Path):
+        return read_submission(found.files, student=student.id, asked=parts)
+    raw = read_listed(found.files, found.source)
+    return submission_of(raw, found.source, student.id, found.assignment or folder, parts)
 
 
 def _roster_request(
-    folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment]
+    folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
 ) -> GradingRequest:
-    if row.problem:
-        raise UsageError(row.problem)
     if not row.assignment and asked is None:
         raise UsageError("names no assignment; name it with -a, or in a column assignment.")
     path = file_inside(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
-    submission = read_submission(path, student=row.student, asked=assignment.parts)
-    return GradingRequest(submission, assignment, shown(row.file), row.submitted_at)
+    submission = read_submission(path, student=student.id, asked=assignment.parts)
+    return GradingRequest(submission, assignment, shown(row.file), row.submitted_at, student)
 
 
 def _roster_assignment(folder: Path, name: str) -> Assignment:
@@ -154,19 +199,26 @@ def _roster_assignment(folder: Path, name: str) -> Assignment:
     return read_assignment(path) if path.is_dir() else find_assignment(name)
 
 
-def _entries(folder: Path) -> list[Path]:
-    entries = sorted(
-        entry for entry in folder.iterdir() if not entry.name.startswith(".") and entry.name not in _IGNORED
-    )
-    parts = [entry.name for entry in entries if entry.name.lower() in _PARTS]
+def _found(folder: Path, asked: Assignment | None) -> list[StudentFiles]:
+    """What lies there; of several assignments that a platform keeps together, what is for the one asked for."""
+    found = student_files(folder)
+    parts = [entry.name for entry in folder.iterdir() if entry.name.lower() in _PARTS]
     if parts:
         raise UsageError(
-            f"{folder.name}: has {parts[0]} in it, so it looks like one submission; a batch is a folder with a "
+            f"{folder.name}: has {min(parts)} in it, so it looks like one submission; a batch is a folder with a "
             "subfolder, .py or .zip for each student (one submission is graded with robomark grade)."
         )
-    if not entries:
+    if not found:
         raise UsageError(f"{folder.name}: is empty, expected a subfolder, .py or .zip for each student.")
-    return entries
+    several = dict.fromkeys(each.assignment for each in found)
+    if asked is None or len(several) == 1:
+        return found
+    if asked.id not in several:
+        raise UsageError(
+            f"{folder.name}: has submissions for {', '.join(map(shown, list(several)[:5]))}, expected for {asked.id}, "
+            "or for one assignment alone."
+        )
+    return [each for each in found if each.assignment == asked.id]
 
 
 @contextmanager
@@ -190,11 +242,11 @@ def _opened(path: Path) -> Iterator[Path]:
 
 def _stepped_into(folder: Path) -> Path:
     """The only folder inside, where archives have one around the submissions; but not a lone student's."""
-    inside = [entry for entry in folder.iterdir() if entry.name not in _IGNORED]
+    inside = [entry for entry in folder.iterdir() if entry.name not in IGNORED]
     if len(inside) != 1 or not inside[0].is_dir():
         return folder
     files = {entry.name.lower() for entry in inside[0].iterdir()}
-    return folder if files & _PARTS else inside[0]
+    return folder if files & _PARTS or is_one_students(inside[0]) else inside[0]
 
 
 def _unzip(path: Path, folder: Path) -> None:

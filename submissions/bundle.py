@@ -19,7 +19,9 @@ from typing import Literal
 
 from responders.code import Code
 from sim.errors import UsageError
+from submissions.agent_files import with_agents
 from submissions.assignment.definition import Parts
+from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
 from submissions.marked_cell import marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
@@ -33,7 +35,8 @@ Part = Literal["program", "responder"]
 _NAMES: Mapping[str, Part] = MappingProxyType(
     {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
 )
-_CANONICAL: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
+#: What the file of each part is called.
+PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
 _WORDS: Mapping[Part, str] = MappingProxyType({"program": "a robot program", "responder": "a responder"})
 _META = "submission.toml"
 _NOTEBOOK = ".ipynb"
@@ -53,7 +56,7 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
     """What one student submitted at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
     ``student`` says whose it is, else the name of the file or folder; what its own submission.toml says is noted.
-    With ``asked`` a lone .py is the part that the assignment asks for, and a missing part is refused;
+    With ``asked`` a lone .py is the part that the assignment asks for, and what has no such part is refused;
     without it what a lone .py is follows from its name or its text.
 
     Raises UsageError, one sentence, for whatever cannot be read as a submission.
@@ -75,7 +78,15 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
         raise UsageError(
             f"{where}: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip."
         )
-    submission = _assemble(raw, where, student or named_by(path), path.parent.name)
+    return submission_of(raw, where, student or named_by(path), path.parent.name, asked)
+
+
+def submission_of(raw: RawFiles, where: str, student: str, candidate: str, asked: Parts | None = None) -> Submission:
+    """The submission that these files are, for the assignment ``candidate`` unless they say another.
+
+    Raises UsageError as ``read_submission`` does; ``where`` names them in its sentence.
+    """
+    submission = _assemble(raw, where, student, candidate)
     return submission if asked is None else fit_parts(submission, asked, where=where)
 
 
@@ -91,12 +102,13 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     """The submission as an assignment with these parts takes it.
 
     A lone file that is not called robot.py or responder.py becomes the one part that is asked for; a part
-    that the assignment gives itself, or has no use for, is left out with a note. Raises UsageError if a
-    part is missing.
+    that the assignment gives itself, or has no use for, is left out with a note, and so is one of two that is
+    missing. Raises UsageError if no part is there that is asked for.
     """
     where = where or submission.student
     if submission.notebook is not None:
         return _fit_notebook(submission, submission.notebook, asked, where)
+    submission = with_agents(submission, asked, where)
     notes = list(submission.notes)
     parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
@@ -109,10 +121,19 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             notes = [note for note in notes if not note.startswith(f"{shown(lone.name)} was taken for")]
             notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
     missing = [part for part in wanted if parts.get(part) is None]
-    if missing:
-        names = " and ".join(_CANONICAL[part] for part in missing)
-        expected = " and ".join(f"{_CANONICAL[part]} ({_WORDS[part]})" for part in wanted)
+    files = [PART_FILES[part] for part in missing]
+    needed = [f"{PART_FILES[part]} ({_WORDS[part]})" for part in wanted]
+    if asked.second_program == "student":
+        needed.append(f"{SECOND_PROGRAM} (the second robot's program)")
+        files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
+    # Two robots are not marked by halves.
+    if files and (len(missing) == len(wanted) or asked.second_program != "none"):
+        names, expected = " and ".join(files), " and ".join(needed)
         raise UsageError(f"{where}: has no {names}, expected {expected}.")
+    for part in missing:
+        others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
+        beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
+        notes.append(f"There is no {PART_FILES[part]}{beside}; what needs {_WORDS[part]} has no marks.")
     for part, source in parts.items():
         if source is not None and part not in wanted:
             notes.append(f"{shown(source.name)} was left out: {_WORDS[part]} is not asked for.")
@@ -162,7 +183,7 @@ def pack_submission(submission: Submission) -> bytes:
     for part, source in (("program", submission.program), ("responder", submission.responder)):
         if source is not None:
             meta.append(f"{part} = {_toml_text(source.name)}")
-            entries[_CANONICAL[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
+            entries[PART_FILES[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
     if submission.notebook is not None:
         meta.append(f"notebook = {_toml_text(submission.notebook.name)}")
         entries[_PACKED_NOTEBOOK] = pack_notebook(submission.notebook)
@@ -183,7 +204,7 @@ def unpack_submission(data: bytes) -> Submission:
     files = unzip(data, "the kept submission").files
     meta = _read_meta(files.pop(_META, b""), "the kept submission")
     sources: dict[Part, Code | None] = {}
-    for part, canonical in _CANONICAL.items():
+    for part, canonical in PART_FILES.items():
         name = meta.get(part)
         text = files.pop(canonical, None) if isinstance(name, str) else None
         sources[part] = None if text is None else Code(str(name), text.decode("utf-8", "surrogatepass"))
@@ -241,7 +262,7 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
     """The one notebook among the files, or the file that nbconvert made of one; it is taken out of them."""
     names = sorted(name for name in files if name.lower().endswith(_NOTEBOOK))
     parts = {part for name in files if (part := _NAMES.get(name.lower()))}
-    if len(parts) == len(_CANONICAL):
+    if len(parts) == len(PART_FILES):
         for name in names:
             del files[name]
             notes.append(f"{shown(name)} is a notebook and was left out.")
@@ -283,7 +304,7 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
         if part is None:
             continue
         if part in parts:
-            raise UsageError(f"{where}: has both {parts[part]} and {name}, expected one {_CANONICAL[part]}.")
+            raise UsageError(f"{where}: has both {parts[part]} and {name}, expected one {PART_FILES[part]}.")
         parts[part] = name
     if parts or not alone:
         return parts

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from submissions.assignment.definition import Assignment
+from submissions.people import NOBODY, Student
 from submissions.submission import Submission
 
 
@@ -17,9 +18,9 @@ class GradingRequest:
     assignment: Assignment
     source: str
     submitted_at: datetime | None = None  # by the student, where anybody said
-    written: str = ""  # the student, as the file or folder has it, where that is not the normal form
+    whose: Student = NOBODY  # as it is written there, where anybody said
 
     @property
-    def student(self) -> str:
-        """As it was written."""
-        return self.written or self.submission.student
+    def student(self) -> Student:
+        """Whose it is, by an id as it was written."""
+        return self.whose if self.whose.id else replace(self.whose, id=self.submission.student)

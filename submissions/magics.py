@@ -11,10 +11,11 @@ import shlex
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from responders.sandbox.inside.cell_source import WRAPPERS
 from sim.errors import UsageError
 from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
-from sim.robot import ROBOTS, WIDE_EYES, usual_robot
+from sim.robot import WIDENED, usual_robot
 
 Preamble = Literal["none", "imports", "preloaded"]
 _PREAMBLES: dict[str, Preamble] = {
@@ -85,6 +86,10 @@ class Flags:
         given = {key: value for key, value in values.items() if value is not None}
         return replace(self, values=self.values | given)
 
+    def without(self, flag: str) -> Flags:
+        """These flags but for one value."""
+        return replace(self, values={key: value for key, value in self.values.items() if key != flag})
+
 
 @dataclass(frozen=True, slots=True)
 class Setup:
@@ -117,23 +122,33 @@ def without_magic(text: str) -> str:
     lines = text.split("\n")
     place = magic_place(text)
     if place is not None:
-        lines[place] = "#"
+        lines[: place + 1] = ["#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: place + 1]]
     return "\n".join(lines)
 
 
 def magic_place(text: str) -> int | None:
-    """The index of the first line that is neither blank nor a comment, if it is a magic."""
+    """The index of the first line that is neither blank nor a comment, if it is a magic; of wrappers the last."""
+    found = None
     for place, line in enumerate(text.split("\n")):
         stripped = line.lstrip("\ufeff").strip()
-        if stripped and not stripped.startswith("#"):
-            return place if stripped.startswith("%") else None
-    return None
+        if not stripped or stripped.startswith("#"):
+            continue
+        if not stripped.startswith("%"):
+            return found
+        found = place
+        if not stripped.startswith("%%") or _name(stripped) not in WRAPPERS:
+            return place
+    return found
 
 
 def is_program_magic(line: str) -> bool:
     """Whether a line makes its cell a robot program, as ``%%sim_magic`` does and ``%sim_magic`` does not."""
     stripped = line.lstrip("\ufeff").strip()
-    return stripped.startswith("%%") and (stripped.split(maxsplit=1) or [""])[0].lstrip("%") in _PREAMBLES
+    return stripped.startswith("%%") and _name(stripped) in _PREAMBLES
+
+
+def _name(magic: str) -> str:
+    return (magic.split(maxsplit=1) or [""])[0].lstrip("%")
 
 
 def parse_magic(line: str, number: int = 1) -> Flags:
@@ -228,7 +243,7 @@ class Simulator:
 
     def __init__(self) -> None:
         self.background = "Empty_Map"
-        self.robot = "Default_Robot"
+        self.robot = self._chosen = "Default_Robot"
         self.obstacles: tuple[tuple[float, float, float, float], ...] = ()
         self.pose = _FRESH
         self._angle_slider = 0
@@ -270,10 +285,11 @@ class Simulator:
         self.pose = pose
 
     def _choose_robot(self, name: str) -> None:
-        if name not in ROBOTS or name == WIDE_EYES:
+        if name not in WIDENED:
             self._note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator")
             name = "Default_Robot"
-        self.robot, self.pose = name, _AFTER_ROBOT
+        self.robot = self._chosen = name
+        self.pose = _AFTER_ROBOT
         self._noise = {"N": 0.0, "M": 0.0}
         self._noise_is_heard = True
 
@@ -285,14 +301,13 @@ class Simulator:
         self.pose, self.obstacles = start_of(name)
         if 0 <= self.pose.heading <= _ANGLE_MOST:
             self._angle_slider = round(self.pose.heading)
-        if usual_robot(name) == WIDE_EYES:
+        # The original would keep what this does to the robot for the rest of the session; nothing leaks here.
+        self.robot = self._chosen
+        if usual_robot(name) == WIDENED["Default_Robot"]:
             self._note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
-            self.robot = WIDE_EYES
+            self.robot = WIDENED[self._chosen]
             self._noise = {"N": 0.0, "M": 0.0}
             self._noise_is_heard = False
-        elif self.robot == WIDE_EYES:
-            # The original would keep them for the rest of the session; nothing leaks here.
-            self.robot = "Default_Robot"
 
     def _choose_obstacles(self, name: str) -> None:
         if name in OBSTACLE_PRESETS and name != "None":

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
 from submissions.magics import is_program_magic, magic_place
 from submissions.submission import Cell, Notebook
@@ -94,7 +95,8 @@ def _sites(cell: Cell) -> Iterator[Site]:
     if program is not None:
         yield program
         return
-    if cell.source.lstrip().startswith("%%"):
+    magic = cell_magic(cell.source)
+    if magic is not None and magic.name not in WRAPPERS:
         return
     for number, line in enumerate(cell.source.split("\n"), 1):
         again = _LINE.search(line)

@@ -7,23 +7,25 @@ from __future__ import annotations
 
 import re
 
+from responders.sandbox.inside.cell_source import LINE_WRAPPERS, WRAPPERS, cell_magic, wrapped
 from submissions.submission import Notebook
 
-#: Cell magics whose cell is run as Python, as ``%time`` does with its line.
-_RUN = re.compile(r"%%(?:time|capture)\b")
-_RUN_LINE = re.compile(r"%time[ \t]+(?P<rest>.*)")
+_RUN_LINE = re.compile(rf"%(?:{'|'.join(sorted(LINE_WRAPPERS))})[ \t]+(?P<rest>.*)")
 
 
 def python_of(notebook: Notebook) -> str:
     """All cells that are run as Python, one after the other; magic and shell lines are comments."""
-    cells = (cell.source for cell in notebook.cells)
-    return "\n".join(
-        _without_magics(source) for source in cells if not source.lstrip().startswith("%%") or _is_run(source)
-    )
+    cells = (_python(cell.source) for cell in notebook.cells)
+    return "\n".join(_without_magics(source) for source in cells if source is not None)
 
 
-def _is_run(source: str) -> bool:
-    return _RUN.match(source.lstrip()) is not None
+def _python(source: str) -> str | None:
+    """The cell with its lines in their places; None if it is for a magic that runs no Python."""
+    while (magic := cell_magic(source)) is not None:
+        if magic.name not in WRAPPERS:
+            return None
+        source = "#\n" * magic.number + magic.body
+    return source
 
 
 def _without_magics(source: str) -> str:
@@ -36,5 +38,5 @@ def _commented(line: str) -> str:
     indent = line[: len(line) - len(stripped)]
     timed = _RUN_LINE.match(stripped)
     if timed is not None:
-        return f"{indent}{timed['rest']}"
+        return f"{indent}{wrapped(timed['rest'])}"
     return f"{indent}pass  # {stripped}" if stripped.startswith(("%", "!")) else line

@@ -13,7 +13,7 @@ import struct
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -133,11 +133,34 @@ def read_folder(path: Path) -> RawFiles:
             budget.one_more()
             with _regular_file(f"{where}/{name}", name, descriptor) as stream:
                 files[name] = budget.read(name, stream)
-        return RawFiles(files, tuple(notes))
+        return _with_archive_opened(RawFiles(files, tuple(notes)))
     except OSError as error:
         raise UsageError(f"{where}: cannot be read ({error.strerror}), expected a readable folder.") from None
     finally:
         os.close(descriptor)
+
+
+def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
+    """The files at ``paths``, by the names that they go by here; raises UsageError as ``read_folder`` does."""
+    budget = _Budget(where)
+    files = {}
+    for name, path in paths.items():
+        _check_name(where, name)
+        budget.one_more()
+        with _regular_file(f"{where}/{name}", os.fspath(path), None) as stream:
+            files[name] = budget.read(name, stream)
+    return _with_archive_opened(RawFiles(files))
+
+
+def _with_archive_opened(raw: RawFiles) -> RawFiles:
+    """The files; where there is no code but what may lie in the one archive among them, with what lies there."""
+    archives = [name for name in raw.files if name.lower().endswith(".zip")]
+    if len(archives) != 1 or any(name.lower().endswith((".py", ".ipynb")) for name in raw.files):
+        return raw
+    inside = unzip(raw.files[archives[0]], shown(archives[0]))
+    beside = {name: data for name, data in raw.files.items() if name != archives[0]}
+    note = f"The files were read from the archive {shown(archives[0])} in it."
+    return RawFiles({**beside, **inside.files}, (*raw.notes, note, *inside.notes))
 
 
 def read_zip(path: Path) -> RawFiles:

@@ -5,20 +5,18 @@ Says where a file would lie, never outside the roster's folder; reading the subm
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
+from submissions.csv_table import CsvRow, read_csv
 from submissions.names import LONGEST_NAME, shown_name
+from submissions.people import NOBODY, PERSON_COLUMNS, Student
 from submissions.raw_files import shown
 
-COLUMNS = ("student", "file", "assignment", "submitted_at")
-_MOST_BYTES = 10_000_000
-_SEPARATORS = (",", ";", "\t")
+_OWN_COLUMNS = ("file", "assignment", "submitted_at")
+_USUAL = "student (or id), file, assignment"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +24,7 @@ class RosterRow:
     """One row. ``line`` counts from 1 and is where the row begins; a ``problem`` means the rest is not usable."""
 
     line: int
-    student: str = ""
+    student: Student = NOBODY
     file: str = ""
     assignment: str = ""
     problem: str = ""
@@ -34,21 +32,18 @@ class RosterRow:
 
 
 def read_roster(path: Path) -> list[RosterRow]:
-    """The rows of a roster with the columns student, file and, if it has them, assignment and submitted_at.
+    """The rows of a roster: student (or id) and file and, where it has them, name, email, assignment, submitted_at.
 
-    Other columns are passed over.
-
-    Comma, semicolon or tab; quoted cells; UTF-8 with or without a byte order mark. Raises UsageError when the
-    file as a whole is no roster.
+    Raises UsageError when the file as a whole is no roster.
     """
-    lines = _text(path).splitlines(keepends=True)
-    records = _records(lines, _separator(lines, path.name))
-    header = next(records)
-    places = _places(header, path.name)
-    rows = [_row(record, places, len(header.cells)) for record in records if record.problem or any(record.cells)]
-    if not rows:
-        raise UsageError(f"{path.name}: has no rows, expected one for each student below the line of columns.")
-    return rows
+    table = read_csv(path, {**PERSON_COLUMNS, **{column: (column,) for column in _OWN_COLUMNS}}, _USUAL)
+    missing = [said for column, said in (("id", "student"), ("file", "file")) if column not in table.columns]
+    if missing:
+        raise UsageError(
+            f"{path.name}: has no column {' and no column '.join(missing)} in its first line, expected "
+            f"{_USUAL} (assignment may be left out with -a)."
+        )
+    return [_row(row) for row in table.rows]
 
 
 def file_inside(folder: Path, name: str) -> Path:
@@ -66,86 +61,12 @@ def file_inside(folder: Path, name: str) -> Path:
     return path
 
 
-@dataclass(frozen=True, slots=True)
-class _Record:
-    line: int
-    cells: Sequence[str]
-    problem: str = ""
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(_MOST_BYTES + 1)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}.") from None
-    if len(data) > _MOST_BYTES:
-        raise UsageError(f"{path.name}: is larger than {_MOST_BYTES // 10**6} MB, expected a roster of students.")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise UsageError(f"{path.name}: line {line} is not UTF-8; save it as CSV UTF-8.") from None
-    # Only these end a line of a CSV; splitlines() knows more, and would miscount.
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return text.translate({ord(character): " " for character in "\v\f\x1c\x1d\x1e\x85\u2028\u2029"})
-
-
-def _separator(lines: Sequence[str], name: str) -> str:
-    """The separator by which the first line has most of our columns."""
-    if not lines:
-        raise UsageError(f"{name}: is empty, expected the columns {', '.join(COLUMNS[:3])}.")
-
-    def found(separator: str) -> int:
-        cells = next(_records(lines, separator)).cells
-        return sum(cell.casefold() in COLUMNS for cell in cells)
-
-    return max(_SEPARATORS, key=found)
-
-
-def _records(lines: Sequence[str], separator: str) -> Iterator[_Record]:
-    """The records of a CSV. After one with broken quotes it goes on at the next line, so that it costs one row."""
-    start = 0
-    while start < len(lines):
-        reader = csv.reader(io.StringIO("".join(lines[start:]), newline=""), delimiter=separator, strict=True)
-        begun = start
-        try:
-            for cells in reader:
-                yield _Record(begun + 1, [cell.strip() for cell in cells])
-                begun = start + reader.line_num
-            return
-        except csv.Error:
-            yield _Record(begun + 1, (), 'has quotation marks that do not match (one inside a cell is written "").')
-            start = begun + 1
-
-
-def _places(header: _Record, name: str) -> Mapping[str, int]:
-    """Where the columns stand."""
-    if header.problem:
-        raise UsageError(f"{name}: line 1 {header.problem}")
-    cells = [cell.casefold() for cell in header.cells]
-    for column in COLUMNS:
-        if cells.count(column) > 1:
-            raise UsageError(f"{name}: has two columns {column}, expected one.")
-    missing = [column for column in COLUMNS[:2] if column not in cells]
-    if missing:
-        raise UsageError(
-            f"{name}: has no column {' and no column '.join(missing)} in its first line, expected "
-            f"{', '.join(COLUMNS[:3])} (assignment may be left out with -a)."
-        )
-    return {column: cells.index(column) for column in COLUMNS if column in cells}
-
-
-def _row(record: _Record, places: Mapping[str, int], columns: int) -> RosterRow:
-    if record.problem:
-        return RosterRow(record.line, problem=record.problem)
-    if any(record.cells[columns:]):
-        return RosterRow(
-            record.line, problem=f"has {len(record.cells)} cells for {columns} columns; quote a cell with a separator."
-        )
-    found = {column: record.cells[at] if at < len(record.cells) else "" for column, at in places.items()}
-    student = shown_name(found["student"])
-    problem = _problem(student, found["file"])
+def _row(row: CsvRow) -> RosterRow:
+    if row.problem:
+        return RosterRow(row.line, problem=row.problem)
+    found = row.cells
+    student = Student(shown_name(found["id"]), shown_name(found.get("name", "")), found.get("email", ""))
+    problem = _problem(student.id, found["file"])
     try:
         submitted_at = moment(found["submitted_at"]) if found.get("submitted_at") else None
     except ValueError:
@@ -153,7 +74,7 @@ def _row(record: _Record, places: Mapping[str, int], columns: int) -> RosterRow:
         problem = (
             problem or f"has {shown(found['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
         )
-    return RosterRow(record.line, student, found["file"], found.get("assignment", ""), problem, submitted_at)
+    return RosterRow(row.line, student, found["file"], found.get("assignment", ""), problem, submitted_at)
 
 
 def moment(text: str, *, end_of_day: bool = False) -> datetime:

@@ -27,7 +27,7 @@ class Sandboxes:
     def __init__(self, isolation: Isolation = FULL, group: ControlGroup | None = None) -> None:
         self._isolation = isolation
         self._group = group
-        self._memory_limits: dict[Role, int] = {}  # of the newest child of each; one lives at a time
+        self._living: list[tuple[Child, int]] = []  # in the group, each with the bytes that it may have
         self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
@@ -42,9 +42,12 @@ class Sandboxes:
         What it costs is counted by ``meter``, that of its job.
         """
         if self._group is not None:
-            self._memory_limits[role] = limits.memory_bytes
-            self._group.make_room(sum(self._memory_limits.values()))
-        return self._zygote(role, limits.without).spawn(limits, folder, meter, blamed=self._blamed)
+            self._living = [(child, allowed) for child, allowed in self._living if not child.closed]
+            self._group.make_room(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
+        child = self._zygote(role, limits.without).spawn(limits, folder, meter, blamed=self._blamed)
+        if self._group is not None:
+            self._living.append((child, limits.memory_bytes))
+        return child
 
     @contextlib.contextmanager
     def blaming(self) -> Iterator[None]:

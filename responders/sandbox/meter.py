@@ -19,11 +19,14 @@ _FREE_SLEEP_SECONDS = 0.5
 
 
 class ChildStopped(Exception):
-    """A child that will say no more: why, in a sentence, and the line of its file where that is known."""
+    """A child that will say no more: why, in a sentence, and the line where that is known.
 
-    def __init__(self, verdict: Verdict, message: str, line: int | None = None) -> None:
+    It is one of the file that is run, or of ``file`` beside it.
+    """
+
+    def __init__(self, verdict: Verdict, message: str, line: int | None = None, file: str | None = None) -> None:
         super().__init__(message)
-        self.verdict, self.message, self.line = verdict, message, line
+        self.verdict, self.message, self.line, self.file = verdict, message, line, file
 
 
 @dataclass(frozen=True, slots=True)

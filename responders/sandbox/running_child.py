@@ -42,6 +42,7 @@ _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
 _MOST_GIVEN = 10_000
+_NOWHERE: wire.Frame = {"line": None, "file": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +89,7 @@ class Child:
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
+        self._queued_before = _seconds_queued()
         connection.settimeout(_POLL_SECONDS)
 
     def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
@@ -136,12 +138,17 @@ class Child:
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
             ) from None
         if frame["do"] == "busy":
-            raise self._too_busy(frame["line"])
+            raise self._too_busy(frame)
         if frame["do"] not in wire.NOTHING_KEPT:
             self._meter.keep(len(line))
         elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
             self._known[line] = frame
         return frame
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has been ended."""
+        return self._closed
 
     def cpu_seconds(self) -> float:
         """What the child has used so far, by the scheduler's clock."""
@@ -206,9 +213,10 @@ class Child:
         return used
 
     def _check_sleep(self) -> None:
-        """Time that it neither ran nor stood in the queue for a processor, while the worker waited, adds up.
+        """Time in which neither it nor the worker ran or stood in the queue for a processor adds up.
 
-        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker.
+        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker. But
+        what it has sent may lie there for as long as the worker itself stands in the queue.
         """
         slept = self._slept_seconds()
         if slept > 2 * _STALLED_SECONDS:
@@ -216,15 +224,14 @@ class Child:
         self._meter.check_sleep(slept)
 
     def _slept_seconds(self) -> float:
-        return max(0.0, self._waited - self._busy_seconds())
+        return max(0.0, self._waited - self._busy_seconds() - (_seconds_queued() - self._queued_before))
 
     def _busy_seconds(self) -> float:
         """What it has run, and waited for a processor; endless where the kernel does not say."""
         try:
-            run, queued, _ = Path(f"/proc/{self._pid}/schedstat").read_text().split()
+            return sum(_scheduled(self._pid))
         except (OSError, ValueError):
             return math.inf
-        return (int(run) + int(queued)) / 1e9
 
     def _check_folder(self) -> None:
         """One flat look: the sandbox lets no folder be made in it, and follow no link."""
@@ -238,8 +245,8 @@ class Child:
                 f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
             )
 
-    def _last_word(self) -> int | None:
-        """Ask the child which line it is on, and give it a moment to say so."""
+    def _last_word(self) -> wire.Frame:
+        """Ask the child where it is, and give it a moment to say so."""
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
         deadline = time.monotonic() + _LAST_WORD_SECONDS
@@ -260,14 +267,15 @@ class Child:
         for line in reversed(data.splitlines()):
             with contextlib.suppress(wire.WireError):
                 frame = wire.parse(wire.unnumbered(line)[1], {"busy": wire.ROBOT["busy"]})
-                return None if frame["line"] is None else int(frame["line"])
-        return None
+                return frame
+        return _NOWHERE
 
-    def _too_busy(self, line: int | None) -> ChildStopped:
+    def _too_busy(self, place: wire.Frame) -> ChildStopped:
         return ChildStopped(
             Verdict.CPU_LIMIT,
             f"it computed for more than {self._limits.cpu_seconds:g} seconds of CPU time",
-            line,
+            place["line"],
+            place["file"],
         )
 
     def _stalled(self) -> ChildStopped:
@@ -295,7 +303,7 @@ class Child:
         number = os.WTERMSIG(status)
         # The kernel's own limit on processor time, a second or two behind ours, ends with SIGKILL too.
         if number == signal.SIGXCPU or (number == signal.SIGKILL and used > self._limits.cpu_seconds):
-            return self._too_busy(None)
+            return self._too_busy(_NOWHERE)
         if number == signal.SIGSYS:
             return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
         if number != signal.SIGKILL:
@@ -336,6 +344,20 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
+
+
+def _seconds_queued() -> float:
+    """For how long this thread has stood in the queue for a processor; 0 where the kernel does not say."""
+    try:
+        return _scheduled("thread-self")[1]
+    except (OSError, ValueError):
+        return 0.0
+
+
+def _scheduled(process: int | str) -> tuple[float, float]:
+    """Seconds that a process has run, and stood in the queue for a processor, by ``/proc``."""
+    run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
+    return int(run) / 1e9, int(queued) / 1e9
 
 
 def _content(folder: Path, most: int) -> tuple[int, int]:

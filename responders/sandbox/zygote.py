@@ -97,7 +97,7 @@ class Zygote:
         self._sandbox = sandbox
         self._folders = folders
         self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
-        self._forks = 0
+        self._forks = self._living = 0  # children that were forked, and of them those that are not gone
         #: Why bubblewrap does not stand round it; None when it does.
         self.without_bubblewrap: str | None = "not asked for"
         #: Why its children can name any path; None when a doorkeeper decides about those.
@@ -117,7 +117,7 @@ class Zygote:
         """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
         if folder is not None and folder.parent != self._folders.path:
             raise ValueError(f"{folder} is not a private folder")
-        if self._forks >= _RECYCLE_AFTER:
+        if self._forks >= _RECYCLE_AFTER and not self._living:
             self.close()
         self._forks += 1
         for attempt in (1, 2):
@@ -151,6 +151,7 @@ class Zygote:
         """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
         try:
             ended, _ = self._ask({"do": "reap", "pid": pid})
+            self._living -= 1
             status, *used = _ENDED.unpack_from(ended)
             self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
             return int(status)
@@ -174,7 +175,7 @@ class Zygote:
         if self._folders_inside >= 0:
             os.close(self._folders_inside)
             self._folders_inside = -1
-        self._forks = 0
+        self._forks = self._living = 0
 
     def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: Work, blamed: bool) -> Child:
         self._start()
@@ -210,6 +211,7 @@ class Zygote:
         if "missing" in answer:
             ours.close()
             raise _sandbox_missing(answer["missing"])
+        self._living += 1
         inside = answer["pid"]  # what the zygote calls it
         reap = functools.partial(self.reap, inside)
         child = Child(reap, _pid(received[0]), received[0], ours, limits, folder)

@@ -13,14 +13,17 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
+from service.autograder import write_autograder
 from service.commands.example_table import catalogue_table, examples_table, measures_table
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
+from service.home_secret import secret_here
 from service.reports.readable import one_line, readable
+from service.settings import load_settings
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXAMPLES, REFERENCE
+from submissions.assignment.examples import EXAMPLES, EXPECTED, REFERENCE, add_expected
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import FILE_NAME, catalogue
 from submissions.assignment.reader import find_assignment
@@ -57,10 +60,12 @@ def _cell(which: str) -> str:
 def _setting(found: Assignment) -> str:
     if not found.scenarios:
         return f"no robot is run; responder: {found.parts.responder}"
+    agents = "".join(f", {name}: {who}" for name, who in found.parts.agents.items())
     noise = "" if found.world.noise == "course" else f", motor noise in {found.world.noise}"
     return (
         f"world: {found.world.background}, robot {found.world.robot}{noise}; "
-        f"program: {found.parts.program}, responder: {found.parts.responder}; of a notebook: {_cell(found.parts.cell)}"
+        f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
+        f"of a notebook: {_cell(found.parts.cell)}"
     )
 
 
@@ -93,13 +98,20 @@ def show(assignment: Which) -> None:
 def check(
     assignment: Annotated[str | None, typer.Argument(help="Its id in the catalogue, or its folder.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="Check the whole catalogue and print one table.")] = False,
+    write_expected: Annotated[
+        bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
+    ] = False,
 ) -> None:
     """Find every mistake in an assignment's files, and grade its examples: do they get what they must?"""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or give --all for the whole catalogue")
+    if everything and write_expected:
+        raise UsageError("name the one assignment whose expectations are to be written")
     with TrialRunner() as runner:
         if assignment is not None:
             checked = [check_examples(assignment, runner=runner)]
+            if write_expected:
+                checked = [_noted(assignment, checked[0])]
             _print_checked(checked[0])
         else:
             checked = [check_examples(name, runner=runner) for name in track(catalogue(), "grading", transient=True)]
@@ -139,9 +151,31 @@ def export(
     typer.echo(f"{folder}: {_count(written, 'file', 'files')}")
 
 
+@assignments_app.command()
+def autograder(
+    assignment: Which,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to make.")],
+) -> None:
+    """Make the folder that Gradescope takes as an autograder; it has this installation's secret in it."""
+    with for_the_user():
+        write_autograder(assignment, output, secret_here(load_settings()))
+    typer.echo(f"{output}: zip what is in it, and upload that to Gradescope")
+
+
 def _console() -> Console:
     """As wide as the terminal; wide enough for every table where there is none."""
     return Console(width=None if Console().is_terminal else _WIDTH_OF_FILES)
+
+
+def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
+    """As it is with the new expectations, which are written for somebody to read over."""
+    if not checked.unwritten:
+        typer.echo(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
+        return checked
+    with for_the_user():
+        path = add_expected(assignment, checked.unwritten)
+    typer.echo(f"{path}: wrote what {', '.join(checked.unwritten)} got; is it what they must get?")
+    return checked.written()
 
 
 def _print_checked(checked: CheckedAssignment) -> None:

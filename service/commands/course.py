@@ -6,6 +6,7 @@ What follows for a submission stands in ``store/policies.py``.
 from __future__ import annotations
 
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,8 +19,10 @@ from service.store.engine import Store, now, open_store
 from service.store.intake import DEFAULT_COURSE, course_of
 from service.store.policies import PolicyLimits
 from service.store.students import Students
+from service.store.versions import check_assignment
 from sim.errors import UsageError
 from submissions.names import shown_name
+from submissions.people import read_people, students_of
 from submissions.roster import moment
 
 course_app = typer.Typer(help="When and how often students may submit.", no_args_is_help=True)
@@ -47,6 +50,7 @@ def policy(
         if allowed != PolicyLimits():
             with store.transaction() as session:
                 course_id = course_of(session, DEFAULT_COURSE, now(session))
+                check_assignment(session, assignment)
                 policies.set_policy(session, course_id, assignment, allowed)
                 audit.note(session, audit.this_user(), "policy", "course", str(course_id), **_told(assignment, allowed))
         _show(store)
@@ -59,7 +63,10 @@ def extend(
     due: Due = None,
     more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
 ) -> None:
-    """Allow one student more time or attempts, in place of what they were allowed before."""
+    """Allow one student more time or attempts, in place of what they were allowed before.
+
+    Who has not submitted anything yet is enrolled first.
+    """
     if due is None and not more_attempts:
         raise UsageError("say what to allow: --due, --more-attempts, or both")
     due_at = _due(due)
@@ -67,13 +74,30 @@ def extend(
     with open_store(load_settings()) as store, store.transaction() as session:
         at = now(session)
         course_id = course_of(session, DEFAULT_COURSE, at)
-        enrolment_id = Students(session, course_id).enrol(student, at)
+        check_assignment(session, assignment)
+        enrolment_id = Students(session, course_id).find(student)
         policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
         detail = {"student": student, **_told(assignment, PolicyLimits(due_at, attempts=more_attempts))}
         audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} times more" if more_attempts else ""
     print(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
+
+
+@course_app.command()
+def enrol(
+    people: Annotated[Path, typer.Argument(help="A .csv with id, name, email; Moodle's grading worksheet is one.")],
+) -> None:
+    """Enrol students before they submit, or give those who have an id alone their names and addresses."""
+    listed = students_of(read_people(people))
+    with open_store(load_settings()) as store, store.transaction() as session:
+        at = now(session)
+        course_id = course_of(session, DEFAULT_COURSE, at)
+        students = Students(session, course_id)
+        for student in listed:
+            students.enrol(student, at)
+        audit.note(session, audit.this_user(), "enrol", "course", str(course_id), students=len(listed))
+    print(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
 
 
 def _due(text: str | None) -> datetime | None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,19 +14,36 @@ import typer
 from rich.console import Console
 
 from responders.sandbox.zygote import FULL, NONE
+from service.commands.channel_flags import (
+    BeaconFlag,
+    BlockedByFlag,
+    CorruptionFlag,
+    DelayFlag,
+    DuplicationFlag,
+    FacingFlag,
+    JitterFlag,
+    LinkFlag,
+    LossFlag,
+    RangeFlag,
+    ReorderingFlag,
+    changed,
+    given_flags,
+)
 from service.commands.format_option import format_option
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
 from service.reports.formats import FORMATS, Format
+from service.reports.rows import TableRow, missing_words
 from service.reports.written import prepare_folder, write_report
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment, find_in_catalogue
 from submissions.bundle import fit_parts, named_by, read_submission
-from submissions.names import alike, cannot_be_told
+from submissions.names import alike, cannot_be_told, shown_name
+from submissions.people import Student
 from submissions.raw_files import shown
 from submissions.submission import Submission
 
@@ -39,13 +58,46 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
+    link: LinkFlag = None,
+    beacon: BeaconFlag = None,
+    reach: RangeFlag = None,
+    facing: FacingFlag = None,
+    blocked_by: BlockedByFlag = None,
+    loss: LossFlag = None,
+    delay: DelayFlag = None,
+    jitter: JitterFlag = None,
+    duplication: DuplicationFlag = None,
+    reordering: ReorderingFlag = None,
+    corruption: CorruptionFlag = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Grade submissions now; exit status 0 when all were graded, whatever the marks."""
+    """Grade submissions now; exit status 0 when all were graded, whatever the marks.
+
+    Several are one document in every format but text, also those that could not be graded, with the reason.
+    """
+    if assignment is not None:
+        # A mistake of the instructor's is no submission's.
+        find_assignment(assignment)
+    chosen = FORMATS[form]
+    together = chosen.table if len(submissions) > 1 else None
+    rows: list[TableRow[Grade]] = []
     if report is not None:
         prepare_folder(report)
+    given = given_flags(
+        link=link,
+        beacon=beacon,
+        range=reach,
+        facing=facing,
+        blocked_by=blocked_by,
+        loss=loss,
+        delay=delay,
+        jitter=jitter,
+        duplication=duplication,
+        reordering=reordering,
+        corruption=corruption,
+    )
     near = _like_others(submissions) if report is not None else {}
     secret = secret_here(load_settings())
     worst: RobomarkError | None = None
@@ -57,20 +109,48 @@ def grade(
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
-                graded = grade_submission(submission, asked, secret=secret, runner=runner)
+                graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
+                graded = replace(graded, notes=(*_tried(given), *graded.notes))
             except RobomarkError as error:
+                refused = isinstance(error, UsageError)
+                who = Student(shown_name(named_by(path)))
+                reason = str(error).removeprefix(f"{shown(path.name)}: ")
+                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
                 if len(submissions) == 1:
+                    if refused and chosen.refusal is not None:
+                        sys.stdout.write(chosen.refusal(row))
                     raise
+                rows.append(row)
                 print(f"robomark: {error}", file=sys.stderr)
                 worst = worst if worst is not None and not isinstance(worst, UsageError) else error
                 continue
-            _print(FORMATS[form], graded)
+            if together is None:
+                _print(chosen, graded)
+            missing = missing_words(graded.missing)
+            rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
             if report is not None:
                 written = write_report(report, graded, submission, named_by(path))
                 print(f"report: {written}", file=sys.stderr)
+    if together is not None:
+        sys.stdout.write(together(rows))
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")
+
+
+def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
+    """The assignment with the channel of the flags in every scenario: another one, for it marks otherwise."""
+    if not given:
+        return asked
+    scenarios = tuple(replace(each, channel=changed(each.channel, given)) for each in asked.scenarios)
+    version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
+    return replace(asked, scenarios=scenarios, version=version)
+
+
+def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
+    """What a grade must say of itself when flags have changed what it was made with."""
+    words = ", ".join(f"{name} {value}" for name, value in given.items())
+    return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
 
 
 def _print(form: Format, graded: Grade) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import typer
@@ -11,6 +11,7 @@ import typer
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
+from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
@@ -20,7 +21,7 @@ from service.reports.plots.own_diagrams import draw_diagram, title_of_cell
 from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.written import write_file
-from sim.floors import floor
+from sim.floors import Floor, floor
 from sim.recording import Recording
 from sim.robot import robot
 from sim.world import Noise
@@ -47,10 +48,17 @@ class LastRun:
     flags: Flags
     seed: int
     sheet: int
+    channel: Channel = field(default_factory=Channel)
+    own_floor: Floor | None = None  # an image in the place of a floor
 
 
 def run_notebook(
-    notebook: Notebook, files: Mapping[str, bytes], limits: RunLimits, last: LastRun, runner: TrialRunner
+    notebook: Notebook,
+    files: Mapping[str, bytes],
+    limits: RunLimits,
+    last: LastRun,
+    runner: TrialRunner,
+    meter: JobMeter | None = None,
 ) -> ExecutedNotebook:
     """Execute the notebook; its last robot program is run even without ``-R``, and with the flags of ``last``.
 
@@ -60,14 +68,14 @@ def run_notebook(
     def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
         wanted = planner.simulator.apply(last.flags)
         spec = TrialSpec(
-            program=program_spec(program, limits.program, limits.output_bytes),
+            program=program_spec(program, limits.program, limits.output_bytes, files),
             responder=None,
             collaborative=setup.collaborative or wanted.collaborative,
-            floor=floor(wanted.background, seed=last.sheet),
+            floor=last.own_floor or floor(wanted.background, seed=last.sheet),
             robot=robot(wanted.robot),
             pose=wanted.pose,
             noise=Noise(wanted.light_noise, wanted.motor_noise),
-            channel=Channel(),
+            channel=last.channel,
             seconds=limits.seconds,
             seed=last.seed,
             child_seed=last.seed,
@@ -76,11 +84,11 @@ def run_notebook(
         return PlannedRun(spec, wanted.obstacles, notes=(*setup.notes, *wanted.notes))
 
     found = sites(notebook)
-    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, last.sheet)
+    unmarked = UnmarkedRuns(limits.program, limits.output_bytes, limits.seconds, last.seed, files, sheet=last.sheet)
     planner = NotebookRuns(found[-1] if found else None, marked_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.notebook, limits.output_bytes, last.seed)
-    return runner.execute_notebook(spec, planner)
+    return runner.execute_notebook(spec, planner, meter)
 
 
 def show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:

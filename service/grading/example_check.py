@@ -7,7 +7,8 @@ prints nothing.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import Grade
@@ -15,21 +16,26 @@ from service.grading.grader import grade
 from service.grading.judging.words import fault_words
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
+from sim.recorded import faults_of
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import REFERENCE, Expectation, OriginalMeasure, examples, expected
+from submissions.assignment.examples import EXPECTED, REFERENCE, Expectation, OriginalMeasure, examples, expected
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
 
 @dataclass(frozen=True, slots=True)
 class ExampleResult:
-    """What one example got. ``problems`` has a sentence for each thing that is not as expected."""
+    """What one example got. ``problems`` has a sentence for each thing that is not as expected.
+
+    ``unwritten`` is what ``expected.toml`` could say of it, and does not yet.
+    """
 
     name: str
     marks: Decimal | None  # None when it was refused
     lost: tuple[str, ...]  # ids of the criteria without full marks
     seconds: float  # of real time
     problems: tuple[str, ...]
+    unwritten: Expectation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +65,23 @@ class CheckedAssignment:
     def problems(self) -> tuple[str, ...]:
         """A sentence for each thing that is wrong: with the examples first, then with the measures."""
         of_examples = (problem for example in self.examples for problem in example.problems)
-        return (*of_examples, *(problem for measure in self.measures for problem in _measure_problems(measure)))
+        of_measures = (problem for measure in self.measures for problem in _measure_problems(measure))
+        return (*of_examples, *of_measures)
+
+    @property
+    def unwritten(self) -> Mapping[str, Expectation]:
+        """What ``expected.toml`` does not say yet, by example; nothing of an example with another problem."""
+        return {
+            each.name: each.unwritten
+            for each in self.examples
+            if each.unwritten is not None and set(each.problems) <= {_no_table(each.name)}
+        }
+
+    def written(self) -> CheckedAssignment:
+        """As it is once ``expected.toml`` says what it did not."""
+        told = self.unwritten
+        examples = (replace(each, problems=()) if each.name in told else each for each in self.examples)
+        return replace(self, examples=tuple(examples))
 
 
 def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignment:
@@ -103,8 +125,24 @@ def _check_example(
         return ExampleResult(name, None, (), time.monotonic() - begin, (f"{name}: {error}",)), None
     seconds = time.monotonic() - begin
     lost = tuple(result.id for result in graded.criteria if result.marks < result.max_marks)
-    problems = _differences(graded, lost, wanted if wanted is not None else _usual(name, assignment))
-    return ExampleResult(name, graded.marks, lost, seconds, tuple(f"{name}: {each}" for each in problems)), graded
+    problems = [
+        f"{name}: {each}"
+        for each in _differences(graded, lost, wanted if wanted is not None else _usual(name, assignment))
+    ]
+    if wanted is None and name != REFERENCE:
+        problems.append(_no_table(name))
+    unwritten = _found(graded, lost) if wanted is None else None
+    return ExampleResult(name, graded.marks, lost, seconds, tuple(problems), unwritten), graded
+
+
+def _no_table(name: str) -> str:
+    return f"{name}: has no table in {EXPECTED} (check --write-expected notes what it got)"
+
+
+def _found(graded: Grade, lost: tuple[str, ...]) -> Expectation:
+    """What is to be expected if the example got what it must."""
+    earns = {result.id: result.marks for result in graded.criteria if result.id in lost}
+    return Expectation(marks=graded.marks, verdict=graded.verdict, loses=lost, earns=earns)
 
 
 def _usual(name: str, assignment: Assignment) -> Expectation | None:
@@ -115,12 +153,18 @@ def _usual(name: str, assignment: Assignment) -> Expectation | None:
 def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | None) -> list[str]:
     found = [f"{result.id} could not be judged: {result.unjudged}" for result in graded.criteria if result.unjudged]
     if wanted is None:
-        return [*found, "has no table in expected.toml"]
-    known = {result.id for result in graded.criteria}
+        return found
+    earned = {result.id: result.marks for result in graded.criteria}
     found += [
-        f'expected.toml says it loses "{name}", expected the id of a criterion: {", ".join(sorted(known))}'
-        for name in wanted.loses or ()
-        if name not in known
+        f'{EXPECTED} says it {verb} "{name}", expected the id of a criterion: {", ".join(sorted(earned))}'
+        for verb, names in (("loses", wanted.loses or ()), ("earns", wanted.earns))
+        for name in names
+        if name not in earned
+    ]
+    found += [
+        f"got {earned[name]} marks for {name}, expected {marks}"
+        for name, marks in wanted.earns.items()
+        if name in earned and earned[name] != marks
     ]
     told = "\n".join(result.message for result in graded.criteria)
     if graded.marks != wanted.marks:
@@ -135,7 +179,7 @@ def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | Non
 
 def _fault(graded: Grade) -> str:
     """What went wrong first, as far as somebody said."""
-    faults = [fault for trial in graded.trials for fault in trial.recording.faults]
+    faults = [fault for trial in graded.trials for fault in faults_of(trial.recording)]
     return f"; {fault_words(faults[0])}" if faults else ""
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 
 from responders.sandbox.meter import JobLimits, Spent
+from sim.recorded import verdict_of
 from sim.recording import Image, Pose, Recording, Verdict
 from submissions.seeds import PUBLIC
 
@@ -164,7 +165,7 @@ class TrialResult:
     @property
     def verdict(self) -> Verdict:
         """How the run ended, as recorded."""
-        return self.recording.verdict
+        return verdict_of(self.recording)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +190,7 @@ class Grade:
     sandbox: str
     grader_version: str
     notes: tuple[str, ...] = ()
+    missing: str = ""  # the file that was asked for and not submitted; what needs it has no marks
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
     cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
 

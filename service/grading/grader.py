@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from responders.sandbox.meter import JobLimits, JobMeter
-from responders.trial_spec import TrialSpec
+from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.run_plan import RunPlan, plan_run
@@ -24,9 +24,11 @@ from sim.chance import Stream
 from sim.errors import AssignmentError
 from sim.floors import Floor, floor, floor_from_image
 from sim.motion import Physics
+from sim.recording import BROWSER_TICK, TICK
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
+from submissions.bundle import PART_FILES
 from submissions.seeds import PUBLIC, Secret, child_seed
 from submissions.submission import Submission
 
@@ -65,14 +67,14 @@ def grade(
 
     Without a ``runner`` one is made for this grading and closed afterwards.
 
-    Raises UsageError when a part is missing that the assignment asks for, HostError when this machine fails,
+    Raises UsageError when no part is there that the assignment asks for, HostError when this machine fails,
     and whatever ``observe`` raises.
     """
     if runner is None:
         with TrialRunner() as own:
             return grade(submission, assignment, secret=secret, observe=observe, runner=own)
     plan = plan_run(submission, assignment, secret)
-    trials = tuple(assignment.trials(secret))
+    trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.heartbeat)
     results = _run_trials(plan, trials, runner, meter, watch)
@@ -90,6 +92,7 @@ def grade(
         sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code was run",
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *plan.notes, *plan.trial.notes_on_all(results), *_unjudged_notes(criteria)),
+        missing=PART_FILES[plan.missing] if plan.missing else "",
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )
@@ -183,6 +186,7 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
     return TrialSpec(
         program=plan.program,
         responder=plan.answers,
+        agents=plan.agents,
         collaborative=plan.collaborative,
         floor=_floor(world, trial.seed),
         robot=robot(world.robot),
@@ -194,4 +198,14 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
         child_seed=child_seed(trial.seed, plan.submission),
         pen_down="p" in plan.flags.switches,
         physics=Physics(world.solid, world.drive),
+        tick=BROWSER_TICK if world.tick == "browser" else TICK,
+        partner=_partner(trial, plan),
     )
+
+
+def _partner(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
+    """The second robot; a program of the assignment's own may run until the time is up."""
+    if plan.second_program is None or trial.second_pose is None:
+        return None
+    given = plan.assignment.parts.second_program in plan.assignment.given_parts
+    return PartnerSpec(plan.second_program, trial.second_pose, "p" in plan.second_flags.switches, given)

@@ -5,7 +5,7 @@ It decides only; the cells are executed and the robots run by ``responders``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from responders.channel import Channel
@@ -16,9 +16,10 @@ from responders.trial_spec import ProgramSpec, TrialSpec
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor
-from sim.recording import Recording
+from sim.recording import TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, Setup, Simulator, parse_flags
 from submissions.marked_cell import Site
 
@@ -35,6 +36,7 @@ class Program:
     flags: Flags
 
 
+_NO_PROGRAM = Program(0, "", Flags())
 #: From the program, the flags of the magic that starts it and the simulator's set-up to the marked run.
 MarkedRun = Callable[[Program, Flags, Setup], PlannedRun]
 
@@ -47,6 +49,8 @@ class UnmarkedRuns:
     output_bytes: int
     seconds: float
     seed: int
+    files: Mapping[str, bytes]  # of which programs import modules
+    tick: int = TICK
     sheet: int = 0
 
 
@@ -65,6 +69,11 @@ class NotebookRuns:
         self.marked_ran = False
         #: Where robots were started, in order.
         self.started: list[Site] = []
+
+    def standing(self) -> PlannedRun:
+        """How the robot stands that does not run."""
+        setup = self.simulator.apply(Flags())
+        return PlannedRun(self._own(_NO_PROGRAM, setup), setup.obstacles)
 
     def call(self, call: MagicCall) -> PlannedRun:
         """What one magic comes to."""
@@ -131,7 +140,7 @@ class NotebookRuns:
         own = self._unmarked
         seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
         return TrialSpec(
-            program=program_spec(program, own.limits, own.output_bytes),
+            program=program_spec(program, own.limits, own.output_bytes, own.files),
             responder=None,
             collaborative=setup.collaborative,
             floor=floor(setup.background, seed=own.sheet),
@@ -143,9 +152,11 @@ class NotebookRuns:
             seed=seed,
             child_seed=seed,
             pen_down=setup.pen_down,
+            tick=own.tick,
         )
 
 
-def program_spec(program: Program, limits: ChildLimits, output_bytes: int) -> ProgramSpec:
-    """The program of a cell as the bridge takes it."""
-    return ProgramSpec(Code(f"cell {program.cell}", program.text), program.flags.preamble, limits, output_bytes)
+def program_spec(program: Program, limits: ChildLimits, output_bytes: int, files: Mapping[str, bytes]) -> ProgramSpec:
+    """The program of a cell as the bridge takes it, with the modules among ``files`` that it can import."""
+    code = Code(f"cell {program.cell}", program.text)
+    return ProgramSpec(code, program.flags.preamble, limits, output_bytes, modules_of(code.text, files.get))

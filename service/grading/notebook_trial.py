@@ -79,7 +79,7 @@ class NotebookTrial:
                 program = replace(program, text=spec.program.code.text)
             run = replace(
                 spec,
-                program=program_spec(program, spec.program.limits, spec.program.output_bytes),
+                program=program_spec(program, spec.program.limits, spec.program.output_bytes, self.notebook.files),
                 pen_down="p" in flags.switches or "p" in program.flags.switches,
             )
             return replace(planned, spec=run)
@@ -87,7 +87,9 @@ class NotebookTrial:
         # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
         sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
         # Their noise would tell the trial again, were it of the world's seed.
-        unmarked = UnmarkedRuns(spec.program.limits, spec.program.output_bytes, spec.seconds, spec.child_seed, sheet)
+        limits, files = spec.program.limits, self.notebook.files
+        output = spec.program.output_bytes
+        unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
         notebook = replace(self.notebook, seed=spec.child_seed)
 
         def execute() -> tuple[ExecutedNotebook, list[Site]]:

@@ -8,29 +8,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
+from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
+from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
+from submissions.bundle import Part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
+from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_cell import marked_site, program_of
 from submissions.plain_cells import python_of
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
 from submissions.submission import Notebook, Submission
-
-Part = Literal["program", "responder"]
 
 _MEGABYTE = 1 << 20
 _IGNORED = "the program's magic line is ignored"
@@ -62,8 +64,9 @@ class ProgramTrial:
 class RunPlan:
     """Who takes part in every trial, and what of the submission is looked at beside them.
 
-    ``program`` is None where no robot is run. ``answers`` is what answers it, unless ``trial`` sees to that;
-    ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the source reader takes them.
+    ``program`` is None where no robot is run; then there are no trials. ``answers`` is what answers it, unless
+    ``trial`` sees to that; ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the
+    source reader takes them.
     """
 
     assignment: Assignment
@@ -77,37 +80,77 @@ class RunPlan:
     own_files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))  # those submitted
     notes: tuple[str, ...] = ()
     submission: str = ""  # content hash
+    missing: Part | None = None  # asked for, and not submitted
     child_seed: int = 0  # of the chance that is the submission's own, and no trial's
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
+    second_program: ProgramSpec | None = None  # where there are two robots
+    second_flags: Flags = field(default_factory=Flags)
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
     """The plan for grading ``submission`` in the installation that has this secret.
 
-    Raises UsageError when a part is missing that the assignment asks for.
+    Raises UsageError when no part is there that the assignment asks for.
     """
     notebook = submission.notebook
     if notebook is not None and assignment.training is not None:
         function = assignment.training.function
         raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
+    if notebook is not None and assignment.parts.agents:
+        files = " and ".join(f"{name}.py" for name in assignment.parts.agents)
+        raise UsageError(f"{notebook.name}: is a notebook, expected robot.py and responder.py beside {files}")
     if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
         plan = _of_notebook(submission, notebook, assignment)
     else:
         plan = _of_files(submission, assignment)
     seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    if assignment.world.robots == 2:
+        plan = _with_second_program(plan, submission)
     plan = replace(plan, notes=(*plan.notes, *diagrams_in(notebook).problems))
     return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
 
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
-    asked = assignment.parts
+    asked, missing = assignment.parts, _missing(submission, assignment)
+    if missing == "program":
+        asked = replace(asked, program="none")
+    elif missing == "responder":
+        asked = replace(asked, responder="none")
     code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
     responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
     flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment brings its own, or none",)
-    program = _program(Code(code.name, text), flags, assignment) if code is not None else None
-    beside = _responder(responder, _files(submission, assignment), assignment)
-    return _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
+    plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    if missing == "program" and (asking := _stand_in(assignment)) is not None:
+        asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
+        plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
+    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
+    # What is sent to a responder that is not there is a message all the same.
+    return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
+
+
+def _stand_in(assignment: Assignment) -> ProgramSpec | None:
+    """A program that asks a responder all that it is judged by alone; None where that is nothing."""
+    texts = list(dict.fromkeys(text for criterion in assignment.criteria for text in criterion.questions))
+    if not texts:
+        return None
+    text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
+    return _program(Code("questions.py", text), Flags(), {}, assignment)
+
+
+def _missing(submission: Submission, assignment: Assignment) -> Part | None:
+    """The one part of two that was not submitted; with neither there is nothing to grade."""
+    asked = assignment.parts
+    if (asked.program, asked.responder) == ("student", "student"):
+        if submission.program is None and submission.responder is not None:
+            return "program"
+        if submission.responder is None and submission.program is not None:
+            return "responder"
+    return None
 
 
 def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
@@ -131,8 +174,9 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
     responder = _part("responder", "responder.py", asked.responder, None, assignment)
-    program = _program(Code(f"cell {cell.number}", text), flags, assignment)
-    beside = _responder(responder, _files(submission, assignment), assignment)
+    files = _files(submission, assignment, asked.program)
+    program = _program(Code(f"cell {cell.number}", text), flags, files, assignment)
+    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
     return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
 
@@ -170,7 +214,7 @@ def _executed(
     notes: tuple[str, ...],
 ) -> RunPlan:
     """A notebook from top to bottom; what in it is no robot program stands for the responder."""
-    files = _files(submission, assignment)
+    files = _files(submission, assignment, "student")
     functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
@@ -188,7 +232,7 @@ def _executed(
     return RunPlan(
         assignment,
         NotebookTrial(spec, marked_site(notebook, which) if which is not None else None, which, as_read),
-        _program(program, flags, assignment) if program is not None else None,
+        _program(program, flags, _files(submission, assignment, asked.program), assignment) if program else None,
         None,
         functions,
         True,
@@ -196,6 +240,21 @@ def _executed(
         MappingProxyType(read_as),
         notes=notes,
     )
+
+
+def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
+    """The plan with what runs on the second robot. Robots that nobody answers talk to each other."""
+    assignment = plan.assignment
+    who = assignment.parts.second_program
+    if plan.program is None or isinstance(plan.trial, NotebookTrial):
+        raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
+    if who == SAME:
+        return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
+    code = _part("second robot program", SECOND_PROGRAM, who, second_program_of(submission), assignment)
+    assert code is not None
+    flags, text, notes = _flags(code.text, assignment)
+    program = _program(Code(code.name, text), flags, _files(submission, assignment, who), assignment)
+    return replace(plan, second_program=program, second_flags=flags, collaborative=True, notes=(*plan.notes, *notes))
 
 
 def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: Assignment) -> Code | None:
@@ -226,15 +285,33 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
     return flags, text, tuple(notes)
 
 
-def _files(submission: Submission, assignment: Assignment) -> Mapping[str, bytes]:
-    """What lies in the responder's folder; a submission's own file wins over a given one."""
-    return {**assignment.given, **submission.files}
+def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
+    """What lies beside a part of ``who``; a submission's own file wins over a given one.
+
+    What the assignment brings imports none of the submission's code.
+    """
+    submitted = without_agents(submission.files, assignment.parts.agents)
+    own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
+    return {**assignment.given, **dict(own)}
 
 
-def _program(code: Code, flags: Flags, assignment: Assignment) -> ProgramSpec:
+def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
+    """Each has a folder like the responder's and may use as much; in a given one's lie given files alone."""
+    agents = {}
+    for name, who in assignment.parts.agents.items():
+        given = who != "student"
+        code = Code(who, assignment.given_parts[who]) if given else code_of(name, submission.files)
+        spec = _responder(code, assignment.given if given else _files(submission, assignment, who), assignment)
+        if spec is None:
+            raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
+        agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
+    return agents
+
+
+def _program(code: Code, flags: Flags, files: Mapping[str, bytes], assignment: Assignment) -> ProgramSpec:
     limits = assignment.limits
     allowed = ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _avoided(assignment, "program"))
-    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes)
+    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, modules_of(code.text, files.get))
 
 
 def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assignment) -> ResponderSpec | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from responders.code import Code
@@ -15,14 +16,16 @@ from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import ResponderSpec
 from service.grading.grade import TrialResult
-from service.grading.judging.case import StaticAnalysis
+from service.grading.judging.case import StaticAnalysis, as_had_by
 from service.grading.judging.code import calls_of
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words
-from service.grading.run_plan import Part, RunPlan
+from service.grading.run_plan import RunPlan
 from sim.chance import Stream
+from sim.recorded import seconds_at
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment
+from submissions.bundle import Part
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 
 _MEGABYTE = 1 << 20
@@ -59,9 +62,10 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter:
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    checks[criterion.id, place] = _check(criterion, trial, assignment, caller, own)
+                    had = as_had_by(criterion.robot, trial)
+                    checks[criterion.id, place] = _check(criterion, had, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
-    return StaticAnalysis(answers, plan.flags, called, checks, sandbox)
+    return StaticAnalysis(answers, plan.flags, called, checks, sandbox, plan.missing)
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:
@@ -84,12 +88,17 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
             {"t": each.t, "sender": each.sender, "text": each.text, "delivered": each.delivered}
             for each in recording.messages
         ],
+        "agent_messages": [
+            {"t": each.t, "sender": each.sender, "receiver": each.receiver, "text": each.text}
+            for each in recording.agent_messages
+        ],
         "datalog": [
             [each.t, each.name, each.value, each.simtime] for each in recording.datalog if math.isfinite(each.value)
         ],
         "images": [{"t": each.t, "pose": _pose(each.pose), "truth": each.truth} for each in recording.images],
-        "image_log": [[side, tick / 30] for side, _, tick in recording.image_log],
+        "image_log": [[side, seconds_at(recording, tick)] for side, _, tick in recording.image_log],
         "touches": [[each.t, each.what] for each in recording.touches],
+        **({"partner": plain_trial(replace(trial, recording=recording.partner))} if recording.partner else {}),
     }
 
 
@@ -112,15 +121,28 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: Caller, meter: JobMe
 
 
 def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
-    """The part, and the Python files beside a responder, as bytes: they say themselves how they are written."""
+    """The part, and the files submitted beside it that it can import.
+
+    A responder may import any, and what is in it as bytes: they say themselves how they are written.
+    """
     yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
     left = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
-    beside = {name: data for name, data in plan.own_files.items() if name.lower().endswith(".py")}
-    for name, data in beside.items() if part == "responder" else ():
+    for name, kind, content in _beside(part, plan):
         if left > 0:
-            yield {"name": name, "bytes": data[:_MOST_OF_ONE].decode("latin-1")}
-        left -= len(data)
+            yield {"name": name, kind: content[:_MOST_OF_ONE]}
+        left -= len(content)
+
+
+def _beside(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
+    if part == "responder":
+        for name, data in plan.own_files.items():
+            if name.lower().endswith(".py"):
+                yield name, "bytes", data.decode("latin-1")
+    elif plan.program is not None:
+        for module, text in plan.program.modules.items():
+            if f"{module}.py" in plan.own_files:
+                yield f"{module}.py", "text", text
 
 
 def _entries(assignment: Assignment) -> Iterator[str]:

@@ -37,7 +37,7 @@ def with_models_answers(
     machine fails, and whatever the meter's heartbeat raises.
     """
     training, trainer = plan.assignment.training, plan.functions
-    if training is None or trainer is None:
+    if training is None or trainer is None or not results:
         return list(results)
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]

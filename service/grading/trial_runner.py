@@ -15,6 +15,7 @@ from typing import TypeVar
 from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
 from responders.notebook_process import NotebookSpec
+from responders.pair import run_pair
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
@@ -30,10 +31,14 @@ from sim.camera import CachedCamera, Cameras
 from sim.errors import HostError
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording
+from sim.robot import Robot
+from sim.shared_arena import SharedArena
 
 _log = logging.getLogger(__name__)
 _MOST_ARENAS = 4
 Result = TypeVar("Result")
+Key = TypeVar("Key")
+AnArena = TypeVar("AnArena", bound=Arena)
 
 
 class TrialRunner:
@@ -52,6 +57,7 @@ class TrialRunner:
         self._forgets = isolation.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
+        self._shared_arenas: OrderedDict[tuple[tuple[Rectangle, ...], str, int], SharedArena] = OrderedDict()
 
     def run(
         self,
@@ -61,6 +67,11 @@ class TrialRunner:
     ) -> Recording:
         """One trial. Raises HostError when the machine fails, and whatever the meter's heartbeat raises."""
         meter = meter or JobMeter()
+        partner = spec.partner
+        if partner is not None:
+            camera = self._cameras.camera(spec.floor.pixels)
+            arenas = self._shared_arena(obstacles, spec.robot, 1), self._shared_arena(obstacles, spec.robot, 2)
+            return self.undisturbed(lambda: run_pair(spec, partner, arenas, camera, self._sandboxes, meter), meter)
         ground = self._ground(spec, obstacles)
         return self.undisturbed(lambda: run_trial(spec, *ground, self._sandboxes, meter), meter)
 
@@ -116,8 +127,10 @@ class TrialRunner:
         """End all children, and give back the sandboxes, cameras and arenas."""
         self._sandboxes.close()
         self._cameras.close()
-        while self._arenas:
-            self._arenas.popitem()[1].close()
+        for arena in (*self._arenas.values(), *self._shared_arenas.values()):
+            arena.close()
+        self._arenas.clear()
+        self._shared_arenas.clear()
 
     def __enter__(self) -> TrialRunner:
         return self
@@ -152,8 +165,18 @@ class TrialRunner:
         return self._slots.alone(meter.heartbeat) if self._slots is not None else nullcontext()
 
     def _arena(self, obstacles: tuple[Rectangle, ...]) -> Arena:
-        arena = self._arenas.pop(obstacles, None) or Arena(obstacles)
-        self._arenas[obstacles] = arena
-        while len(self._arenas) > _MOST_ARENAS:
-            self._arenas.popitem(last=False)[1].close()
-        return arena
+        return _kept(self._arenas, obstacles, lambda: Arena(obstacles))
+
+    def _shared_arena(self, obstacles: tuple[Rectangle, ...], robot: Robot, number: int) -> SharedArena:
+        """That of robot ``number`` of two of a kind."""
+        key, partner = (obstacles, robot.name, number), f"robot {3 - number}"
+        return _kept(self._shared_arenas, key, lambda: SharedArena(obstacles, robot, partner))
+
+
+def _kept(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable[[], AnArena]) -> AnArena:
+    """The arena of this key, made if need be; the one that has not been used for longest is closed."""
+    arena = arenas.pop(key, None) or make()
+    arenas[key] = arena
+    while len(arenas) > _MOST_ARENAS:
+        arenas.popitem(last=False)[1].close()
+    return arena

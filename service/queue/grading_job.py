@@ -22,6 +22,7 @@ from service.store import intake, jobs, plots, results
 from service.store.engine import Store
 from service.store.installation import secret_of
 from sim.errors import Cancelled, HostError, UsageError
+from sim.recorded import faults_of
 from sim.recording import Verdict
 
 _log = structlog.get_logger(__name__)
@@ -96,7 +97,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
             _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
-        faults = broken.recording.faults
+        faults = faults_of(broken.recording)
         raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
     prepared = results.prepare(graded)
     # The work is done: a database that is away for a moment must not lose it.

@@ -5,19 +5,26 @@ Faults are told, never judged; marks do not depend on anything here.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from responders.code import Code
 from service.grading.grade import Grade
 from service.reports.readable import one_line, readable
+from sim.errors import UsageError
+from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
+from submissions.agent_files import code_of
+from submissions.assignment.second_robot import second_program_of
+from submissions.source_text import decode_source
 from submissions.submission import Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {
         "program": "Robot program",
+        "second program": "Program of the second robot",
         "responder": "Responder",
         "bridge": "Bridge",
         "host": "Grading machine",
@@ -51,7 +58,7 @@ def fault_groups(grade: Grade, submission: Submission | None = None, limit: int 
     """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
     found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
-        for fault in trial.recording.faults:
+        for fault in faults_of(trial.recording):
             found.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
     return tuple(_group(grade, places, submission) for places in list(found.values())[:limit])
 
@@ -59,9 +66,12 @@ def fault_groups(grade: Grade, submission: Submission | None = None, limit: int 
 def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None) -> FaultGroup:
     index, fault = places[0]
     source = _source(fault, submission)
-    where = _WHERE[fault.who] if source is None else f"{_WHERE[fault.who]} ({one_line(source.name, 60)})"
-    if fault.place:
-        where += f", {fault.place}"
+    where = f"Agent {fault.agent}" if fault.agent else _WHERE[fault.who]
+    if source is not None and not fault.file:
+        where += f" ({one_line(source.name, 60)})"
+    place = replace(fault, agent="").place
+    if place:
+        where += f", {place}"
     trial = grade.trials[index]
     first = f"at {fault.t:.2f} s in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
     trials = len({trial_index for trial_index, _ in places})
@@ -75,10 +85,25 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
 def _source(fault: Fault, submission: Submission | None) -> Code | None:
     if submission is None:
         return None
+    if fault.file:
+        return _beside(fault.file, submission)
     if submission.notebook is not None and fault.cell is not None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
-    return {"program": submission.program, "responder": submission.responder}.get(fault.who)
+    if fault.agent:
+        return code_of(fault.agent, submission.files)
+    parts = {"program": submission.program, "responder": submission.responder}
+    if fault.who == "second program":
+        parts[fault.who] = second_program_of(submission)
+    return parts.get(fault.who)
+
+
+def _beside(file: str, submission: Submission) -> Code | None:
+    """A process has named the file, so it may be any, or none."""
+    data = submission.files.get(file)
+    with contextlib.suppress(UsageError):
+        return None if data is None else Code(file, decode_source(data, file).text)
+    return None
 
 
 def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:

@@ -19,12 +19,18 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from service.grading.grade import Grade
+from service.grading.ranks import RankTable
 from service.reports.page import page_of
 from service.reports.readable import number, readable
+from service.reports.rows import TableRow
 from service.reports.view import View
 from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
+
+#: What is expected of a submission where a refusal does not say.
+_USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,7 @@ class BatchRow:
     verdict: Verdict | None = None
     report: str | None = None
     note: str = ""
+    name: str = ""  # the student's, where that is not what they are called by
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +72,28 @@ def report(view: View, plots: Mapping[str, bytes], submission: Submission | None
     return _render("report.html", page=page_of(view, submission), images=images)
 
 
-def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "") -> str:
-    """A page with one row a student: marks, verdict, and a link to the report."""
+def refusal_page(row: TableRow[Grade]) -> str:
+    """The page of one whose submission was refused: what was found, what was expected, what to do next."""
+    found, _, expected = row.reason.partition(", expected ")
+    return _render(
+        "refusal.html",
+        who=row.student.name or row.who,
+        source=row.source,
+        assignment=row.assignment,
+        found=f"{found.rstrip('.')}.",
+        expected=f"{(expected or _USUAL).rstrip('.')}.",
+    )
+
+
+def batch_index(
+    rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "", ranks: Sequence[RankTable] = ()
+) -> str:
+    """A page with one row a student: marks, verdict, and a link to the report; and the tables of ranks."""
     graded = [row for row in rows if row.marks is not None]
     cells = [
         {
             "student": _breakable(row.student),
+            "name": row.name,
             "marks": "" if row.marks is None else number(row.marks),
             "max_marks": "" if row.max_marks is None else number(row.max_marks),
             "share": _share(row.marks, row.max_marks),
@@ -80,7 +103,7 @@ def batch_index(rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "
         }
         for row in rows
     ]
-    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox)
+    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
 
 
 def _render(template: str, **context: object) -> str:

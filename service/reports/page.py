@@ -5,19 +5,22 @@ Nothing is escaped here, and nothing is hidden: what comes in is the reader's vi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
-from service.reports.words import VerdictWords, cost_words, grade_words, verdict_words
-from sim.recording import Fault, Message, Recording, Verdict
+from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
+from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
@@ -90,6 +93,7 @@ class Scene:
     more_messages: int
     responder_output: str
     responder_log: str
+    agents: tuple[AgentOutput, ...]
     notes: tuple[str, ...]
 
 
@@ -113,6 +117,7 @@ class Page:
     trials: tuple[TrialLine, ...]
     more_trials: int
     notes: tuple[str, ...]
+    channel: str
     cost: str
     weak_sandbox: bool
     staff: bool
@@ -143,6 +148,7 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
+        channel=channel_words(grade),
         cost=cost_words(grade),
         weak_sandbox=PROCESS_LIMITS in grade.sandbox,
         staff=view.staff,
@@ -152,10 +158,13 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
 
 def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
     """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
-    moments = [(line.t, "printed", line.text) for line in recording.printed]
-    moments += [(line.t, "said", line.text) for line in recording.spoken]
-    moments += [(touch.t, "touched", touch.what) for touch in recording.touches]
-    moments += [(fault.t, _kind(fault), fault.message) for fault in recording.faults]
+    moments: list[tuple[float, str, str]] = []
+    for robot, own in robots_of(recording):
+        whose = "" if own is recording else f"{robot}: "
+        moments += [(line.t, "printed", whose + line.text) for line in own.printed]
+        moments += [(line.t, "said", whose + line.text) for line in own.spoken]
+        moments += [(touch.t, "touched", whose + touch.what) for touch in own.touches]
+        moments += [(fault.t, _kind(fault), whose + fault.message) for fault in own.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
     if omitted <= 1:
@@ -210,6 +219,7 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
+    messages = messages_of(recording)
     of = sum(other.scenario == scenario for other in grade.trials)
     which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
     if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
@@ -220,21 +230,41 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
         words=verdict_words(trial.verdict),
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
-        messages=tuple(_message_lines(recording.messages[:_MOST_MESSAGES])),
-        more_messages=max(0, len(recording.messages) - _MOST_MESSAGES),
+        messages=tuple(itertools.islice(_message_lines(recording), _MOST_MESSAGES)),
+        more_messages=max(0, len(messages) + len(recording.agent_messages) - _MOST_MESSAGES),
         responder_output=readable(recording.responder_output, 4000),
         responder_log=readable(recording.responder_log, 4000),
+        agents=tuple(
+            AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
+            for each in recording.agent_outputs
+        ),
         notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
     )
 
 
-def _message_lines(messages: tuple[Message, ...]) -> Iterator[MessageLine]:
-    for message in messages:
+def _message_lines(recording: Recording) -> Iterator[MessageLine]:
+    """Each message of the robot's is followed by what the agents said until it was answered.
+
+    Two robots have no agents, so the index of a message among those told is its index in the recording.
+    """
+    inner: dict[int, list[AgentMessage]] = {}
+    for each in recording.agent_messages:
+        inner.setdefault(each.message, []).append(each)
+    yield from map(_agent_line, inner.get(-1, ()))
+    for index, (sender, message) in enumerate(messages_of(recording)):
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
-        if message.note:
-            arrived += f" ({one_line(message.note, 40)})"
-        wrong = message.delivered is None or bool(message.note)
-        yield MessageLine(f"{message.t:.2f}", message.sender, message_words(message.text, 240), arrived, wrong)
+        happened = befell_in_full(message)
+        if happened:
+            arrived += f" ({happened})"
+        wrong = message.delivered is None or bool(happened)
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, wrong)
+        yield from map(_agent_line, inner.get(index, ()))
+
+
+def _agent_line(each: AgentMessage) -> MessageLine:
+    arrived = f"({each.note})" if each.note else f"{each.t:.2f} s"
+    sender = f"{each.sender} → {each.receiver}"
+    return MessageLine(f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, bool(each.note))
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:

@@ -9,14 +9,16 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from sim.recording import SECOND, TICK, Image, Line, Pose, Recording
+from sim.recorded import seconds_at
+from sim.recording import Image, Line, Pose, Recording
 
 
 def trace(recording: Recording) -> dict[str, Any]:
     """``recording`` as a JSON-serialisable dict: one row a tick under ``ticks``, then what was said and sent.
 
     Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees
-    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists.
+    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists. Of two
+    robots this is the first; the second is its ``partner``.
     """
     return {
         "ticks": {name: _numbers(column.tolist()) for name, column in recording.ticks.told().items()},
@@ -30,9 +32,14 @@ def trace(recording: Recording) -> dict[str, Any]:
                 "delivered": None if message.delivered is None else _finite(message.delivered),
                 "reply_to": message.reply_to,
                 "note": message.note,
+                "lost": message.lost,
+                "distance": message.distance,
+                "angle": message.angle,
+                "arrived_as": None if message.arrived_as is None else storable(message.arrived_as),
             }
             for message in recording.messages
         ],
+        **agent_messages(recording),
         "datalog": [
             {
                 "t": _finite(datum.t),
@@ -48,7 +55,25 @@ def trace(recording: Recording) -> dict[str, Any]:
         "end": {"t": _finite(recording.end_t), **_pose(recording.end)},
         "sha256": recording.sha256,
         "sandbox": recording.sandbox,
+        **({"partner": trace(recording.partner)} if recording.partner is not None else {}),
     }
+
+
+def agent_messages(recording: Recording) -> dict[str, Any]:
+    """What the responder and its agents said to each other, under its key; nothing where there was nothing."""
+    told = [
+        {
+            "t": _finite(each.t),
+            "sender": each.sender,
+            "receiver": each.receiver,
+            "text": storable(each.text),
+            "message": each.message,
+            "reply_to": each.reply_to,
+            "note": each.note,
+        }
+        for each in recording.agent_messages
+    ]
+    return {"agent_messages": told} if told else {}
 
 
 def storable(text: str) -> str:
@@ -62,7 +87,7 @@ def _images(recording: Recording) -> list[dict[str, Any]]:
     for side, csv, tick in recording.image_log:
         rows.append(
             {
-                "t": tick * TICK / SECOND,
+                "t": seconds_at(recording, tick),
                 "tick": tick,
                 "source": "image_data",
                 side: [int(value) for value in csv.split(",") if value.strip().isdecimal()],

@@ -5,13 +5,14 @@ It knows no marks and no particular trial; the faults of a recording say where a
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
 from service.grading.grade import Grade
-from sim.recording import Verdict
+from sim.recording import LossReason, Verdict
 
 Tone = Literal["good", "notice", "bad"]
 _MEGABYTE = 1 << 20
@@ -119,6 +120,16 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
 )
 
 
+_LOSSES: Mapping[LossReason, str] = MappingProxyType(
+    {
+        "chance": "by chance",
+        "out of range": "because the robot was out of range",
+        "facing away": "because it faced away",
+        "blocked": "because a wall or an obstacle stood between",
+    }
+)
+
+
 def verdict_words(verdict: Verdict) -> VerdictWords:
     """The words for ``verdict``; every verdict has some."""
     return _WORDS[verdict]
@@ -134,9 +145,56 @@ _NO_ROBOT = VerdictWords(
 )
 
 
+#: Where there was a part to grade, and the other not.
+_WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
+    {
+        "robot.py": VerdictWords(
+            "no robot.py",
+            "There is no robot.py, so only your responder was graded, by itself.",
+            "The marks that need a robot program are missing for that alone.",
+            "Submit robot.py beside responder.py; if it is there, check its name.",
+            "bad",
+        ),
+        "responder.py": VerdictWords(
+            "no responder.py",
+            "There is no responder.py, so nothing answered your robot program, which was graded by itself.",
+            "The marks that need a responder are missing for that alone.",
+            "Submit responder.py beside robot.py; if it is there, check its name.",
+            "bad",
+        ),
+    }
+)
+
+#: Where an agent of the responder's failed.
+_AGENT_ERROR = VerdictWords(
+    "error in an agent",
+    "An agent of yours raised an error, so whoever asked it got no answer.",
+    "The error is in the agent that is named below, or in a function that it calls.",
+    "Call the agent's function yourself with the message that it was sent, and mend the line that is named.",
+    "bad",
+)
+
+
 def grade_words(grade: Grade) -> VerdictWords:
-    """The words for a grade's verdict, or that there was nothing to run."""
-    return verdict_words(grade.verdict) if grade.trials else _NO_ROBOT
+    """The words for a grade's verdict, for what was not submitted, or that there was nothing to run."""
+    if not grade.missing:
+        return _ended(grade) if grade.trials else _NO_ROBOT
+    words = _WITHOUT[grade.missing]
+    if grade.verdict is Verdict.FINISHED:
+        return words
+    ended = _ended(grade)
+    return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
+
+
+def _ended(grade: Grade) -> VerdictWords:
+    if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
+        return _AGENT_ERROR
+    return verdict_words(grade.verdict)
+
+
+def _is_of_an_agent(grade: Grade) -> bool:
+    faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
+    return bool(faults and faults[0].agent)
 
 
 def accuracy_words(grade: Grade) -> str:
@@ -148,6 +206,17 @@ def accuracy_words(grade: Grade) -> str:
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
         f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
     )
+
+
+def channel_words(grade: Grade) -> str:
+    """A sentence or two on what the channel lost in all trials, and why; empty where it lost nothing."""
+    messages = [message for trial in grade.trials for message in trial.recording.messages]
+    lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
+    if not lost:
+        return ""
+    reasons = ", ".join(f"{lost[reason]} {words}" for reason, words in _LOSSES.items() if lost[reason])
+    fair = " What was lost by chance is held against nobody." if lost["chance"] else ""
+    return f"The channel lost {lost.total()} of {len(messages)} messages: {reasons}.{fair}"
 
 
 def cost_words(grade: Grade) -> str:

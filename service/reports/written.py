@@ -46,6 +46,15 @@ def file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
     return [file_stem(student, assignment if many[student] > 1 else "") for student, assignment in graded]
 
 
+def refused_stems(refused: Sequence[tuple[str, str]]) -> list[str]:
+    """A stem for each (name it came under, student) that was refused.
+
+    One student may be refused several times, and several for what they submitted together.
+    """
+    many = Counter(source for source, _ in refused)
+    return [file_stem(f"{source} {student}" if many[source] > 1 else source, "refused") for source, student in refused]
+
+
 def prepare_folder(folder: Path) -> None:
     """Make the folder, before any work is done for it. Raises UsageError when nothing can be written there."""
     try:

@@ -5,13 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
+from typing import Any
 
 from sqlalchemy import ColumnElement, Row, Select, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.codec import decode
+from service.store.models import (
+    AssignmentVersion,
+    Batch,
+    CriterionResultRow,
+    Enrolment,
+    Job,
+    Person,
+    SubmissionRow,
+    TrialRow,
+)
 from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
 from sim.errors import UsageError
+from submissions.assignment.schema import did_you_mean
+from submissions.people import Refusal
+
+#: The newest of which one may have been meant by an id that there is not.
+_MOST_COMPARED = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +36,8 @@ class JobLine:
 
     id: str
     student: str
+    name: str  # the student's
+    email: str
     source: str
     assignment: str
     state: JobState
@@ -35,6 +53,7 @@ class JobLine:
     queued_at: datetime
     finished_at: datetime | None
     standing: Standing
+    missing: str  # the part that was asked for and not submitted
     copied_from: str | None  # the identical grade that was run
     suspect: str | None  # why the grade is not to be trusted
     staff_only: str | None  # the limit that the submission was over
@@ -57,7 +76,7 @@ class BatchLine:
     name: str
     state: BatchState
     created_at: datetime
-    problems: tuple[tuple[str, str], ...]  # the rows that were refused: name, sentence
+    refusals: tuple[Refusal, ...]
     jobs: int
     states: dict[JobState, int]
     regrade_of: str | None  # the batch whose submissions these are
@@ -75,12 +94,12 @@ class BatchProgress:
 
 def find_batch(session: Session, start: str) -> str:
     """The id of the batch that begins so. Raises UsageError where none or several do."""
-    return _find(session, select(Batch.id).where(Batch.id.startswith(start, autoescape=True)), start, "batch")
+    return _find(session, Batch.id, Batch.created_at, start, "batch")
 
 
 def find_job(session: Session, start: str) -> str:
     """The id of the job that begins so. Raises UsageError where none or several do."""
-    return _find(session, select(Job.id).where(Job.id.startswith(start, autoescape=True)), start, "grade")
+    return _find(session, Job.id, Job.queued_at, start, "grade")
 
 
 def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
@@ -97,9 +116,9 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     # What a worker in quarantine graded is in the batch a second time.
     counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
     states = dict(session.execute(counted.group_by(Job.state)).all())
-    problems = tuple((name, sentence) for name, sentence in row.problems)
+    refusals = decode(tuple[Refusal, ...], row.refusals)
     return BatchLine(
-        row.id, row.name, row.state, row.created_at, problems, sum(states.values()), states, row.regrade_of
+        row.id, row.name, row.state, row.created_at, refusals, sum(states.values()), states, row.regrade_of
     )
 
 
@@ -137,17 +156,18 @@ def progress(session: Session, batch_id: str) -> BatchProgress:
     )
 
 
-def _find(session: Session, query: Select[str], start: str, what: str) -> str:
-    found = session.scalars(query.limit(2)).all()
+def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:
+    found = session.scalars(select(column).where(column.startswith(start, autoescape=True)).limit(2)).all()
     if not found:
-        raise UsageError(f"there is no {what} {start!r}")
+        known = session.scalars(select(column).order_by(newest.desc()).limit(_MOST_COMPARED))
+        raise UsageError(f"there is no {what} {start!r}{did_you_mean(start, known)}")
     if len(found) > 1:
         raise UsageError(f"more than one {what} begins with {start!r}; give more of its id")
     return found[0]
 
 
 def _job_lines() -> Select[
-    Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
+    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
 ]:
     accuracy = (
         select(CriterionResultRow.accuracy)
@@ -166,6 +186,8 @@ def _job_lines() -> Select[
         select(
             Job,
             Enrolment.student,
+            Person.name,
+            Person.email,
             SubmissionRow.source,
             AssignmentVersion,
             SubmissionRow.attempt,
@@ -177,17 +199,22 @@ def _job_lines() -> Select[
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(Person, Enrolment.person_id == Person.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
     )
 
 
 def _line(
-    row: Row[Job, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None],
+    row: Row[
+        Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
+    ],
 ) -> JobLine:
-    job, student, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
+    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
     return JobLine(
         id=job.id,
         student=student,
+        name=name,
+        email=email or "",
         source=source,
         assignment=version.assignment,
         state=job.state,
@@ -203,6 +230,7 @@ def _line(
         queued_at=job.queued_at,
         finished_at=job.finished_at,
         standing=job.standing,
+        missing=job.missing,
         copied_from=job.copied_from,
         suspect=job.suspect,
         staff_only=staff_only,

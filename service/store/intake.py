@@ -14,6 +14,7 @@ from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import jobs, result_cache
+from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
@@ -27,6 +28,7 @@ from sim.errors import HostError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.bundle import pack_submission, unpack_submission
 from submissions.grading_request import GradingRequest
+from submissions.people import Refusal
 from submissions.submission import Submission
 
 DEFAULT_COURSE = "default"
@@ -46,11 +48,11 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class AcceptedBatch:
-    """``refused`` are rows of students whom the course cannot tell from others: name, sentence."""
+    """``refused`` are students whom the course cannot tell from others."""
 
     id: str
     jobs: tuple[Accepted, ...]
-    refused: tuple[tuple[str, str], ...] = ()
+    refused: tuple[Refusal, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,7 @@ class AcceptedNew:
 
     batch: AcceptedBatch | None
     known: tuple[AlreadySubmitted, ...]
-    refused: tuple[tuple[str, str], ...] = ()
+    refused: tuple[Refusal, ...] = ()
 
 
 def accept(
@@ -101,14 +103,14 @@ def accept_batch(
     store: Store,
     name: str,
     grading_requests: Sequence[GradingRequest],
-    problems: Sequence[tuple[str, str]],
+    refusals: Sequence[Refusal],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
 ) -> AcceptedBatch:
     """Take in a whole batch or nothing of it, each submission to be graded anew whatever was submitted before.
 
-    ``problems`` are the rows that were refused: name, sentence. Raises UsageError when the course refuses the rest.
+    ``refusals`` were made when it was read. Raises UsageError when the course refuses the rest.
     """
     packed = _pack(grading_requests)
     secret = secret_of(store).sha256
@@ -117,15 +119,15 @@ def accept_batch(
         terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
         items, refused = _enrolled(session, packed, terms)
         if refused and not items:
-            raise UsageError(f"none can be taken in; {refused[0][0]}: {refused[0][1]}")
-        return replace(_accept_batch(session, items, name, [*problems, *refused], terms), refused=refused)
+            raise UsageError(f"none can be taken in; {refused[0].source}: {refused[0].reason}")
+        return replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
 
 
 def accept_new(
     store: Store,
     name: str,
     grading_requests: Sequence[GradingRequest],
-    problems: Sequence[tuple[str, str]],
+    refusals: Sequence[Refusal],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
@@ -144,7 +146,7 @@ def accept_new(
         items, refused = _enrolled(session, packed, terms)
         found = [_known(session, item) for item in items]
         new = [item for item, known in zip(items, found, strict=True) if known is None]
-        batch = _accept_batch(session, new, name, [*problems, *refused], terms) if new else None
+        batch = _accept_batch(session, new, name, [*refusals, *refused], terms) if new else None
         return AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
 
 
@@ -222,17 +224,16 @@ def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
     return packed
 
 
-def _enrolled(
-    session: Session, packed: Sequence[_Packed], terms: _Terms
-) -> tuple[list[_Item], tuple[tuple[str, str], ...]]:
-    """Whose each is, and the rows whose student cannot be told from another."""
+def _enrolled(session: Session, packed: Sequence[_Packed], terms: _Terms) -> tuple[list[_Item], tuple[Refusal, ...]]:
+    """Whose each is, and what is refused because its student cannot be told from another."""
     students = Students(session, terms.course_id)
     items, refused = [], []
     for each in packed:
+        asked = each.grading_request
         try:
-            items.append(_Item(each, students.enrol(each.grading_request.student, terms.at)))
+            items.append(_Item(each, students.enrol(asked.student, terms.at)))
         except UsageError as error:
-            refused.append((each.grading_request.source, str(error)))
+            refused.append(Refusal(asked.source, str(error), asked.student, asked.assignment.id))
     return items, tuple(refused)
 
 
@@ -272,10 +273,9 @@ def _known(session: Session, item: _Item) -> AlreadySubmitted | None:
 
 
 def _accept_batch(
-    session: Session, items: Sequence[_Item], name: str, problems: Sequence[tuple[str, str]], terms: _Terms
+    session: Session, items: Sequence[_Item], name: str, refusals: Sequence[Refusal], terms: _Terms
 ) -> AcceptedBatch:
-    rows = [list(row) for row in problems]
-    batch = Batch(course_id=terms.course_id, name=name, problems=rows, created_at=terms.at)
+    batch = Batch(course_id=terms.course_id, name=name, refusals=encode(tuple(refusals)), created_at=terms.at)
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)

@@ -174,6 +174,7 @@ def finish(
             "secret_sha256": grade.secret_sha256,
             "cache_key": result_cache.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
             "sandbox": grade.sandbox,
+            "missing": grade.missing,
             "notes": list(grade.notes),
             "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,

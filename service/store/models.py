@@ -83,7 +83,7 @@ class Person(Base):
     __tablename__ = "person"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    name: Mapped[str]
+    name: Mapped[str] = mapped_column(default="")  # empty where nobody said, like the address
     email: Mapped[str | None]
     created_at: Mapped[datetime]
 
@@ -97,7 +97,8 @@ class Enrolment(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"))
-    student: Mapped[str]
+    student: Mapped[str]  # the id, in its normal form
+    written: Mapped[str]  # the id as it was first written
     role: Mapped[Role]
 
 
@@ -125,7 +126,7 @@ class Batch(Base):
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
-    problems: Mapped[Any] = mapped_column(default=list)  # [[row, sentence], ...] that were refused when it was read
+    refusals: Mapped[Any] = mapped_column(default=list)  # what was not taken in: a ``Refusal`` each
     regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose submissions these are
     created_at: Mapped[datetime]
 
@@ -199,6 +200,7 @@ class Job(Base):
     grader_version: Mapped[str | None]
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
+    missing: Mapped[str] = mapped_column(default="")  # the part that was asked for and not submitted
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 
     #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.

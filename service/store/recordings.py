@@ -56,6 +56,8 @@ def keep(recording: Recording, cap: int) -> Kept:
     for trim in (_without_floods, _without_words, _without_ticks):
         if len(data) <= cap:
             break
+        if recording.partner is not None:
+            recording = replace(recording, partner=trim(recording.partner))
         recording = trim(recording)
         data = to_bytes(recording)
     return Kept(recording, data)
@@ -67,9 +69,9 @@ def to_bytes(recording: Recording) -> bytes:
     words: dict[str, Any] = {
         field.name: encode(getattr(recording, field.name))
         for field in fields(recording)
-        if field.name not in ("ticks", "images")
+        if field.name not in ("ticks", "images", "partner")
     }
-    words["ticks"] = {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels}
+    words["ticks"] = _of_all_ticks(ticks)
     words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
     arrays: dict[str, NDArray[Any]] = {
         "words": _bytes_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
@@ -79,6 +81,8 @@ def to_bytes(recording: Recording) -> bytes:
     for column in COLUMNS:
         values = np.asarray(getattr(ticks, column.name), column.dtype)
         arrays[column.name] = _shuffled(values.reshape(-1, column.width))
+    if recording.partner is not None:
+        arrays["partner"] = _bytes_array(to_bytes(recording.partner))
     buffer = io.BytesIO()
     np.savez(buffer, **cast(dict[str, Any], arrays))
     return zlib.compress(buffer.getvalue(), 6)
@@ -90,15 +94,23 @@ def from_bytes(data: bytes) -> Recording:
         with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
             words = json.loads(bytes(arrays["words"]))
             pixels = bytes(arrays["pictures"])
+            partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
             # A recording may be older than a column.
             columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pixels)
         words = {_FORMERLY.get(name, name): value for name, value in words.items()}
-        return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images)
+        for message in words.get("messages", ()):
+            if message.get("note") == "lost":  # earlier releases knew no other reason
+                message.setdefault("lost", "chance")
+        return Recording(**decoded_arguments(Recording, words), ticks=ticks, images=images, partner=partner)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
+
+
+def _of_all_ticks(ticks: Ticks) -> dict[str, int]:
+    return {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels, "length": ticks.length}
 
 
 def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
@@ -153,6 +165,7 @@ def _without_floods(recording: Recording) -> Recording:
             printed=recording.printed[:_TEXT_KEPT],
             datalog=recording.datalog[:_TEXT_KEPT],
             messages=recording.messages[:_TEXT_KEPT],
+            agent_messages=recording.agent_messages[:_TEXT_KEPT],
         ),
         f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
     )
@@ -160,15 +173,20 @@ def _without_floods(recording: Recording) -> Recording:
 
 def _without_words(recording: Recording) -> Recording:
     bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
+    outputs = (
+        replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
+    )
     cut = replace(
         bare,
         responder_output=recording.responder_output[:_TEXT_KEPT],
         responder_log=recording.responder_log[:_TEXT_KEPT],
         faults=recording.faults[:10],
+        agent_messages=(),
+        agent_outputs=tuple(outputs),
     )
     return _noted(cut, "what was printed, said and sent is left out")
 
 
 def _without_ticks(recording: Recording) -> Recording:
-    ticks = Ticks(np.empty(0), left_pixels=recording.ticks.left_pixels, right_pixels=recording.ticks.right_pixels)
+    ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_of_all_ticks(recording.ticks)}))
     return _noted(replace(recording, ticks=ticks), "its ticks are left out")

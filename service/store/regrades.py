@@ -97,7 +97,7 @@ def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_a
         batch = Batch(
             course_id=original.course_id,
             name=f"regrade of {original.name}",
-            problems=[],
+            refusals=[],
             regrade_of=original.id,
             created_at=at,
         )

@@ -30,6 +30,7 @@ from service.store import artifacts, recordings
 from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from sim.errors import HostError, UsageError
+from sim.recorded import faults_of
 from sim.recording import Image, Recording
 from submissions.seeds import PUBLIC
 
@@ -103,6 +104,7 @@ def load(session: Session, job_id: str) -> Grade:
         sandbox=job.sandbox or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
+        missing=job.missing,
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
         cost=None if job.cost is None else decode(Cost, job.cost),
     )
@@ -127,7 +129,7 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         end_t=trial.recording.end_t,
         place=trial.place,
         sweep=encode(trial.sweep),
-        surprise=next((fault.staff for fault in trial.recording.faults if fault.staff), None),
+        surprise=next((fault.staff for fault in faults_of(trial.recording) if fault.staff), None),
     )
 
 

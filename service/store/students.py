@@ -1,4 +1,4 @@
-"""The students of a course: found by name, enrolled when new, and refused where one cannot be told from another.
+"""The students of a course: found by id, enrolled when new, and refused where one cannot be told from another.
 
 What a name comes to is ``submissions.names``'; what a student submits is ``intake.py``'s.
 """
@@ -14,7 +14,9 @@ from sqlalchemy.orm import Session
 from service.store.models import Enrolment, Person
 from service.store.states import Role
 from sim.errors import UsageError
+from submissions.assignment.schema import did_you_mean
 from submissions.names import cannot_be_told, forms, shown_name
+from submissions.people import Student
 from submissions.raw_files import shown
 
 
@@ -26,47 +28,66 @@ class Students:
         self._course_id = course_id
         self._by_form: dict[str, dict[str, int]] | None = None
 
-    def enrol(self, written: str, at: datetime) -> int:
-        """The enrolment of the student who is written so, new if there is none.
+    def enrol(self, student: Student, at: datetime) -> int:
+        """The enrolment of the student whose id is written so, new if there is none.
 
-        One who is written otherwise than in the normal form is only who was first written so. Raises UsageError for a
-        name that is nobody's, or cannot be told from another student's.
+        One who is written otherwise than in the normal form is only who was first written so. Name and address are
+        those that were told last. Raises UsageError for an id that is nobody's, or cannot be told from another's.
         """
-        name, written = shown_name(written), unicodedata.normalize("NFC", written)
-        if not name:
+        own, written = shown_name(student.id), unicodedata.normalize("NFC", student.id)
+        if not own:
             raise UsageError("this names no student, expected a name that can be seen.")
-        query = select(Enrolment.id, Person).join(Person, Enrolment.person_id == Person.id)
-        found = self._session.execute(
-            query.where(Enrolment.course_id == self._course_id, Enrolment.student == name)
-        ).one_or_none()
+        found = self._enrolled(own)
         if found is None:
-            others = self._near(name)
+            others = self._near(own)
             # What was enrolled before there was one normal form may have blanks round it.
-            same = [enrolment_id for other, enrolment_id in others.items() if shown_name(other) == name]
+            same = [enrolment_id for other, enrolment_id in others.items() if shown_name(other) == own]
             if len(same) == 1:
+                self._tell(same[0], student)
                 return same[0]
             if not others:
-                return self._new(name, written, at)
+                return self._new(own, written, student, at)
         else:
-            enrolment_id, person = found
-            others = {name: enrolment_id}
-            if written == name:
-                person.name = name
-            if written == person.name:
-                return enrolment_id
+            others = {own: found.id}
+            if written == own:
+                found.written = own
+            if written == found.written:
+                self._tell(found.id, student)
+                return found.id
         raise UsageError(
             f'"{shown(written)}" {cannot_be_told(list(others)[:3])}, who is in this course; '
             "expected that name as it is written there, or another."
         )
 
-    def _new(self, name: str, written: str, at: datetime) -> int:
-        person = Person(name=written, created_at=at)
+    def find(self, written: str) -> int:
+        """The enrolment of the student who is written so.
+
+        Raises UsageError, with one like it if there is one, for somebody who is not in the course.
+        """
+        found = self._enrolled(shown_name(written))
+        if found is not None:
+            return found.id
+        known = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
+        hint = did_you_mean(written, known) or "; robomark course enrol lets in who has not submitted anything"
+        raise UsageError(f"there is no student {shown(written)!r} in this course{hint}")
+
+    def _enrolled(self, own: str) -> Enrolment | None:
+        query = select(Enrolment).where(Enrolment.course_id == self._course_id, Enrolment.student == own)
+        return self._session.scalars(query).one_or_none()
+
+    def _tell(self, enrolment_id: int, student: Student) -> None:
+        if student.name or student.email:
+            person = self._session.get_one(Person, self._session.get_one(Enrolment, enrolment_id).person_id)
+            person.name, person.email = student.name or person.name, student.email or person.email
+
+    def _new(self, own: str, written: str, student: Student, at: datetime) -> int:
+        person = Person(name=student.name, email=student.email or None, created_at=at)
         self._session.add(person)
         self._session.flush()
-        row = Enrolment(course_id=self._course_id, person_id=person.id, student=name, role=Role.STUDENT)
+        row = Enrolment(course_id=self._course_id, person_id=person.id, student=own, written=written, role=Role.STUDENT)
         self._session.add(row)
         self._session.flush()
-        self._note(name, row.id)
+        self._note(own, row.id)
         return row.id
 
     def _near(self, name: str) -> dict[str, int]:

@@ -19,7 +19,10 @@ from sqlalchemy.orm import Session
 from service.store import models
 from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion
+from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import catalogue
+from submissions.assignment.schema import did_you_mean
 
 #: What keys are called in assignments that earlier releases kept.
 _FORMERLY = {"picture": "image", "pictures": "images"}
@@ -59,6 +62,17 @@ def keep(session: Session, frozen: Frozen, at: datetime) -> int:
         created_at=at,
     )
     return session.scalars(of_version).one()
+
+
+def check_assignment(session: Session, name: str) -> None:
+    """Raises UsageError, with one like it, for an assignment that is neither in the catalogue nor was ever marked.
+
+    An empty one stands for all.
+    """
+    known = {"", *catalogue(), *session.scalars(select(AssignmentVersion.assignment).distinct())}
+    if name not in known:
+        hint = did_you_mean(name, known) or "; robomark assignments list shows the catalogue"
+        raise UsageError(f"there is no assignment {name!r}{hint}")
 
 
 def assignment_to_bytes(assignment: Assignment) -> bytes:

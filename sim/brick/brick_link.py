@@ -10,8 +10,7 @@ from typing import Any, NoReturn
 
 Frame = dict[str, Any]
 
-TICK = 100_000  # thirds of a microsecond in a thirtieth of a second
-SECOND = 30 * TICK
+SECOND = 3_000_000  # thirds of a microsecond
 READ = SECOND // 100
 FREE_READS = 100_000
 
@@ -27,6 +26,7 @@ class Link:
 
     def __init__(self) -> None:
         self.units = 0
+        self.number = 1  # of the robot, where there are two
         self.state: dict[str, list[Any]] = {"messages": []}
         self._send: Callable[[Frame], None] = _unconnected
         self._send_later: Callable[[Frame], None] = _unconnected
@@ -36,6 +36,7 @@ class Link:
         self._sensors: list[str] = []
         self._seen: Frame = {}  # what the sensors read in tick number _seen_in
         self._seen_in = -1
+        self._tick = SECOND
 
     def connect(
         self,
@@ -44,12 +45,14 @@ class Link:
         receive: Callable[[], Frame],
         stuck: Callable[[], None],
         sensors: list[str],
+        tick: int,
     ) -> None:
         """``send_later`` may hold a frame back until the next one; ``stuck`` ends a program that never waits.
 
-        Each time one of ``sensors`` is read, the world tells what they all give, in this order.
+        Each time one of ``sensors`` is read, the world tells what they all give, in this order. Values change every
+        ``tick``.
         """
-        self._sensors = sensors
+        self._sensors, self._tick = sensors, tick
         self._send, self._send_later, self._receive, self._stuck = send, send_later, receive, stuck
 
     def tell(self, frame: Frame) -> None:
@@ -86,15 +89,20 @@ class Link:
         """
         frame = {"do": "read", "what": what, "times": times}
         end = self.units + times * READ
-        if self._seen_in == end // TICK:
+        if self._seen_in == end // self._tick:
             self._free = 0
             self.units = end
             self._send_later(frame)
             return self._seen[what]
         values = self.ask(frame)
         self._seen = dict(zip(self._sensors, values, strict=True))
-        self._seen_in = self.units // TICK
+        self._seen_in = self.ticks
         return self._seen[what]
+
+    @property
+    def ticks(self) -> int:
+        """How many there were."""
+        return self.units // self._tick
 
     def read_freely(self) -> None:
         """Count an act that costs no time; the world cannot move while a program only does these."""
@@ -116,6 +124,6 @@ def number(value: float) -> float:
 
 
 def clock() -> float:
-    """Seconds since the program began, in whole ticks."""
+    """Seconds since the program began, in whole ticks, of which the original has thirty a second."""
     link.read_freely()
-    return number(link.units // TICK / 30)
+    return number(link.ticks / 30)

@@ -17,6 +17,7 @@ __all__ = [
     "UltrasonicSensor",
     "get_clock",
     "pyState",
+    "robot_number",
     "showme",
 ]
 
@@ -29,6 +30,11 @@ def get_clock() -> float:
 def pyState() -> dict[str, list[Any]]:
     """``{"messages": [...]}``: what the responder answered with ``JSON::``, oldest first."""
     return link.state
+
+
+def robot_number() -> int:
+    """1, or 2 for the second robot: so that one program can be run on both."""
+    return link.number
 
 
 def showme() -> str:

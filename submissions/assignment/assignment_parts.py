@@ -17,8 +17,10 @@ from responders import library
 from responders.channel import Channel
 from sim.errors import UsageError
 from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
+from sim.motion import gap
 from sim.recording import Pose
 from sim.robot import usual_robot
+from submissions.assignment.agents import read_agents
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
 from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.problems import Problems
@@ -32,6 +34,7 @@ from submissions.assignment.schema import (
     did_you_mean,
     listed,
 )
+from submissions.assignment.second_robot import SAME, check_robots, second_poses_of
 from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria.common import Surroundings
 from submissions.document import checked_table, no_double, tables_of, texts_in
@@ -39,7 +42,7 @@ from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
-_TABLES = ("world", "parts", "limits", "training", "scenario", "criterion")
+_TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 
@@ -60,10 +63,16 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world = _world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
     scenarios = [] if robotless else _scenarios(document, ground, problems)
+    if world_table and parts:
+        check_robots(document, world_table, parts, problems)
+    agents, agents_sources = read_agents(document, parts, files, problems)
+    _clear_beacons(scenarios, world, problems)
     around = Surroundings(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
         without=_nobodys(parts),
+        agents=frozenset(agents),
+        robots=world_table.robots if world_table else 1,
         files=files,
         aliases=head.aliases if head else {},
     )
@@ -75,6 +84,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     check_given(document, problems)
     given_parts = sources_of(criteria, files, problems)
     given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
+    given_parts |= agents_sources
     given = _given(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
@@ -82,7 +92,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         id=head.id,
         title=head.title,
         world=world,
-        parts=Parts(parts.program, parts.responder, str(parts.cell)),
+        parts=Parts(
+            parts.program,
+            parts.responder,
+            str(parts.cell),
+            parts.second_program if world.robots == 2 else "none",
+            MappingProxyType(dict(agents)),
+        ),
         scenarios=tuple(scenario for scenario in scenarios if scenario),
         criteria=criteria,
         limits=Limits(**limits.model_dump()),
@@ -157,9 +173,11 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
         labels=table.labels,
         obstacles=obstacles,
         robot=robot,
+        robots=table.robots,
         solid=table.solid,
         drive=table.drive,
         noise=table.noise,
+        tick=table.tick,
         sheet=_sheet(table),
     )
 
@@ -184,15 +202,17 @@ def _scenarios(document: Mapping[str, object], ground: Floor | None, problems: P
 
 
 def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems: Problems) -> Scenario | None:
-    for number, (x, y, _) in enumerate(table.poses):
-        if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
-            problems.add(
-                (*place, "poses", number),
-                f"poses[{number}] is off the floor, expected x from 0 to {WIDTH} and y from 0 to {HEIGHT}",
-            )
+    for key in ("poses", "second_poses"):
+        for number, (x, y, _) in enumerate(getattr(table, key)):
+            if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
+                problems.add(
+                    (*place, key, number),
+                    f"{key}[{number}] is off the floor, expected x from 0 to {WIDTH} and y from 0 to {HEIGHT}",
+                )
     poses = tuple(Pose(*pose) for pose in table.poses)
     if not poses:
         poses = (ground.default_pose if ground else Pose(100, 800, 0),)
+    second_poses = second_poses_of(table, len(poses), place, problems)
     return Scenario(
         id=table.id,
         poses=poses,
@@ -206,7 +226,17 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
         visibility=table.visibility,
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
+        second_poses=second_poses,
     )
+
+
+def _clear_beacons(scenarios: Sequence[Scenario | None], world: WorldSpec | None, problems: Problems) -> None:
+    """Names a beacon that stands within an obstacle, which would block every way to it."""
+    for number, scenario in enumerate(scenarios):
+        beacon = scenario.channel.beacon if scenario and scenario.channel.blocked_by == "obstacles" else None
+        if world and beacon and any(gap(box, *beacon) == 0 for box in world.obstacles):
+            sentence = "beacon is in an obstacle, which blocks every way to it, expected a place beside them"
+            problems.add(("scenario", number, "channel", "beacon"), sentence)
 
 
 def _nobodys(parts: PartsTable | None) -> frozenset[str]:
@@ -215,15 +245,15 @@ def _nobodys(parts: PartsTable | None) -> frozenset[str]:
 
 def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
     sources = {}
-    for part in ("program", "responder"):
+    for part in ("program", "responder", "second_program"):
         name = getattr(parts, part)
-        if name in ("student", "none"):
+        if name == "student" or name == (SAME if part == "second_program" else "none"):
             continue
         if part == "responder" and name not in files and name in library.names():
             sources[name] = library.source(name)
             continue
         if name not in files or not name.endswith(".py"):
-            none = "" if part == "program" else f', "none", {", ".join(library.names())}'
+            none = {"program": "", "second_program": f', "{SAME}"'}.get(part, f', "none", {", ".join(library.names())}')
             problems.add(
                 ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
             )

@@ -97,7 +97,11 @@ def _marked(schema: type[Criterion], mark: str) -> set[str]:
 
 
 def _without_a_part(criterion: Criterion, around: Surroundings, robotless: bool) -> Iterator[Misfit]:
-    """What it judges must be there: runs of a robot, and a responder that is asked."""
+    """What it judges must be there: runs of a robot, of a second one, and a responder that is asked."""
+    if criterion.robot > around.robots:
+        yield Misfit("robot", "robot is 2, but there is one, expected robots = 2 in world")
+    if criterion.robot > 1 and not criterion.judges_runs:
+        yield Misfit("robot", "robot is 2, but check looks at no run, expected it without robot")
     if criterion.asks_responder and "responder" in around.without:
         yield Misfit("check", 'check needs a responder, but parts has responder = "none", expected one')
     if robotless and criterion.judges_runs:

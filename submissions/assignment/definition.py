@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
@@ -32,9 +33,11 @@ class WorldSpec:
     labels: bool = True
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
     robot: str = "Default_Robot"
+    robots: Literal[1, 2] = 1
     solid: bool = False  # walls and obstacles stop the robot
     drive: Literal["course", "wheels"] = "course"  # who moves it: the course's equations, or rigid-body wheels
     noise: Literal["course", "both directions"] = "course"  # of the wheels: of positive speeds alone, or of all
+    tick: Literal["thirtieth", "browser"] = "thirtieth"  # of a second, or 33 ms as in the original's browser
     sheet: int | None = 0  # the seed of the digits on a digit sheet; None: each trial's own seed
 
 
@@ -45,11 +48,13 @@ class Parts:
     program: str = "student"
     responder: str = "student"
     cell: str = "last"  # of a notebook: which robot program is marked; ``last``, ``tag:NAME`` or a number from 1
+    second_program: str = "none"  # of the second robot, where there are two; ``same`` is the first one's
+    agents: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))  # by name, those the responder asks
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Poses x swept levels x noise levels x seeds.
+    """Poses x swept levels x noise levels x seeds. A second robot starts from the second pose of the same number.
 
     ``choose = "random"`` draws one pose a trial, by the trial's seed; ``"shuffled"`` takes each once, in an order
     that the seed of the scenario decides. ``start_jitter`` moves every start by up to so many mm in x and y and
@@ -68,6 +73,7 @@ class Scenario:
     visibility: Visibility = "visible"
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
+    second_poses: tuple[Pose, ...] = ()  # as many as poses, or none
 
     def varies(self, condition: str) -> bool:
         """Whether its trials differ in a condition that can be swept; noise that is listed counts as well."""
@@ -121,6 +127,7 @@ class Trial:
     place: int  # which of the scenario's poses it starts from
     channel: Channel
     sweep: Coordinates = ()
+    second_pose: Pose | None = None  # of the second robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +184,9 @@ class Assignment:
                         delay=varied.get("delay", scenario.channel.delay),
                     ),
                     sweep,
+                    _moved(scenario, scenario.second_poses[place], seed, "second start jitter")
+                    if scenario.second_poses
+                    else None,
                 )
 
     def _places(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
@@ -199,10 +209,15 @@ class Assignment:
 
 def _start(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
     """The pose of that number, moved by the swept offsets and by the jitter of the trial."""
-    pose = scenario.poses[place]
     offsets = [varied.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
+    return _moved(scenario, scenario.poses[place], seed, "start jitter", offsets)
+
+
+def _moved(scenario: Scenario, pose: Pose, seed: int, chance: str, by: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+    """The pose, moved by offsets and by the jitter that this stream of chance has for the trial."""
+    offsets = list(by)
     if any(scenario.start_jitter):
-        chance = Stream(seed, "start jitter")
+        stream = Stream(seed, chance)
         for axis, most in enumerate(scenario.start_jitter):
-            offsets[axis] += chance.between(-most, most, 0, axis)
+            offsets[axis] += stream.between(-most, most, 0, axis)
     return Pose(pose.x + offsets[0], pose.y + offsets[1], pose.heading + offsets[2])

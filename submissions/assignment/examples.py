@@ -5,6 +5,9 @@ They are submissions like any other: nothing here reads or grades them.
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated
@@ -26,12 +29,19 @@ EXPECTED = "expected.toml"
 REFERENCE = "reference"
 
 
-class Expectation(StrictTable):
-    """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks."""
+_Marks = Annotated[Decimal, BeforeValidator(str)]
 
-    marks: Annotated[Decimal, BeforeValidator(str)]
+
+class Expectation(StrictTable):
+    """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks.
+
+    ``earns`` are the marks of single criteria, by id.
+    """
+
+    marks: _Marks
     verdict: Verdict = Verdict.FINISHED
     loses: tuple[str, ...] | None = None
+    earns: dict[str, _Marks] = Field(default_factory=dict)
     feedback: tuple[str, ...] = ()  # each must be in what the student is told
 
 
@@ -80,3 +90,39 @@ def expected(assignment: str) -> Expected:
             problem = problem_of(schema, {**details, "loc": tuple(each for each in rest if each != "")})
             problems.add((*place, *problem.path), problem.sentence)
         raise AssignmentProblems(problems.sorted()) from error
+
+
+def add_expected(assignment: str, new: Mapping[str, Expectation]) -> Path:
+    """Appends a table for each of these examples to ``expected.toml``, which is made where there is none.
+
+    What stands there stays as it is. Raises UsageError for an example that has a table already.
+    """
+    known = expected(assignment).examples
+    again = [name for name in new if name in known]
+    if again:
+        raise UsageError(f"{again[0]} has a table in {EXPECTED} already, expected an example without one.")
+    path = assignment_folder(assignment) / EXPECTED
+    before = path.read_text(encoding="utf-8").rstrip() if path.is_file() else ""
+    tables = [_table(name, wanted) for name, wanted in new.items()]
+    path.write_text("\n\n".join(filter(None, (before, *tables))) + "\n", encoding="utf-8")
+    return path
+
+
+def _table(name: str, wanted: Expectation) -> str:
+    lines = [f"[{_key(name)}]", f'marks = "{wanted.marks}"']
+    if wanted.verdict is not Verdict.FINISHED:
+        lines.append(f'verdict = "{wanted.verdict}"')
+    lines.append(f"loses = [{', '.join(map(_quoted, wanted.loses or ()))}]")
+    if wanted.earns:
+        earned = ", ".join(f'{_key(each)} = "{marks}"' for each, marks in wanted.earns.items())
+        lines.append(f"earns = {{ {earned} }}")
+    return "\n".join(lines)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quoted(name)
+
+
+def _quoted(text: str) -> str:
+    # What JSON escapes, TOML's basic strings escape in the same way.
+    return json.dumps(text, ensure_ascii=False)

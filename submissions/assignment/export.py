@@ -16,7 +16,7 @@ from pathlib import Path
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import FILE_NAME, assignment_folder
-from submissions.assignment.reader import read_assignment
+from submissions.assignment.reader import ASIDE, read_assignment
 
 _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
 _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
@@ -44,6 +44,13 @@ def export_whole(assignment: str, target: Path) -> int:
     source = assignment_folder(assignment)
     read_assignment(source)
     return _write(target, _files(source))
+
+
+def export_for_grading(assignment: str, target: Path) -> int:
+    """Write what the assignment is marked by, without examples; how many files. Raises UsageError as above."""
+    source = assignment_folder(assignment)
+    read_assignment(source)
+    return _write(target, {name: data for name, data in _files(source).items() if name.split("/")[0] not in ASIDE})
 
 
 def export_for_students(assignment: str, target: Path) -> int:

@@ -21,7 +21,7 @@ from submissions.assignment.schema import did_you_mean
 from submissions.assignment.toml_lines import find_lines
 
 #: What lies in an assignment's folder beside what it is marked by: it may change without changing a mark.
-_ASIDE = ("starter", "examples", "expected.toml")
+ASIDE = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
@@ -110,7 +110,7 @@ def _folder_files(folder: Path) -> Mapping[str, bytes]:
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
-        if hidden or parts[0] in _ASIDE or not path.is_file():
+        if hidden or parts[0] in ASIDE or not path.is_file():
             continue
         size += path.stat().st_size
         if size > _MAX_FOLDER_BYTES:

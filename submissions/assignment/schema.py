@@ -10,13 +10,13 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from sim.floors import OBSTACLE_PRESETS
+from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.strict_table import Shape, StrictTable
@@ -47,9 +47,11 @@ class WorldTable(StrictTable):
     labels: bool = True
     obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
     robot: str = "Default_Robot"
+    robots: Literal[1, 2] = 1
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
     noise: Literal["course", "both directions"] = "course"
+    tick: Literal["thirtieth", "browser"] = "thirtieth"
     sheet: int | str = 0
 
     @field_validator("sheet", mode="before")
@@ -81,6 +83,7 @@ class PartsTable(StrictTable):
     """Whose program and responder are run, and which cell of a notebook is the program."""
 
     program: str = Field(default="student", min_length=1)
+    second_program: str = Field(default="student", min_length=1)
     responder: str = Field(default="student", min_length=1)
     cell: str | int = "last"
 
@@ -96,13 +99,33 @@ class PartsTable(StrictTable):
 
 
 class ChannelTable(StrictTable):
-    """What becomes of messages on their way: delays in seconds, the rest as probabilities."""
+    """What becomes of messages on their way: delays in seconds, shares as probabilities, an infrared link in mm."""
+
+    link: Literal["cable", "infrared", "between robots"] = "cable"
+    beacon: Annotated[tuple[float, float], Shape("[x, y]")] | None = None
+    range: float = Field(default=600.0, gt=0, le=5000)
+    facing: float = Field(default=90.0, gt=0, le=360)
+    blocked_by: Literal["obstacles", "nothing"] = "obstacles"
 
     delay: float = Field(default=0.1, ge=0, le=60)
     jitter: float = Field(default=0.0, ge=0, le=60)
     loss: float = Field(default=0.0, ge=0, le=1)
     duplication: float = Field(default=0.0, ge=0, le=1)
     reordering: float = Field(default=0.0, ge=0, le=1)
+    corruption: float = Field(default=0.0, ge=0, le=1)
+
+    @model_validator(mode="after")
+    def _reaches(self) -> Self:
+        needless = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
+        if self.link == "cable" and needless:
+            raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
+        if self.link == "between robots" and self.beacon is not None:
+            raise ValueError("has a beacon, but the robots are each other's, expected none beside this link")
+        if self.link == "infrared" and self.beacon is None:
+            raise ValueError('has link = "infrared" and nothing at its other end, expected beacon = [x, y] beside it')
+        if self.beacon is not None and not (0 < self.beacon[0] < WIDTH and 0 < self.beacon[1] < HEIGHT):
+            raise ValueError(f"has its beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
+        return self
 
 
 class SweepTable(StrictTable):
@@ -131,6 +154,7 @@ class ScenarioTable(StrictTable):
     id: str = Slug
     title: str = Field(default="", max_length=200)
     poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
+    second_poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
@@ -141,7 +165,7 @@ class ScenarioTable(StrictTable):
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
-    @field_validator("poses", mode="before")
+    @field_validator("poses", "second_poses", mode="before")
     @classmethod
     def _list_of_poses(cls, value: object) -> object:
         if isinstance(value, list) and value and all(isinstance(entry, int | float) for entry in value):
@@ -290,8 +314,10 @@ def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     if kind in _TYPES:
         return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
     if kind == "literal_error":
-        choices = str(context.get("expected", "")).replace("'", '"')
-        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}")
+        choices = str(context.get("expected", ""))
+        hint = did_you_mean(str(details["input"]), re.findall("'(.*?)'", choices))
+        choices = choices.replace("'", '"')
+        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}{hint}")
     bounds = {"greater_than": ("gt", "more than"), "greater_than_equal": ("ge", "at least")}
     bounds |= {"less_than": ("lt", "less than"), "less_than_equal": ("le", "at most")}
     if kind in bounds:

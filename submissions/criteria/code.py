@@ -61,6 +61,11 @@ class SourceRules(Criterion):
 
     judges_runs: ClassVar[bool] = False
 
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The one that it reads."""
+        return frozenset({self.part})
+
     @field_validator("flags")
     @classmethod
     def _known_flags(cls, value: Texts) -> Texts:
@@ -136,6 +141,11 @@ class Functions(Criterion):
 
     judges_runs: ClassVar[bool] = False
 
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The one whose functions it calls."""
+        return frozenset({"responder"})
+
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """The responder whose functions it calls has to be there."""
         yield from _without("check", "responder", around)
@@ -163,6 +173,7 @@ class PythonCheck(Criterion):
     """
 
     check: Literal["python"]
+    measures: ClassVar[Texts] = ("...",)
     file: Annotated[str, HOLDS_ANSWERS] = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
 
     @property

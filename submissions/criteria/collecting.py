@@ -5,11 +5,11 @@ What a single log has to hold is asked in ``logged.py``.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 
 
 class Collects(Criterion):
@@ -28,6 +28,7 @@ class Collects(Criterion):
     """
 
     check: Literal["collects"]
+    measures: ClassVar[Texts] = ("pairs", "usable", "duplicates", "different: ...")
     source: Literal["log", "sent"] = "log"
     each: int = Field(default=1, ge=1, le=10_000)
     classes: tuple[str, ...] = ()

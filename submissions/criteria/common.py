@@ -5,6 +5,7 @@ No kind of criterion is here; each has a module of its family.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -52,6 +53,8 @@ class Surroundings:
     scenarios: Sequence[Scenario] = ()
     ground: Floor | None = None
     without: frozenset[str] = frozenset()  # the parts, program and responder, that nobody writes
+    agents: frozenset[str] = frozenset()
+    robots: int = 1
     files: Mapping[str, bytes] = field(default_factory=dict)
     aliases: Mapping[str, Texts] = field(default_factory=dict)
     criteria: Sequence[Criterion] = ()
@@ -82,12 +85,15 @@ class Criterion(StrictTable):
     title: str = Field(min_length=1, max_length=200)
     marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
     scenarios: SomeTexts = ()
+    robot: Literal[1, 2] = 1  # which one it looks at, where there are two
     #: how the trials become marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
     #: Whether it looks at runs of the robot; else at the code alone.
     judges_runs: ClassVar[bool] = True
+    #: The figures that it measures in a trial, by name; # stands for a number from 1, ... for any words.
+    measures: ClassVar[Texts] = ()
 
     @property
     def asks_responder(self) -> bool:
@@ -95,9 +101,26 @@ class Criterion(StrictTable):
         return False
 
     @property
+    def questions(self) -> Texts:
+        """The texts for a responder by whose answers alone it judges; without any it looks at the robot as well."""
+        return ()
+
+    @property
+    def parts_needed(self) -> frozenset[str]:
+        """The parts without which there is nothing to look at."""
+        if self.questions:
+            return frozenset({"responder"})
+        return frozenset({"program", "responder"} if self.asks_responder else {"program"})
+
+    @property
     def result_needed(self) -> str | None:
         """The id of the criterion that has to be judged before it."""
         return None
+
+    def measures_a(self, name: str) -> bool:
+        """Whether it measures a figure of this name."""
+        known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
+        return any(re.fullmatch(each, name) for each in known)
 
     @property
     def python_files(self) -> Texts:
@@ -111,3 +134,15 @@ class Criterion(StrictTable):
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """All that it asks and that is not there."""
         yield from ()
+
+
+class AmongMany(Criterion):
+    """One that looks for something among all that a program prints, says, sends or logs.
+
+    Whoever names everything has named what is looked for as well, so strays count: a thing that is looked for and came
+    where it does not belong is one, twenty other things of its sort are another. ``strays`` is how many cost nothing,
+    as many as things are looked for if not given; each further one lowers the score like one more thing that was
+    looked for and did not come.
+    """
+
+    strays: int | None = Field(default=None, ge=0)

@@ -5,11 +5,11 @@ Only what is asked; finding the legs in the path is the service's.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
 
 
@@ -25,6 +25,7 @@ class Drawing(Criterion):
     """
 
     check: Literal["drawing"]
+    measures: ClassVar[Texts] = ("legs", "leg #", "corner #", "from start to end")
     legs: int = Field(ge=1)
     figures: int = Field(default=1, ge=1)
     at_least: bool = False

@@ -5,11 +5,11 @@ What happened on the way there is asked in the other modules.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Area, Zone
 
 
@@ -21,6 +21,7 @@ class Finishes(Criterion):
     """
 
     check: Literal["finishes"]
+    measures: ClassVar[Texts] = ("time",)
     seconds: float | None = Field(default=None, gt=0)
 
 
@@ -33,6 +34,7 @@ class EndPose(Criterion):
     """
 
     check: Literal["pose"]
+    measures: ClassVar[Texts] = ("end x", "end y", "end heading", "time", "displacement", "bearing")
     x: float | None = None
     y: float | None = None
     tolerance: float = Field(default=20.0, ge=0)

@@ -5,11 +5,11 @@ Only what is asked; a line is described as ``places.py`` has it.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import LineToFollow, Part, Range
 from submissions.strict_table import Shape
 
@@ -24,6 +24,7 @@ class Follows(Criterion):
     """
 
     check: Literal["follows"]
+    measures: ClassVar[Texts] = ("share covered", "farthest off", "mean off", "seconds to the end", "share on one side")
     line: LineToFollow
     within: float = Field(default=50.0, gt=0)
     covers: float = Field(default=0.9, gt=0, le=1)
@@ -47,6 +48,7 @@ class Laps(Criterion):
     """
 
     check: Literal["laps"]
+    measures: ClassVar[Texts] = ("lap time", "laps", "farthest off", "part of a lap")
     line: LineToFollow
     start_line: Annotated[tuple[float, float, float, float], Shape("[x1, y1, x2, y2]")]
     laps: int = Field(default=1, ge=1)

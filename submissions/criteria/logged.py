@@ -6,18 +6,18 @@ Logs are what ``print("Light_left: 42")`` and ``print("image_data both")`` leave
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import AmongMany, Criterion, Texts
 from submissions.criteria.places import Range
 
 #: What a series may be a log of.
 Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
 
 
-class Datalog(Criterion):
+class Datalog(AmongMany):
     """A series of the datalog, by its name (``Light_left``), has what it should; all that is given must hold.
 
     ``at_least`` and ``at_most`` count its samples. ``plateaus`` are values that it must keep for
@@ -31,6 +31,7 @@ class Datalog(Criterion):
     """
 
     check: Literal["datalog"]
+    measures: ClassVar[Texts] = ("samples", "made up", "least", "most")
     series: str = Field(min_length=1, max_length=40)
     at_least: int = Field(default=1, ge=0)
     at_most: int | None = Field(default=None, ge=0)
@@ -55,21 +56,30 @@ class Datalog(Criterion):
 class ImageLog(Criterion):
     """The images that the program logs with ``image_data left``, ``right`` or ``both``.
 
-    ``left`` and ``right`` are how many there must be of each sensor. ``at_start`` asks that each shows what
+    ``left`` and ``right`` are how many there must be of each sensor, ``left_at_least`` and ``right_at_least`` how many
+    or more. ``at_start`` asks that each shows what
     the sensor sees from the pose that the scenario starts at; ``pairs`` that left and right take turns,
     left first; ``uniform`` names the sensor whose images must be of one colour, as a label patch is, and show one
     where the floor has them.
     """
 
     check: Literal["image_log"]
+    measures: ClassVar[Texts] = ("images",)
     left: int | None = Field(default=None, ge=0)
     right: int | None = Field(default=None, ge=0)
+    left_at_least: int = Field(default=0, ge=0)
+    right_at_least: int = Field(default=0, ge=0)
     at_start: bool = False
     pairs: bool = False
     uniform: Literal["left", "right"] | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self.left is None and self.right is None and not (self.at_start or self.pairs or self.uniform):
-            raise ValueError("asks for nothing, expected left, right, at_start, pairs or uniform")
+        counts = self.left is not None or self.right is not None or self.left_at_least or self.right_at_least
+        if not (counts or self.at_start or self.pairs or self.uniform):
+            raise ValueError(
+                "asks for nothing, expected left, right, left_at_least, right_at_least, at_start, pairs or uniform"
+            )
+        if (self.left is not None and self.left_at_least) or (self.right is not None and self.right_at_least):
+            raise ValueError("has a number of images beside at_least, expected one or the other for each sensor")
         return self

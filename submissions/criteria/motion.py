@@ -5,11 +5,11 @@ Only what is asked; where on the floor it goes is asked in ``path.py`` and ``lin
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
 from submissions.strict_table import StrictTable
 
@@ -60,6 +60,14 @@ class Displacement(AskedMotion, Criterion):
     """
 
     check: Literal["displacement"]
+    measures: ClassVar[Texts] = (
+        "displacement",
+        "displacement forward",
+        "displacement sideways",
+        "heading change",
+        "left wheel",
+        "right wheel",
+    )
     left_wheel: Range | None = None
     right_wheel: Range | None = None
     agrees_with_wheels: float | None = Field(default=None, gt=0, le=1)
@@ -76,13 +84,22 @@ class Displacement(AskedMotion, Criterion):
 
 
 class Moves(Criterion):
-    """The run move by move. A move ends where the robot stands still, or where driving straight and turning meet.
+    """The run move by move.
 
+    A move ends where the robot stands still, or where two ways of moving meet: straight on, straight back, turning
+    left, turning right.
     ``moves`` lists what must be among them, in that order (``in_order = false``: in any order);
     ``only`` allows no others.
     """
 
     check: Literal["moves"]
+    measures: ClassVar[Texts] = (
+        "move # forward",
+        "move # sideways",
+        "move # distance",
+        "move # turn",
+        "move # seconds",
+    )
     moves: tuple[NamedMotion, ...] = Field(min_length=1)
     in_order: bool = True
     only: bool = False
@@ -97,6 +114,7 @@ class Excursions(Criterion):
     """
 
     check: Literal["excursions"]
+    measures: ClassVar[Texts] = ("peak #", "return #")
     heights: tuple[float, ...] = Field(min_length=1)
     tolerance: float = Field(default=0.1, gt=0, lt=1)
     at_least: float = Field(default=50.0, gt=0)
@@ -119,6 +137,7 @@ class Encounters(Criterion):
     """
 
     check: Literal["encounters"]
+    measures: ClassVar[Texts] = ("encounters", "answered")
     light: Literal["left", "right", "either"] = "left"
     below: float = Field(gt=0, le=100)
     then: tuple[Literal["reverse", "turn", "stop"], ...] = ("reverse", "turn")

@@ -5,11 +5,11 @@ Lines to follow are ``line.py``'s, drawings ``drawing.py``'s, points to keep to 
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Area, Part
 
 
@@ -21,6 +21,7 @@ class Visits(Criterion):
     """
 
     check: Literal["visits"]
+    measures: ClassVar[Texts] = ("places visited",)
     places: tuple[Area, ...] = Field(min_length=1)
     in_order: bool = True
     at_least: int | None = Field(default=None, ge=1)
@@ -41,20 +42,23 @@ class StaysInside(Criterion):
     """
 
     check: Literal["stays_inside"]
+    measures: ClassVar[Texts] = ("farthest out", "least x", "greatest x", "least y", "greatest y")
     areas: tuple[Area, ...] = Field(min_length=1)
     of: Part = "robot"
     drives: float = Field(default=0.0, ge=0)
 
 
 class KeepsOut(Criterion):
-    """At no time is ``of`` in any of the areas.
+    """At no time is ``of`` in any of the areas, nor nearer to one than ``clear_of`` mm.
 
     ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
     """
 
     check: Literal["keeps_out"]
+    measures: ClassVar[Texts] = ("least clearance", "least x", "greatest x", "least y", "greatest y")
     areas: tuple[Area, ...] = Field(min_length=1)
     of: Part = "robot"
+    clear_of: float = Field(default=0.0, ge=0)
     drives: float = Field(default=0.0, ge=0)
 
 
@@ -62,4 +66,5 @@ class TouchesNothing(Criterion):
     """The robot's body touches no wall and no obstacle; ``at_most`` touches are forgiven."""
 
     check: Literal["touches_nothing"]
+    measures: ClassVar[Texts] = ("touches",)
     at_most: int = Field(default=0, ge=0)

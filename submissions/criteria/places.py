@@ -39,13 +39,17 @@ Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), 
 
 
 class Area(StrictTable):
-    """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback."""
+    """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback.
+
+    With ``outside`` it is all that lies outside of that shape.
+    """
 
     name: str = Field(default="", max_length=80)
     rectangle: Annotated[tuple[float, float, float, float], Shape("[left, bottom, right, top]")] | None = None
     circle: Annotated[tuple[float, float, float], Shape("[x, y, radius]")] | None = None
     polygon: tuple[Point, ...] | None = None  # corners
     bar: Annotated[tuple[float, float, float, float, float], Shape("[x1, y1, x2, y2, radius]")] | None = None
+    outside: bool = False
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -64,7 +68,10 @@ class Area(StrictTable):
         return self
 
     def __str__(self) -> str:
-        """``the red circle``, or the shape with its figures."""
+        """``the red circle``, ``the outside of the red circle``, or the shape with its figures."""
+        return f"the outside of {self._shape()}" if self.outside else self._shape()
+
+    def _shape(self) -> str:
         if self.name:
             return self.name
         if self.rectangle is not None:

@@ -5,11 +5,11 @@ Places to come through or to keep out of are asked in ``path.py``.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
 
 
@@ -21,6 +21,7 @@ class Closest(Criterion):
     """
 
     check: Literal["closest"]
+    measures: ClassVar[Texts] = ("least distance", "straight on")
     x: float
     y: float
     distance: Range | None = None
@@ -43,6 +44,7 @@ class Circuits(Criterion):
     """
 
     check: Literal["circuits"]
+    measures: ClassVar[Texts] = ("times round", "gyro in round #", "corners in round #")
     x: float
     y: float
     times: Range
@@ -67,6 +69,7 @@ class Spread(Criterion):
     """
 
     check: Literal["spread"]
+    measures: ClassVar[Texts] = ("distance from the target",)
     x: float
     y: float
     within: float | None = Field(default=None, gt=0)

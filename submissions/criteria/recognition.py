@@ -6,6 +6,7 @@ What that is worth is asked in ``classification.py`` and ``robustness.py``; find
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -13,6 +14,11 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from sim.errors import UsageError
 from submissions.assignment.truth_file import LabelledPlace, read_places
 from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Criterion, Misfit, Surroundings, TextOrTexts
+
+#: A grey level of a patch.
+Grey = Annotated[int, Field(ge=0, le=255)]
+#: Patches whose greys are nearer to one another than this cannot be told apart.
+_GREYS_APART = 6
 
 
 class Recognition(Criterion):
@@ -22,7 +28,8 @@ class Recognition(Criterion):
     the image was taken), ``"grey"`` (the label patch in the right sensor's image, decoded as the course
     does), ``"places"`` (the instructor's own: ``places`` is a list of [x, y, label] or a CSV file of such rows
     beside the assignment, and counts where the left sensor's middle is ``within`` so many mm of it), or a
-    list, one label for each pose of the scenario.
+    list, one label for each pose of the scenario. On an image of the instructor's own ``greys`` says what the label
+    patches stand for: ``"shapes"`` or ``"digits"`` as in the course, or the grey level of each label.
 
     The answer is looked for in the reply to the image, at ``answer`` in its JSON if there is such a place,
     else in the reply's text; with ``answer_from`` in what the robot said or printed between this image and
@@ -41,6 +48,7 @@ class Recognition(Criterion):
     """
 
     truth: Annotated[Literal["label", "grey", "places"] | tuple[str, ...], NOT_EMPTY] = "label"
+    greys: Literal["shapes", "digits"] | dict[str, Grey] = Field(default_factory=dict)
     places: Annotated[str | tuple[LabelledPlace, ...], HOLDS_ANSWERS] = ()
     within: float = Field(default=10.0, gt=0, le=500)
     answer: str | None = Field(default=None, min_length=1)
@@ -100,11 +108,14 @@ class Recognition(Criterion):
                         f"truth has {len(self.truth)} labels for the {len(scenario.poses)} poses of scenario "
                         f'"{scenario.id}", expected one label for each pose',
                     )
+        elif self.greys:
+            return
         elif self.truth != "places" and ground is not None and not ground.labels:
+            greys = ' greys = "shapes", "digits" or { label = grey level } beside it,' if self.truth == "grey" else ""
             yield Misfit(
                 "truth",
                 f'truth is "{self.truth}", but {ground.name} has no labels, '
-                "expected a list with one label for each pose, or places",
+                f"expected{greys} a list with one label for each pose, or places",
             )
         elif self.truth == "grey" and ground is not None and not ground.label_patches:
             yield Misfit(
@@ -116,6 +127,11 @@ class Recognition(Criterion):
     def _fits(self) -> Self:
         if (self.truth == "places") != bool(self.places):
             raise ValueError('needs truth = "places" and places together, expected both or neither')
+        if self.greys and self.truth != "grey":
+            raise ValueError('has greys without truth = "grey", expected both or neither')
+        levels = sorted(self.greys.values()) if isinstance(self.greys, dict) else []
+        if any(after - before < _GREYS_APART for before, after in pairwise(levels)):
+            raise ValueError(f"has greys that are hard to tell apart, expected them {_GREYS_APART} or more apart")
         if self.patterns and self.each_pattern is None:
             raise ValueError('has patterns without each_pattern, expected each_pattern = "majority" or the like')
         if self.each_pattern is not None and (self.images != "all" or isinstance(self.truth, tuple)):

@@ -9,11 +9,12 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import SomeTextOrTexts
+from submissions.criteria.asking import BetweenAgents
+from submissions.criteria.common import SomeTextOrTexts, Texts
 from submissions.criteria.texts import TextConditions
 
 
-class Replies(TextConditions):
+class Replies(BetweenAgents, TextConditions):
     """What the responder answers, arrived in time or not.
 
     ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so.
@@ -37,12 +38,21 @@ class Replies(TextConditions):
         """True: nothing else is looked at."""
         return True
 
+    @property
+    def questions(self) -> Texts:
+        """Those of ``expect``, unless it is agents that ask."""
+        return () if self.agents else tuple(self.expect)
+
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.value is not None and self.path is None:
             raise ValueError('has value without path, expected path = "message" or the like beside it')
         if self.expect and (self.to or self.to_starts_with or self.has_conditions or self.value is not None):
             raise ValueError("has expect beside other conditions, expected expect alone (with path and ignore_case)")
-        if self.path is None and any(not isinstance(answer, str) for answer in self.expect.values()):
+        if (
+            self.path is None
+            and not self.agents
+            and any(not isinstance(answer, str) for answer in self.expect.values())
+        ):
             raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
         return self

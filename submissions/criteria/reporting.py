@@ -1,23 +1,23 @@
 """Criteria about what a program reports: the right figures, in the right order, at the right place.
 
-Single texts and how often they come are asked in ``texts.py``.
+Single texts and how often they come are asked in ``texts.py``, words one after the other in ``sequence.py``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, field_serializer, field_validator, model_validator
+from pydantic import Field, field_serializer, field_validator
 
-from submissions.criteria.common import Criterion, Misfit, NotBlank, Surroundings, TextOrTexts, Texts, one_or_many
+from submissions.criteria.common import AmongMany, Misfit, NotBlank, Surroundings, TextOrTexts, Texts
 from submissions.criteria.places import Zone
 from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
 
 
-class Reports(Criterion):
+class Reports(AmongMany):
     """Printed, said or answered figures and words are those that belong to the pose.
 
     ``expected`` has a list for each pose of the scenario, or a single one for all poses; each entry, a number
@@ -30,11 +30,17 @@ class Reports(Criterion):
     """
 
     check: Literal["reports"]
+    measures: ClassVar[Texts] = ("reported #",)
     source: Literal["print", "speech", "either", "reply"] = "either"
     expected: Literal["label"] | tuple[tuple[float | str, ...], ...]
     tolerance: float = Field(default=0.5, ge=0)
     among: Annotated[Texts, NotBlank] = ()
     only: bool = False
+
+    @property
+    def asks_responder(self) -> bool:
+        """Whether it looks at answers alone."""
+        return self.source == "reply"
 
     @field_validator("expected", mode="plain")
     @classmethod
@@ -66,42 +72,6 @@ class Reports(Criterion):
         return value if isinstance(value, str) else [list(row) for row in value]
 
 
-class WordSequence(Criterion):
-    """Words come one after the other, however they are spread over what is said or printed.
-
-    ``words`` are compared without regard to case and punctuation; one in a list of its own may be any of that
-    list: ``["T", ["M", "em"], "1"]``. Number words count as numbers ("ten" is 10). Before them, other words
-    may come with ``lead_in``; nothing may come between them, and after them only with ``more``. "TM" is one
-    word, "T M" are two. ``waits`` asks that none is said before the one before has been spoken to its end.
-    """
-
-    check: Literal["sequence"]
-    source: Literal["print", "speech"] = "speech"
-    words: tuple[Texts, ...] = Field(min_length=1)
-    lead_in: bool = False
-    more: bool = False
-    waits: bool = False
-
-    @field_validator("words", mode="before")
-    @classmethod
-    def _alternatives(cls, value: Any) -> Any:
-        return tuple(one_or_many(word) for word in value) if isinstance(value, list | tuple) else value
-
-    @field_validator("words")
-    @classmethod
-    def _some_word(cls, value: tuple[Texts, ...]) -> tuple[Texts, ...]:
-        for words in value:
-            if not words or not all(any(c.isalnum() for c in word) for word in words):
-                raise ValueError("has an entry without a letter or digit, expected words to look for")
-        return value
-
-    @model_validator(mode="after")
-    def _waits_for_speech(self) -> Self:
-        if self.waits and self.source != "speech":
-            raise ValueError('has waits with source = "print", expected it with speech')
-        return self
-
-
 class EventAt(StrictTable):
     """A text, and the zone that the sensor must be in when it comes."""
 
@@ -109,7 +79,7 @@ class EventAt(StrictTable):
     zone: Zone
 
 
-class Events(Criterion):
+class Events(AmongMany):
     """Each text is said or printed, in this order, while the sensor is where it belongs.
 
     ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``; a text is found anywhere in
@@ -119,6 +89,7 @@ class Events(Criterion):
     """
 
     check: Literal["events"]
+    measures: ClassVar[Texts] = ("x at ...",)
     source: Source = "either"
     sensor: Literal["left", "right", "middle"] = "left"
     events: tuple[EventAt, ...] = Field(min_length=1)

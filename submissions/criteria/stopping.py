@@ -5,11 +5,11 @@ Where the robot itself ends is ``ending.py``'s.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion
+from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range, Zone
 
 
@@ -26,6 +26,7 @@ class StopOn(Criterion):
     """
 
     check: Literal["stop_on"]
+    measures: ClassVar[Texts] = ("end x", "end y", "sensor x", "sensor y", "reading", "time")
     sensor: Literal["left", "right", "either"] = "left"
     reflected: Range | None = None
     rgb: tuple[float, float, float] | None = None

@@ -9,7 +9,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.common import Criterion, NotBlank, SomeTextOrTexts, SomeTexts
+from submissions.criteria.asking import BetweenAgents
+from submissions.criteria.common import AmongMany, Criterion, NotBlank, SomeTextOrTexts, SomeTexts
 from submissions.criteria.expressions import usable
 
 
@@ -19,6 +20,7 @@ class TextConditions(Criterion):
     equals: SomeTextOrTexts = ()  # the text is one of these
     starts_with: Annotated[SomeTextOrTexts, NotBlank] = ()  # begins with one of these
     contains: Annotated[SomeTextOrTexts, NotBlank] = ()  # has all of these in it
+    among: Annotated[SomeTextOrTexts, NotBlank] = ()  # has one of these words in it, and no other of them
     matches: str | None = None  # a regular expression that RE2 takes, found anywhere in the text
     ignore_case: bool = False
 
@@ -30,10 +32,10 @@ class TextConditions(Criterion):
     @property
     def has_conditions(self) -> bool:
         """Whether it asks anything of a single text."""
-        return bool(self.equals or self.starts_with or self.contains or self.matches is not None)
+        return bool(self.equals or self.starts_with or self.contains or self.among or self.matches is not None)
 
 
-class TextSequence(TextConditions):
+class TextSequence(TextConditions, AmongMany):
     """How many texts must count, and in which order.
 
     Without a count at least one must; with ``in_order`` the listed texts must come in that order among
@@ -54,7 +56,7 @@ class TextSequence(TextConditions):
         counted = (self.at_least, self.at_most, self.exactly) != (None, None, None)
         if not (self.has_conditions or self.in_order or counted or self._asks_more()):
             raise ValueError(
-                "asks for nothing, expected one of equals, contains, starts_with, matches, in_order, "
+                "asks for nothing, expected one of equals, contains, starts_with, matches, among, in_order, "
                 "at_least, at_most, exactly"
             )
         if self.exactly is not None and (self.at_least is not None or self.at_most is not None):
@@ -70,7 +72,7 @@ class TextSequence(TextConditions):
             raise ValueError("has last beside a count, expected one or the other")
         if self.last and not self.has_conditions:
             raise ValueError(
-                "has last without a condition, expected equals, contains, starts_with or matches beside it"
+                "has last without a condition, expected equals, contains, starts_with, matches or among beside it"
             )
         if self.only and not self.in_order:
             raise ValueError("has only without in_order, expected the texts in order")
@@ -98,7 +100,7 @@ class Says(TextSequence):
     check: Literal["says"]
 
 
-class Messages(TextSequence):
+class Messages(BetweenAgents, TextSequence):
     """What the robot sends to the responder: texts like ``PY::0``; an image is the text ``IMG_DATA::...``.
 
     With ``json = true`` it is, instead, the robot's queue that is looked at: every answer that began with

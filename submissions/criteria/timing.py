@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion, Misfit, Surroundings
+from submissions.assignment.schema import did_you_mean, listed
+from submissions.criteria.common import Criterion, Misfit, Surroundings, Texts
 from submissions.criteria.places import Range
 from submissions.strict_table import Shape
 
@@ -24,6 +25,7 @@ class Timing(Criterion):
     """
 
     check: Literal["timing"]
+    measures: ClassVar[Texts] = ("time",)
     of: Literal["program", "moving", "speech"] = "program"
     between: Range
 
@@ -51,8 +53,18 @@ class Ranking(Criterion):
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """The criterion that is ranked has to be there, and to need no other's result itself."""
         # What is itself judged after another is judged too late to be ranked.
-        if self.of not in {each.id for each in around.criteria if each.result_needed is None}:
-            yield Misfit("of", f'of is "{self.of[:60]}", expected the id of another criterion')
+        others = {each.id: each for each in around.criteria if each.result_needed is None}
+        if self.of not in others:
+            hint = did_you_mean(self.of, others)
+            yield Misfit("of", f'of is "{self.of[:60]}", expected the id of another criterion{hint}')
+        elif not others[self.of].measures_a(self.measure):
+            known = others[self.of].measures
+            figures = f"one of {listed(known)}{did_you_mean(self.measure, known)}" if known else "one that has figures"
+            yield Misfit(
+                "measure",
+                f'measure is "{self.measure}", which "{self.of}" ({others[self.of].check}) does not measure, '
+                f"expected {figures}",
+            )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -32,7 +32,8 @@ from submissions.assignment.schema import (
     WorldTable,
     read_table,
 )
-from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria import SCHEMAS
+from submissions.criteria.common import AmongMany
 
 EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
@@ -41,7 +42,7 @@ SECTIONS = dict(
     re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", (ROOT / "docs" / "criteria.md").read_text(), re.DOTALL | re.MULTILINE)
 )
 #: Kinds whose settings are explained with another kind.
-SHARES = {"says": ("prints",), "messages": ("prints",), "replies": ("prints",)}
+SHARES = dict.fromkeys(("says", "messages", "replies", "resends", "in_reach"), ("prints",))
 
 
 def commands(document: Path) -> Iterator[list[str]]:
@@ -65,6 +66,9 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")
     shutil.copytree(EXAMPLE, tmp_path / "submissions" / "ada")
     shutil.copy(MESSAGING, tmp_path)
+    (tmp_path / "my-robots").mkdir()
+    (tmp_path / "my-robots" / "robot.py").write_text("print('PY::hello')\n")
+    (tmp_path / "my-robots" / "robot2.py").write_text("%%sim_magic_preloaded -x 1500 -y 500 -a 180\n")
     environment = os.environ | {"ROBOMARK_HOME": str(tmp_path / "home")}
     ids: dict[str, str] = {}
     for words in commands(document):
@@ -130,11 +134,25 @@ def test_every_kind_of_criterion_has_a_section_with_an_example_that_is_in_order(
         assert isinstance(read_table(SCHEMAS[kind], table), SCHEMAS[kind])
 
 
+def test_all_that_can_be_measured_is_listed_and_nothing_else() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (`.*`) \|$", SECTIONS["ranking"], re.MULTILINE)
+    listed = {kind: tuple(re.findall(r"`(.+?)`", names)) for kind, names in rows}
+    assert listed == {kind: schema.measures for kind, schema in SCHEMAS.items() if schema.measures}
+
+
+def test_every_kind_that_looks_among_much_is_named_with_its_strays() -> None:
+    text = re.search(r"^## Naming everything.*?(?=^## )", (ROOT / "docs" / "criteria.md").read_text(), re.M | re.S)
+    assert text is not None
+    assert [
+        kind for kind, schema in SCHEMAS.items() if issubclass(schema, AmongMany) and f"`{kind}`" not in text[0]
+    ] == []
+
+
 @pytest.mark.parametrize("kind", sorted(SCHEMAS))
 def test_every_setting_of_a_criterion_is_explained(kind: str) -> None:
     text = SECTIONS[kind] + "".join(SECTIONS[other] for other in SHARES.get(kind, ()))
     fields = SCHEMAS[kind].model_fields.items()
-    settings = {field.alias or name for name, field in fields if name not in Criterion.model_fields}
+    settings = {field.alias or name for name, field in fields if name not in AmongMany.model_fields}
     assert not {name for name in settings - {"check"} if not re.search(rf"\b{name}\b", text)}
 
 

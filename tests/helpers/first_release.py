@@ -18,7 +18,7 @@ from service.store.models import Base
 
 REVISION = "0002"
 #: What columns of then are called today.
-_TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions"}
+_TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions", "problems": "refusals"}
 _SQL = DATA / "first_release.sql"
 
 

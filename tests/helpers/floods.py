@@ -51,8 +51,8 @@ FLOODS = [
     _program("messages to nobody", '{"do":"print","text":"PY::"}'),
     _program("images that are sent", '{"do":"print","text":"IMG_DATA"}'),
     _program("images that are logged", '{"do":"print","text":"image_data both"}'),
-    _program("refusals", long('{"do":"refused","what":"@","line":1}')),
-    _program("refusals that differ in length", long('{"do":"refused","what":"@","line":null}', 1000)),
+    _program("refusals", long('{"do":"refused","what":"@","line":1,"file":null}')),
+    _program("refusals that differ in length", long('{"do":"refused","what":"@","line":null,"file":null}', 1000)),
     _program(
         "padded waits", '{"do":"wait",@"units":0}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
     ),
@@ -61,12 +61,12 @@ FLOODS = [
     ),
     _responder("lines of a responder", long('{"do":"print","text":"@"}')),
     _responder("calls", CALL),
-    _responder("refusals of a responder", long('{"do":"refused","what":"@","line":1}')),
+    _responder("refusals of a responder", long('{"do":"refused","what":"@","line":1,"file":null}')),
     _responder("naps", '{"do":"sleep","units":0}', Verdict.CPU_LIMIT, Verdict.STALLED),
     Flood("long answers", NOISY, f"def responder(text): return {BIG!r}"),
     Flood("answers of a long type", NOISY, f"long = type({BIG!r}, (), {{}})\ndef responder(text): return long()"),
     Flood("errors with long words", NOISY, f"{FIND_WIRE}def responder(text):\n    "
-        + forged(long('{"do":"answer","kind":"error","error":{"type":"@","text":"@","line":1}}', 30_000))
+        + forged(long('{"do":"answer","kind":"error","error":{"type":"@","text":"@","line":1,"file":null}}', 30_000))
         + "\n    line._sent += 1\n    line.send = lambda frame: None\n    raise ValueError"),
     Flood("answers that are many objects", NOISY, f"def responder(text): return {DEEP_LIST!r}"),
     Flood("short answers", NOISY, "def responder(text): return ''"),

@@ -178,6 +178,17 @@ def swept_grade() -> Grade:
     return replace(grade, trials=trials, criteria=(result, *grade.criteria[1:]))
 
 
+#: What a channel can do to messages.
+ASTRAY = (
+    Message(0.1, "robot", "PY::0", None, None, "lost", "chance"),
+    Message(0.2, "robot", "PY::0", None, None, "lost", "out of range", 1600.2, 3.0),
+    Message(0.3, "robot", "PY::0", None, None, "lost", "facing away", 300.0, -90.4),
+    Message(0.4, "robot", "PY::0", None, None, "lost", "blocked", 300.0, 0.0),
+    Message(0.5, "robot", "PY::0", 0.5, None, "duplicated", arrived_as="PY::7"),
+    Message(0.6, "responder", "saw 7", None, 4, "lost", "facing away", 300.0, 120.0),
+)
+
+
 def faulty_grade() -> Grade:
     """The program fails in line 3, after one message whose answer is lost and one that nobody answers."""
     recording = line_follower_recording(45)
@@ -207,6 +218,13 @@ def faulty_grade() -> Grade:
                             evidence=(Evidence(1, False, ""), Evidence(2, False, ""))),
         ),
     )  # fmt: skip
+
+
+def astray_grade() -> Grade:
+    """As the faulty one, but for what the channel did."""
+    grade = faulty_grade()
+    talk = [replace(trial, recording=replace(trial.recording, messages=ASTRAY)) for trial in grade.trials[1:2]]
+    return replace(grade, trials=(grade.trials[0], *talk))
 
 
 def faulty_submission() -> Submission:

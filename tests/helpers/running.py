@@ -8,16 +8,21 @@ from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import Preamble, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, PartnerSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.floors import floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
-from sim.recording import Pose, Recording
+from sim.recording import TICK, Pose, Recording
 from sim.robot import robot
 from sim.world import Noise
 
 PROGRAM_LIMITS = ChildLimits(2.0, 128 << 20)
 RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
+
+
+def agent_spec(name: str, text: str, files: Mapping[str, bytes] | None, output_bytes: int) -> AgentSpec:
+    """A student's agent."""
+    return AgentSpec(Code(f"{name}.py", text), files or {}, RESPONDER_LIMITS, output_bytes)
 
 
 def run_program(
@@ -26,6 +31,7 @@ def run_program(
     start: Pose | None = None,
     *,
     responder: str | None = None,
+    agents: Mapping[str, str] | None = None,
     files: Mapping[str, bytes] | None = None,
     background: str = "Empty_Map",
     robot_name: str = "Default_Robot",
@@ -37,16 +43,29 @@ def run_program(
     seed: int = 1,
     output_bytes: int = 1_000_000,
     physics: Physics = COURSE_PHYSICS,
+    tick: int = TICK,
     meter: JobMeter | None = None,
+    second: str | None = None,
+    second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
+    given: bool = False,
+    program_limits: ChildLimits = PROGRAM_LIMITS,
+    child_seed: int | None = None,
 ) -> Recording:
-    """One trial; the start is the background's own unless given."""
+    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots.
+
+    ``given`` is whether the assignment brings that one.
+    """
     ground = floor(background)
+    partner = None
+    if second is not None:
+        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, program_limits, output_bytes)
+        partner = PartnerSpec(program_of_second, second_start, given=given)
     spec = TrialSpec(
-        program=ProgramSpec(Code("robot.py", program), preamble, PROGRAM_LIMITS, output_bytes),
+        program=ProgramSpec(Code("robot.py", program), preamble, program_limits, output_bytes),
         responder=None
         if responder is None
         else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
-        collaborative=responder is not None,
+        collaborative=responder is not None or second is not None,
         floor=ground,
         robot=robot(robot_name),
         pose=start or ground.default_pose,
@@ -54,7 +73,10 @@ def run_program(
         channel=channel,
         seconds=seconds,
         seed=seed,
-        child_seed=seed,
+        child_seed=seed if child_seed is None else child_seed,
         physics=physics,
+        tick=tick,
+        agents={name: agent_spec(name, text, files, output_bytes) for name, text in (agents or {}).items()},
+        partner=partner,
     )
     return runner.run(spec, obstacles, meter)

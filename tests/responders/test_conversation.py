@@ -6,6 +6,7 @@ import pytest
 
 from responders.channel import Channel
 from responders.conversation import Answer, Conversation
+from responders.link import Cable
 from sim.recording import SECOND, TICK, Fault, Verdict
 from sim.world import Chain
 
@@ -13,7 +14,7 @@ DELAY = SECOND // 10
 
 
 def conversation(**channel: float) -> Conversation:
-    return Conversation(Channel(**channel), 5, Chain())
+    return Conversation(Channel(**channel), 5, Chain(), Cable())
 
 
 def exchange(talk: Conversation, answer: Answer, now: int = 0) -> None:
@@ -78,8 +79,25 @@ def test_the_chain_tells_deliveries_apart() -> None:
     hashes = set()
     for until in (0, SECOND):
         chain = Chain()
-        talk = Conversation(Channel(), 5, chain)
+        talk = Conversation(Channel(), 5, chain, Cable())
         exchange(talk, Answer("JSON::1", entry="1"))
         talk.deliver(until)
         hashes.add(chain.hexdigest())
     assert len(hashes) == 2
+
+
+@pytest.mark.parametrize(
+    ("channel", "digest"),
+    [
+        ({"loss": 0.4}, "8b2ff904a5a83a0c"),
+        ({"loss": 0.2, "jitter": 0.4, "duplication": 0.4, "reordering": 0.3}, "c9831e6c34c9d0f4"),
+    ],
+)
+def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, float], digest: str) -> None:
+    """Recordings made before there was another link would have other hashes."""
+    chain = Chain()
+    talk = Conversation(Channel(**channel), 5, chain, Cable())
+    for number in range(200):
+        exchange(talk, Answer(f"JSON::{number}", entry=str(number)), number * SECOND // 4)
+        talk.deliver((number + 1) * SECOND // 4)
+    assert chain.hexdigest()[:16] == digest

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from command import COMMAND
 from hostile import FIND_WIRE, forged
 from processes import children, until
 from responders.bridge import Bridge
@@ -197,8 +198,8 @@ def test_what_the_machine_stumbles_over_is_not(
     [
         FIND_WIRE + forged('{"do":"motor","port":"outB","command":"run-to-rel-pos","position_sp":1e308}'),
         FIND_WIRE + forged('{"do":"motor","port":"outB","position":-1e308,"time_sp":1e308,"command":"run-timed"}'),
-        FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff\\\\u0000","line":10000000}}'),
-        FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null}'),
+        FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff","line":9,"file":null}}'),
+        FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null,"file":null}'),
         "print('Light_left: ' + '9' * 400 + ' 1e999')\nprint('Gyro: nan inf')",
         "print('\\ud800\\x00')\nprint('PY::\\ud800')",
         "raise Exception('\\ud800\\x00' * 1000)",
@@ -289,3 +290,26 @@ def test_honest_trials_sleep_next_to_nothing(runner: TrialRunner) -> None:
     for _ in range(5):
         run_program(runner, HONEST, responder=ECHO, meter=meter)
     assert meter.spent.sleep_seconds < 0.5
+
+
+@pytest.mark.long
+def test_a_worker_that_waits_for_a_processor_itself_calls_nobody_asleep(tmp_path: Path) -> None:
+    program = tmp_path / "robot.py"
+    program.write_text(
+        "from time import sleep\nwhile True:\n    colorLeft.reflected_light_intensity\n    sleep(0.01)\n"
+    )
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]
+    try:
+        ended = subprocess.run(
+            ["nice", "-n", "10", *COMMAND, "run", str(program), "--seconds", "30"],
+            capture_output=True,
+            text=True,
+            timeout=500,
+            check=False,
+        )
+    finally:
+        for each in busy:
+            each.kill()
+            each.wait()
+    assert ended.returncode == 0
+    assert "time_limit" in ended.stdout

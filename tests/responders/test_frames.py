@@ -70,11 +70,12 @@ def _one_of(*words: str) -> st.SearchStrategy[str]:
 
 #: After these nothing more is heard.
 _LAST = {"busy", "ready", "end", "stuck", "executed"}
-_ERROR = st.fixed_dictionaries({"type": _texts(), "text": _texts(), "line": st.none()})
+_ERROR = st.fixed_dictionaries({"type": _texts(), "text": _texts(), "line": st.none(), "file": st.none()})
 #: What fields hold that a schema allows; texts, where a field is not named here.
 _NAMED = {
     "read what": _one_of("left", "right", "gyro"),
     "line": _maybe(st.integers(0, 99)),
+    "file": _maybe(_one_of("helper.py")),
     "port": _one_of("outB", "outC"),
     "command": _one_of("run-forever", "run-timed", "run-to-rel-pos", "reset", ""),
     "state": _one_of("running", "still"),

@@ -88,6 +88,52 @@ def test_images_of_the_log(kit: Kit) -> None:
     assert kit.data.get_sensor_image_pair(kit.robo_sim.image_data()) is None
 
 
+def test_each_logged_image_is_taken_apart_once(kit: Kit, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken_apart = []
+    process = type(kit.robo_sim).process_raw_image_data
+
+    def counted(self: Any, raw_data: str, mode: str = "rgb", to_str: bool = True) -> Any:
+        taken_apart.append(raw_data)
+        return process(self, raw_data, mode, to_str)
+
+    monkeypatch.setattr(type(kit.robo_sim), "process_raw_image_data", counted)
+    for image in range(550):
+        kit.robo_sim.collect([], [f"left {image % 256},0,0,255 {image}"])
+        assert len(kit.robo_sim.image_data()) == image + 1
+    assert len(taken_apart) == 550
+    assert kit.robo_sim.image_data()["vals"].tolist() == [f"{image % 256},0,0" for image in range(550)]
+    assert kit.robo_sim.image_data(mode="greyscale")["vals"].tolist()[-1] == str(549 % 256)
+    # The list is the notebook's, too.
+    del kit.robo_sim.raw_image_data[1:]
+    assert kit.robo_sim.image_data()["clock"].tolist() == ["0"]
+
+
+def test_a_table_is_trimmed_with_its_names_or_without(kit: Kit) -> None:
+    table = kit.data.df_from_image(block(slice(2, 5), slice(3, 8)), show=False)
+    kept = kit.data.trim_image(table, background=255, show=False)
+    assert (kept.index.tolist(), kept.columns.tolist()) == ([2, 3, 4], [3, 4, 5, 6, 7])
+    anew = kit.data.trim_image(table, background=255, reindex=True, show=False, colorTheme="Reds")
+    assert (anew.index.tolist(), anew.columns.tolist()) == ([0, 1, 2], [0, 1, 2, 3, 4])
+    assert anew.to_numpy().tolist() == kept.to_numpy().tolist()
+    assert kit.data.trim_image(table, show=False, image=True).size == (5, 3)
+    assert kit.data.clear_columns(table).shape == (14, 11)
+    assert kit.data.clear_columns(table, reverse=True, transpose=True).shape == (5, 14)
+
+
+def test_a_progress_bar_counts_and_is_not_shown(kit: Kit, capsys: pytest.CaptureFixture[str]) -> None:
+    bars = importlib.import_module("nbev3devsim.tqdma")
+    bar = bars.tqdm([3, 4], desc="Two")
+    assert list(bar) == [3, 4]
+    assert (len(bar), bar.n, bar.total) == (2, 2, 2)
+    with bars.tqdm_notebook(total=10) as other:
+        other.update(4)
+        other.set_postfix(loss=1)
+    assert other.n == 4
+    assert list(bars.trange(2, 8, 3)) == [2, 5]
+    assert not bars.tqdm([])
+    assert capsys.readouterr().out == ""
+
+
 @pytest.mark.parametrize("code", range(6))
 def test_a_pair_is_the_shape_and_its_label(kit: Kit, code: int) -> None:
     left, right = kit.data.get_sensor_image_pair(log_shapes(kit), code)
@@ -276,8 +322,19 @@ def test_training_learns_rows_of_length_one(kit: Kit, capsys: pytest.CaptureFixt
     )
     assert "accuracy" in capsys.readouterr().out
     assert network.predict(kit.data.get_images_features(images[:2])).tolist() == [0, 4]
-    kit.views.test_and_report_random_images(network, images, labels, num_samples=3)
-    assert capsys.readouterr().out.count("MLP predicts") == 3
+    kit.views.test_and_report_random_images(network, kit.data.get_random_image, images, labels, num_samples=30)
+    report = capsys.readouterr().out
+    assert [line.split()[-1] for line in report.split("\n") if "accuracy" in line] == ["30"]
+
+
+def test_the_make_up_of_a_network_is_printed_and_given(kit: Kit, capsys: pytest.CaptureFixture[str]) -> None:
+    network = MLPClassifier((3,), random_state=1).partial_fit([[0, 1], [1, 0]], [0, 1], classes=[0, 1])
+    assert kit.views.network_structure(network, show=True, weights=True) is None
+    assert "Number of input features: 2" in capsys.readouterr().out
+    assert kit.views.network_structure(network, report=False, retval=True) == (2, 3, 1, (3,))
+    table = kit.views.how_did_I_do(network, pd.DataFrame({"x": [[0, 1]], "y": [0]}), "x", "y")
+    assert table.columns.tolist() == ["Expected", "Predicted", "Correct"]
+    assert "out of 1 correct" in capsys.readouterr().out
 
 
 def test_resizing_cuts_to_black_and_white_at_one_hundred(kit: Kit) -> None:
@@ -289,7 +346,7 @@ def test_resizing_cuts_to_black_and_white_at_one_hundred(kit: Kit) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["network_structure", "show_loss", "preview_weights"])
+@pytest.mark.parametrize("name", ["show_loss", "preview_weights"])
 def test_what_only_shows_does_nothing(kit: Kit, name: str) -> None:
     assert getattr(kit.views, name)(Network(), retval=True) is None
     assert kit.data.zoom_img(Image.new("L", (2, 2)), size=(3, 3), grid=False) is None

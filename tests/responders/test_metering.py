@@ -46,14 +46,16 @@ def test_a_flood_ends_at_the_budget(each: Flood, runner: TrialRunner) -> None:
 @pytest.mark.parametrize(
     "frame",
     [
-        pytest.param(long('{"do":"raised","error":{"type":"E","text":"@","line":null}}'), id="cells that raise"),
-        pytest.param(long('{"do":"note","text":"@","line":null}'), id="notes"),
+        pytest.param(
+            long('{"do":"raised","error":{"type":"E","text":"@","line":null,"file":null}}'), id="cells that raise"
+        ),
+        pytest.param(long('{"do":"note","text":"@","line":null,"file":null}'), id="notes"),
         pytest.param(long('{"do":"print","text":"@"}'), id="lines"),
         pytest.param(CALL, id="calls"),
         pytest.param(
             long('{"do":"magic","name":"sim_magic","arguments":"","body":"@","line":null,"missing":null}'), id="magics"
         ),
-        pytest.param(long('{"do":"refused","what":"@","line":null}'), id="refusals"),
+        pytest.param(long('{"do":"refused","what":"@","line":null,"file":null}'), id="refusals"),
     ],
 )
 def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, runner: TrialRunner) -> None:

@@ -365,7 +365,7 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunne
             "%%seqdiag\n# one\na -> -> b;",
             "cell 2, line 3: '->' stands here, expected the name of an actor; the diagram",
         ),
-        ("%run other.py", "cell 2, line 1: %run was skipped: it is not known here"),
+        ("%run other.py", "cell 2, line 1: FileNotFoundError: there is no file other.py beside the notebook"),
         ("%%nonsense\nhello", "cell 2, line 1: %%nonsense was skipped"),
         ("1 +", "cell 2, line 1: SyntaxError: invalid syntax; the other cells were run all the same"),
         ("\n\nopen('/etc/passwd')", "cell 2, line 3: programs here may only open files in their own folder"),
@@ -527,3 +527,51 @@ def test_runs_that_are_not_marked_have_an_end(tmp_path: Path, runner: TrialRunne
     result = graded(tmp_path, runner, cells)
     assert any("a notebook may start it 300 times" in note for note in result.notes)
     assert spoken(result.trials[0].recording) == ["done"]
+
+
+# A notebook's life.
+
+
+def test_what_was_not_run_after_a_cut_is_listed(tmp_path: Path, runner: TrialRunner) -> None:
+    result = graded(tmp_path, runner, [RESPONDER, "while True:\n    pass", PROGRAM, "print('never')"])
+    assert "cells 3 to 4 were not run: the notebook was stopped in cell 2" in result.notes
+    assert "never" not in result.trials[0].recording.responder_output
+
+
+def test_a_marked_program_may_stand_below_wrappers(tmp_path: Path, runner: TrialRunner) -> None:
+    recording = recorded(tmp_path, runner, [RESPONDER, "%%capture\n%%time\n" + PROGRAM + "print(1 / 0)"])
+    assert spoken(recording) == ["done"]
+    assert [fault.place for fault in recording.faults] == ["cell 2, line 8"]
+
+
+def test_a_robot_can_be_looked_at_before_it_runs(tmp_path: Path, runner: TrialRunner) -> None:
+    cells = [
+        RESPONDER,
+        "robot = %sim_robot_state\nprint('fresh', robot.state['x'], robot.state['left_light'])",
+        "%sim_magic -b Loop -x 700 -y 800 -a 0",
+        "robot = %sim_robot_state\nprint('placed', robot.state['x'], robot.state['sensor2dataArray'].count(','))",
+        PROGRAM,
+    ]
+    output = recorded(tmp_path, runner, cells).responder_output
+    assert "fresh 200 255" in output
+    assert "placed 700 1599" in output
+
+
+def test_no_path_of_the_machine_is_told(tmp_path: Path, runner: TrialRunner) -> None:
+    cells = [
+        RESPONDER,
+        "import os\nprint('here', os.getcwd())",
+        "from numpy import no_such_name",
+        "import warnings\nwarnings.warn('careful')",
+        "import numpy\nnumpy",
+        "open(os.path.join(os.getcwd(), 'missing.txt'))",
+        PROGRAM,
+    ]
+    result = graded(tmp_path, runner, cells)
+    told = "\n".join([*result.notes, result.trials[0].recording.responder_output])
+    assert "cannot import name 'no_such_name' from 'numpy' (numpy/__init__.py)" in told
+    assert "No such file or directory: 'missing.txt'" in told
+    assert "here ." in told
+    assert str(Path(sys.prefix)) not in told
+    assert "/tmp/" not in told
+    assert "/lib/python" not in told

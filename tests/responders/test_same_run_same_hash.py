@@ -13,8 +13,10 @@ import pytest
 
 from models import weights_bytes
 from paths import HELPERS
+from responders.channel import Channel
 from running import run_program
 from service.grading.trial_runner import TrialRunner
+from sim.motion import Physics
 from sim.recording import Pose, Verdict
 from sim.world import Noise
 from submissions.assignment.examples import examples
@@ -33,15 +35,86 @@ for i in range(20):
     time.sleep(random.uniform(0.2, 0.6))
     print(time.time(), len(glue.pyState()["messages"]))
 """
+WANDERER = """
+import random
+import ev3dev2_glue as glue
+while True:
+    print("PY::" + str(ultrasonic.distance_centimeters))
+    tank_drive.on_for_seconds(random.randint(10, 50), 30, random.uniform(0.1, 1))
+    print(len(glue.pyState()["messages"]))
+"""
+COUNT = """
+import random, time
+for number in range(20):
+    print(f"PY::{number} {random.random()}")
+    time.sleep(random.uniform(0.2, 0.6))
+"""
+AGENTS = {
+    "agent": "import uuid\ndef agent(text): return [parser(text), uuid.uuid4().hex]",
+    "logger": "seen = []\ndef logger(entry):\n    seen.append(entry)\n    return len(seen)",
+    "parser": """
+import random, time
+def parser(text):
+    time.sleep(random.uniform(0, 0.05))
+    return [text, random.random(), time.time()]
+""",
+}
+ASKING = """
+import random
+def responder(text):
+    answer = agent(text)
+    return f"{answer} {logger(answer)} {random.random()}"
+"""
 RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
 
 
+CALL_ROUND = """
+import time
+import ev3dev2_glue as glue
+tank_turn.on(-100, 10)
+for i in range(40):
+    print("PY::" + str(i))
+    time.sleep(0.3)
+    print(glue.pyState()["messages"])
+"""
+ANSWER = "def responder(text):\n    return 'JSON::[\"' + text + '\"]'\n"
+INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 600.0, 120.0)
+
+
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one of two runs: a noisy line follower of 60 s, or a conversation of 20 images."""
+    """The hash of one run: a follower of 60 s, a talk of 20 images, one by infrared, three agents, or two robots.
+
+    The two bump into each other, ask one responder, and draw chance of their own.
+    """
+    if name == "pair":
+        recording = run_program(
+            runner,
+            WANDERER,
+            Pose(400, 500, 0),
+            second=WANDERER,
+            noise=Noise(10, 20),
+            responder="def responder(text):\n    return f'JSON::[{sender}, \"{text}\"]'",
+            channel=Channel(jitter=0.1, loss=0.1),
+            physics=Physics(solid=True),
+            seconds=20,
+        )
+        assert recording.partner is not None
+        assert {recording.verdict, recording.partner.verdict} == {Verdict.TIME_LIMIT}
+        assert recording.touches
+        return f"{recording.sha256}{recording.partner.sha256}"
     if name == "follower":
         recording = run_program(runner, FOLLOWER, Pose(320, 500, 90), background="Loop", noise=Noise(10, 20))
-        assert recording.verdict is Verdict.TIME_LIMIT
+        assert recording.verdict is Verdict.TIME_LIMIT, recording.faults
         assert len(recording.ticks) == 1800
+    elif name == "agents":
+        recording = run_program(runner, COUNT, responder=ASKING, agents=AGENTS)
+        assert recording.verdict is Verdict.FINISHED
+        assert len(recording.agent_messages) == 120
+    elif name == "infrared":
+        start = Pose(1100, 571, 0)
+        recording = run_program(runner, CALL_ROUND, start, noise=Noise(motor=20), responder=ANSWER, channel=INFRARED)
+        assert {message.lost for message in recording.messages} >= {"", "chance", "facing away"}
+        assert any(message.arrived_as for message in recording.messages)
     else:
         recording = run_program(
             runner,
@@ -57,6 +130,7 @@ def chain(name: str, runner: TrialRunner) -> str:
     return recording.sha256
 
 
+RUNS = ("follower", "talk", "infrared", "agents", "pair")
 WITH_TESTS = os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])}
 ELSEWHERE = textwrap.dedent("""
     import sys
@@ -69,13 +143,13 @@ ELSEWHERE = textwrap.dedent("""
 
 
 def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    here = {name: chain(name, runner) for name in ("follower", "talk")}
+    here = {name: chain(name, runner) for name in RUNS}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
             pair = []
             for half in range(2):
-                names = ["follower", "talk"]
+                names = list(RUNS)
                 random.Random(number * 2 + half).shuffle(names)
                 command = [sys.executable, "-c", ELSEWHERE, *names]
                 pair.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=WITH_TESTS))

@@ -11,7 +11,7 @@ from command import robomark
 from service.grading.example_check import ComparedMeasure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment.examples import OriginalMeasure, expected
+from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import catalogue
 from submissions.assignment.problems import AssignmentProblems
@@ -48,7 +48,12 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: Tri
             '[reference]\nmarks = "6"\n[stops-short]\nmarks = "3"\nloses = ["stop"]\n',
             'stops-short: expected.toml says it loses "stop", expected the id of a criterion: finishes, says, stops',
         ),
-        ("", "stops-short: has no table in expected.toml"),
+        ("", "stops-short: has no table in expected.toml (check --write-expected notes what it got)"),
+        (
+            '[reference]\nmarks = "6"\nearns = { stops = "2", stop = "3" }\n',
+            'reference: expected.toml says it earns "stop", expected the id of a criterion: finishes, says, stops',
+        ),
+        ('[reference]\nmarks = "6"\nearns = { stops = "2" }\n', "reference: got 3.00 marks for stops, expected 2"),
         (
             '[reference]\nmarks = "6"\n[[original]]\nmeasure = "height"\nvalue = 3\n',
             "reference: measured no height, expected about 3",
@@ -161,3 +166,32 @@ def test_check_says_what_is_wrong_and_ends_with_two(tmp_path: Path) -> None:
     assert ended.returncode == 2
     assert "task: reference: got 3.00 marks, expected 6; stops: 0 of 2 trials went as expected." in ended.stderr
     assert robomark("assignments", "check").returncode == 2
+
+
+def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed(tmp_path: Path) -> None:
+    write_new(tmp_path / "task")
+    file, old = tmp_path / "task" / "expected.toml", '# By hand.\n[stops-short]\nmarks = "3"\n'
+    file.write_text(old)
+    (tmp_path / "task" / "examples" / "says, nothing").mkdir()
+    (tmp_path / "task" / "examples" / "says, nothing" / "robot.py").write_text("tank_drive.off()\n")
+    noted = robomark("assignments", "check", tmp_path / "task", "--write-expected")
+    assert noted.returncode == 0, noted.stderr
+    assert "wrote what reference, says, nothing got; is it what they must get?" in noted.stdout
+    assert file.read_text().startswith(old)
+    tables = expected(str(tmp_path / "task")).examples
+    assert tables["reference"].marks == 6
+    assert tables["says, nothing"].marks == sum(tables["says, nothing"].earns.values()) + 1
+    again = robomark("assignments", "check", tmp_path / "task", "--write-expected")
+    assert (again.returncode, again.stdout.count("nothing was written")) == (0, 1)
+    assert robomark("assignments", "check", "--all", "--write-expected").returncode == 2
+
+
+def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner) -> None:
+    """A reference without full marks is a mistake, and what a table says is never overwritten."""
+    write_new(tmp_path / "task")
+    (tmp_path / "task" / "expected.toml").write_text('[stops-short]\nmarks = "1"\n')
+    (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("say('red')\n")
+    checked = check_examples(str(tmp_path / "task"), runner=runner)
+    assert (dict(checked.unwritten), len(checked.problems)) == ({}, 2)
+    with pytest.raises(UsageError, match=r"stops-short has a table in expected\.toml already"):
+        add_expected(str(tmp_path / "task"), {"stops-short": Expectation(marks="3")})

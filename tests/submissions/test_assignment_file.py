@@ -25,7 +25,14 @@ from submissions.criteria.ending import Finishes
 
 HEAD = 'id = "a"\ntitle = "A"\n'
 SCENARIO = '[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'
+INFRARED = 'channel = {{ link = "infrared", beacon = {} }}\n'
+POST = HEAD + '[world]\nobstacles = "Central_post"\n'
 FINISHES = '[[criterion]]\ntitle = "Ends"\nmarks = 1\ncheck = "finishes"\n'
+LAP = (
+    FINISHES.replace("finishes", "laps")
+    + 'id = "lap"\nline = { on = "Thruxton_Circuit" }\nstart_line = [1, 2, 3, 4]\n[[criterion]]\ntitle = "F"\n'
+)
+RANKING = 'marks = 1\ncheck = "ranking"\nof = "lap"\nmeasure = "lap time"\nsteps = [[50, 1]]\n'
 
 
 def written(folder: Path, text: str, **files: str) -> Path:
@@ -55,6 +62,7 @@ def test_catalogue_is_in_order(name: str) -> None:
     assert assignment.description
     assert re.fullmatch("[0-9a-f]{64}", assignment.version)
     asked = {"robot.py": assignment.parts.program, "responder.py": assignment.parts.responder}
+    asked["robot2.py"] = assignment.parts.second_program
     starter = {path.name for path in (assignment_folder(name) / "starter").iterdir()}
     assert {part for part, who in asked.items() if who == "student"} <= starter or starter == {"notebook.ipynb"}
 
@@ -263,10 +271,37 @@ check = "pose"
             10,
             'expected has 2 lists for the 1 poses of scenario "s"',
         ),
+        (
+            HEAD + SCENARIO + LAP + RANKING.replace("lap time", "laptime"),
+            18,
+            'measure is "laptime", which "lap" (laps) does not measure, expected one of "lap time", "laps", '
+            '"farthest off" or "part of a lap"; did you mean "lap time"?',
+        ),
+        (HEAD + SCENARIO + LAP + RANKING.replace('of = "lap"', 'of = "lapp"'), 17, 'did you mean "lap"?'),
+        (
+            HEAD
+            + SCENARIO
+            + FINISHES.replace("finishes", "source")
+            + 'id = "lap"\nuses = ["while"]\n[[criterion]]\ntitle = "F"\n'
+            + RANKING,
+            17,
+            'which "lap" (source) does not measure, expected one that has figures',
+        ),
+        (
+            HEAD + SCENARIO + FINISHES.replace("finishes", "timing") + 'of = "movin"\nbetween = [1, 2]\n',
+            10,
+            'of is "movin", expected "program", "moving" or "speech"; did you mean "moving"?',
+        ),
         (HEAD + SCENARIO + FINISHES + "id = one\n", 10, "texts stand in quotes"),
         (HEAD + SCENARIO + FINISHES + "marks = 2\n", 10, "this key is given twice"),
         (HEAD + SCENARIO + "channel = { los = 1 }\n" + FINISHES, 6, 'did you mean "loss"?'),
         (HEAD + SCENARIO + "channel = { loss = 1.5 }\n" + FINISHES, 6, "expected at most 1"),
+        (HEAD + SCENARIO + "channel = { facing = 90 }\n" + FINISHES, 6, "facing and no link that it limits, expected"),
+        (HEAD + SCENARIO + 'channel = { link = "infrared" }\n' + FINISHES, 6, "expected beacon = [x, y] beside it"),
+        (HEAD + SCENARIO + INFRARED.format("[3000, 50]") + FINISHES, 6, "has its beacon off the floor, expected"),
+        (HEAD + SCENARIO + INFRARED.format("[100]") + FINISHES, 6, "too few numbers, expected [x, y]"),
+        (POST + SCENARIO + INFRARED.format("[1000, 510]") + FINISHES, 8, "beacon is in an obstacle, which blocks"),
+        (HEAD + SCENARIO + FINISHES.replace("finishes", "in_reach"), 9, 'expected link = "infrared" in scenario "s"'),
         (HEAD + SCENARIO + "seconds = nan\n" + FINISHES, 6, "expected a finite number"),
         (HEAD + SCENARIO + "seconds = 1979-05-27\n" + FINISHES, 6, "expected a number"),
         (HEAD + SCENARIO + "trials = true\n" + FINISHES, 6, "expected a whole number"),

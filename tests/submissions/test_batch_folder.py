@@ -49,12 +49,13 @@ def class_folder(tmp_path: Path) -> Path:
 
 def test_every_bad_row_is_named_and_the_rest_taken(class_folder: Path) -> None:
     checked = read_batch(class_folder, "echo-responder")
-    assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
-    problems = dict(checked.problems)
+    taken = [grading_request.submission.student for grading_request in checked.grading_requests]
+    assert taken == ["Zoë 🤖", "ada", "no-responder"]
+    assert "There is no responder.py" in checked.grading_requests[-1].submission.notes[0]
+    problems = {each.source: each.reason for each in checked.refusals}
     assert set(problems) == {
-        "no-responder", "empty", "notes.docx", "broken.zip", "link", "ada.zip", "climber.zip",
+        "empty", "notes.docx", "broken.zip", "link", "ada.zip", "climber.zip",
     }  # fmt: skip
-    assert "responder.py" in problems["no-responder"]
     assert "already this student's submission" in problems["ada.zip"]
     assert all(sentence.strip().endswith(".") and "\n" not in sentence for sentence in problems.values())
 
@@ -69,9 +70,11 @@ def test_a_zip_of_the_same_folder_is_the_same(class_folder: Path, tmp_path: Path
             if path.is_file() and not path.is_symlink():
                 archive.write(path, prefix + str(path.relative_to(class_folder)))
     checked = read_batch(tmp_path / "all.zip", "echo-responder")
-    assert [grading_request.submission.student for grading_request in checked.grading_requests] == ["Zoë 🤖", "ada"]
-    assert {name for name, _ in checked.problems} == {
-        "no-responder", "notes.docx", "broken.zip", "ada.zip", "climber.zip",
+    taken = [grading_request.submission.student for grading_request in checked.grading_requests]
+    assert taken == ["Zoë 🤖", "ada", "no-responder"]
+    assert "There is no responder.py" in checked.grading_requests[-1].submission.notes[0]
+    assert {each.source for each in checked.refusals} == {
+        "notes.docx", "broken.zip", "ada.zip", "climber.zip",
     }  # fmt: skip
 
 
@@ -86,9 +89,9 @@ def test_each_submission_may_name_its_own_assignment(tmp_path: Path) -> None:
         for grading_request in checked.grading_requests
     }
     assert named == {"ada": "echo-responder", "bob": "json-queue"}
-    ((name, sentence),) = checked.problems
-    assert name == "eve"
-    assert "no-such-thing" in sentence
+    (refusal,) = checked.refusals
+    assert refusal.source == "eve"
+    assert "no-such-thing" in refusal.reason
 
 
 def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +104,7 @@ def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatc
         read_with_assignment(Path("eve"), None)
     checked = read_batch(Path(), None)
     assert checked.grading_requests == ()
-    assert "no assignment 'eve' in the catalogue" in dict(checked.problems)["eve"]
+    assert "no assignment 'eve' in the catalogue" in {each.source: each.reason for each in checked.refusals}["eve"]
 
 
 def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
@@ -109,7 +112,7 @@ def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
     _student(folder, "ada", toml='student = "bob"\n')
     _student(folder, "bob")
     checked = read_batch(folder, "echo-responder")
-    assert checked.problems == ()
+    assert checked.refusals == ()
     ada, bob = checked.grading_requests
     assert (ada.submission.student, bob.submission.student) == ("ada", "bob")
     assert "submission.toml names the student bob" in " ".join(ada.submission.notes)

@@ -86,11 +86,11 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
         17: "outside the roster's folder",
         18: "101 characters",
     }
-    assert len(checked.problems) == len(expected)
-    for (name, sentence), (line, part) in zip(checked.problems, expected.items(), strict=True):
-        assert name.split(":")[0] == f"line {line}"
-        assert part in sentence
-        assert "\n" not in sentence
+    assert len(checked.refusals) == len(expected)
+    for refusal, (line, part) in zip(checked.refusals, expected.items(), strict=True):
+        assert refusal.source.split(":")[0] == f"line {line}"
+        assert part in refusal.reason
+        assert "\n" not in refusal.reason
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_an_open_quotation_mark_costs_one_row(folder: Path) -> None:
     text = 'student,file\nada,a\n"bob,b\neve,b\nmia,"d, e.zip"\n'
     checked = read_batch(_roster(folder, text), "echo-responder")
     assert [row.submission.student for row in checked.grading_requests] == ["ada", "eve", "mia"]
-    assert [name for name, _ in checked.problems] == ["line 3"]
+    assert [each.source for each in checked.refusals] == ["line 3"]
 
 
 @pytest.mark.parametrize(

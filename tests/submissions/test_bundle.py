@@ -119,12 +119,24 @@ def test_two_files_of_any_name_are_told_apart(tmp_path: Path) -> None:
     assert submission.responder == Code("mine.py", RESPONDER)
 
 
-def test_missing_part_is_named(tmp_path: Path) -> None:
+def test_one_missing_part_of_two_is_named_and_the_other_taken(tmp_path: Path) -> None:
+    path = folder(tmp_path / "bob", {"robot.py": PROGRAM, "my_responder.py": RESPONDER})
+    submission = read_submission(path, asked=Parts())
+    assert (submission.program, submission.responder) == (Code("robot.py", PROGRAM), None)
+    assert submission.notes == (
+        "There is no responder.py (beside it lies my_responder.py); what needs a responder has no marks.",
+    )
+    lone = tmp_path / "eve.py"
+    lone.write_text(RESPONDER)
+    submission = read_submission(lone, asked=Parts())
+    assert (submission.program, submission.responder) == (None, Code("eve.py", RESPONDER))
+    assert "There is no robot.py; what needs a robot program has no marks." in submission.notes
+
+
+def test_without_any_part_that_is_asked_for_it_is_refused(tmp_path: Path) -> None:
     path = folder(tmp_path / "bob", {"robot.py": PROGRAM})
-    assert "has no responder.py" in refusal(path, asked=Parts())
-    lone = tmp_path / "bob.py"
-    lone.write_text(PROGRAM)
-    assert "has no responder.py" in refusal(lone, asked=Parts())
+    assert "has no responder.py" in refusal(path, asked=Parts("robot.py", "student"))
+    assert "has no robot.py or responder.py" in refusal(folder(tmp_path / "eve", {"a.txt": ""}), asked=Parts())
 
 
 def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:

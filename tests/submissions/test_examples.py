@@ -15,10 +15,14 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment.examples import REFERENCE, Expectation, examples
+from submissions.assignment.examples import REFERENCE, Expectation, examples, expected
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
+from submissions.criteria import Criterion
+from submissions.criteria.common import AmongMany
+from submissions.criteria.logged import Datalog
+from submissions.criteria.texts import TextSequence
 
 FOLDER = DATA / "failing_submissions"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
@@ -95,3 +99,21 @@ def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
     assert (result.accuracy.value, result.accuracy.n) == (1.0, 6)
     said = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}
     assert said[520, 900] == "Is that a upwards facing triangle"
+
+
+def sought(criterion: Criterion) -> bool:
+    """Whether it looks for something in particular: not only that something comes, and not at the last text alone."""
+    if not isinstance(criterion, AmongMany) or (isinstance(criterion, Datalog) and criterion.measured is None):
+        return False
+    if not isinstance(criterion, TextSequence):
+        return True
+    any_text = criterion.matches == r"\w" or not (criterion.has_conditions or criterion.in_order)
+    return not (criterion.last or any_text)
+
+
+@pytest.mark.parametrize("assignment", catalogue())
+def test_naming_everything_earns_less_than_a_third_of_each_criterion_that_looks_among_much(assignment: str) -> None:
+    asked = [criterion for criterion in find_assignment(assignment).criteria if sought(criterion)]
+    if asked:
+        earned = expected(assignment).examples["spray-and-pray"].earns
+        assert [each.id for each in asked if 3 * earned[each.id] >= each.marks] == []

@@ -189,6 +189,28 @@ def test_noise_does_nothing_on_radial_grey_until_a_robot_is_chosen() -> None:
     assert "Default_Robot is used" in pages("-r Default_Robot_Wide_Eyes")[0].notes[0]
 
 
+@pytest.mark.parametrize(
+    ("line", "robot"),
+    [
+        ("-r Small_Robot -b Radial_grey", "Small_Robot_Widest_Eyes"),
+        ("-b Radial_grey -r Small_Robot_Wide_Eyes", "Small_Robot_Widest_Eyes"),
+        ("-r Sensor_Diameter_Config -b Radial_grey", "Sensor_Diameter_Config_Wide_Eyes"),
+        ("-r Small_Robot_Widest_Eyes", "Default_Robot"),
+    ],
+)
+def test_radial_grey_widens_the_eyes_of_the_robot_that_was_chosen(line: str, robot: str) -> None:
+    first, second = pages(line, "-b Loop")
+    assert first.robot == robot
+    assert second.robot == robot.partition("_Wide")[0] or second.robot == "Small_Robot_Wide_Eyes"
+
+
+def test_a_program_below_wrappers_is_found_with_its_lines_in_their_places() -> None:
+    text = "# driven\n%%capture\n%%time\n%%sim_magic_preloaded -b Loop\nsay('x')"
+    flags, program = split_program(text)
+    assert flags.values == {"b": "Loop"}
+    assert program == "# driven\n#\n#\n#\nsay('x')"
+
+
 def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> None:
     simulator = Simulator()
     simulator.leave_at(Pose(321.5, 234.49, -45.25))

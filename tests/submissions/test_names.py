@@ -14,7 +14,7 @@ from sqlalchemy import insert, select, update
 
 from builders import grading_request
 from command import robomark
-from service.reports.written import file_stem, file_stems
+from service.reports.written import file_stem, file_stems, refused_stems
 from service.store import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Person
@@ -24,6 +24,7 @@ from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission
 from submissions.names import alike, forms, shown_name
+from submissions.people import Student
 
 ASSIGNMENT = "echo-responder"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -100,8 +101,9 @@ def _roster(tmp_path: Path, *names: str) -> Path:
 
 
 def _refused(checked: BatchContents) -> list[str]:
-    assert all("\n" not in sentence and sentence.endswith(".") for _, sentence in checked.problems)
-    return [sentence for _, sentence in checked.problems]
+    sentences = [refusal.reason for refusal in checked.refusals]
+    assert all("\n" not in sentence and sentence.endswith(".") for sentence in sentences)
+    return sentences
 
 
 @pytest.mark.parametrize("batch", [_folder, _zip, _roster])
@@ -120,7 +122,7 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
     """Refused in a later batch; but for what one normal form makes the same name, it can only be written otherwise."""
     batches = [read_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
     first, later = (
-        intake.accept_new(store, "b", each.grading_requests, each.problems, max_attempts=3) for each in batches
+        intake.accept_new(store, "b", each.grading_requests, each.refusals, max_attempts=3) for each in batches
     )
     assert first.batch is not None
     assert first.refused == ()
@@ -128,8 +130,8 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
         assert later.batch is not None  # the same letters, whatever machine wrote them
         return
     assert later.batch is None
-    ((_, sentence),) = later.refused
-    assert "cannot be told from" in sentence
+    (refusal,) = later.refused
+    assert "cannot be told from" in refusal.reason
     with pytest.raises(UsageError, match="cannot be told from"):
         intake.accept_batch(store, "b", batches[1].grading_requests, (), max_attempts=3)
 
@@ -157,7 +159,7 @@ def test_students_of_different_names_are_all_taken_in(tmp_path: Path, names: tup
     assert alike(names) == {}
     checked = read_batch(_folder(tmp_path, *names), ASSIGNMENT)
     assert {each.submission.student for each in checked.grading_requests} == set(names)
-    assert checked.problems == ()
+    assert checked.refusals == ()
 
 
 def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp_path: Path) -> None:
@@ -167,7 +169,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
         archive.writestr("responder.py", RESPONDER)
     checked = read_batch(folder, ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob"]
-    assert [name for name, _ in checked.problems] == ["ada", "ada.zip"]
+    assert [each.source for each in checked.refusals] == ["ada", "ada.zip"]
     assert all("not the same; expected one" in sentence for sentence in _refused(checked))
 
 
@@ -220,12 +222,12 @@ def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> No
     intake.accept(store, grading_request("ada"), max_attempts=3)
     with store.transaction() as session:
         students = Students(session, intake.course_of(session, "default", now(session)))
-        known = students.enrol("ada", now(session))
+        known = students.enrol(Student("ada"), now(session))
         assert known == session.scalar(select(Enrolment.id))
         for name in (" ada", "Ada", "\u0430da", "\u200b"):
             with pytest.raises(UsageError):
-                students.enrol(name, now(session))
-        assert students.enrol("bob", now(session)) != known
+                students.enrol(Student(name), now(session))
+        assert students.enrol(Student("bob"), now(session)) != known
         assert session.scalars(select(Enrolment.student)).all() == ["ada", "bob"]
 
 
@@ -233,11 +235,34 @@ def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_c
     with store.transaction() as session:
         at = now(session)
         students = Students(session, intake.course_of(session, "default", at))
-        known = students.enrol("ada ", at)
-        assert students.enrol("ada ", at) == known
-        assert students.enrol("ada", at) == known
+        known = students.enrol(Student("ada "), at)
+        assert students.enrol(Student("ada "), at) == known
+        assert students.enrol(Student("ada"), at) == known
         with pytest.raises(UsageError, match="cannot be told from"):
-            students.enrol("ada ", at)
+            students.enrol(Student("ada "), at)
+
+
+def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
+    with store.transaction() as session:
+        at = now(session)
+        students = Students(session, intake.course_of(session, "default", at))
+        known = students.enrol(Student("s1"), at)
+        for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
+            assert students.enrol(told, at) == known
+        person = session.scalars(select(Person)).one()
+        assert (person.name, person.email) == ("Ada Lovelace", "ada@uni.example")
+
+
+def test_only_who_is_there_is_found(store: Store) -> None:
+    with store.transaction() as session:
+        at = now(session)
+        students = Students(session, intake.course_of(session, "default", at))
+        known = students.enrol(Student("Ada Lovelace"), at)
+        assert students.find(" Ada  Lovelace") == known
+        with pytest.raises(UsageError, match='did you mean "Ada Lovelace"'):
+            students.find("Ada Lovelance")
+        with pytest.raises(UsageError, match="there is no student 'bob' in this course; robomark course enrol"):
+            students.find("bob")
 
 
 def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> None:
@@ -246,8 +271,8 @@ def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> 
         at = now(session)
         course_id = intake.course_of(session, "default", at)
         for number, name in enumerate(("Ada", "ada", " bob")):
-            session.execute(insert(Person).values(id=number + 1, name=name, created_at=at))
-            row = {"id": number + 1, "course_id": course_id, "person_id": number + 1, "student": name}
+            session.execute(insert(Person).values(id=number + 1, created_at=at))
+            row = {"id": number + 1, "course_id": course_id, "person_id": number + 1, "student": name, "written": name}
             session.execute(insert(Enrolment).values(role=Role.STUDENT, **row))
     for name, expected in (("Ada", 1), ("ada", 2), ("bob", 3)):
         accepted = intake.accept(store, grading_request(name), max_attempts=3)
@@ -303,6 +328,12 @@ def test_a_student_with_several_assignments_has_a_file_for_each() -> None:
     graded = [("ada", "json-queue"), ("bob", "json-queue"), ("ada", "echo-responder")]
     assert file_stems(graded) == ["ada+json-queue", "bob", "ada+echo-responder"]
     assert file_stems(graded[::-1]) == file_stems(graded)[::-1]
+
+
+def test_who_was_refused_together_has_a_file_each() -> None:
+    refused = [("submission_1", "ada"), ("submission_1", "bob"), ("submission_2", "ada"), ("line 4: ada", "ada")]
+    assert len(set(refused_stems(refused))) == 4
+    assert refused_stems(refused)[2] == "submission_2+refused"
 
 
 def test_files_in_an_index_of_a_batch_keep_their_students_names() -> None:

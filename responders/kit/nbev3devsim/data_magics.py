@@ -15,7 +15,7 @@ from nn_tools.sensor_data import generate_bw_image, get_sensor_image_pair
 
 
 class RobotState:
-    """What the simulator knows of the robot after its last run, in ``state``."""
+    """What the simulator knows of the robot as it stands, in ``state``."""
 
     def __init__(self, state: dict[str, Any]) -> None:
         self.state = dict(state)
@@ -44,6 +44,8 @@ def sim_data(words: list[str]) -> pd.DataFrame | None:
 
 
 def sim_robot_state(words: list[str]) -> RobotState:
+    if not roboSim.robot_state:
+        roboSim.robot_state = roboSim.look()
     return RobotState(roboSim.robot_state)
 
 

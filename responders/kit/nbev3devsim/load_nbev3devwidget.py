@@ -19,7 +19,10 @@ class RoboSim:
         self.pyresponder: Callable[[str], Any] | None = None
         self.raw_image_data: list[str] = []
         self.results_log: list[dict[str, Any]] = []
+        #: As the last run has left the robot; empty if it may have been put elsewhere since.
         self.robot_state: dict[str, Any] = {}
+        self.look: Callable[[], dict[str, Any]] = dict
+        self._rows: dict[tuple[str, str], tuple[str, ...]] = {}  # of each entry and mode, as image_data has it
         self.live_image_handler: Callable[[int], Any] | None = None
 
     def process_raw_image_data(self, raw_data: str, mode: str = "rgb", to_str: bool = True) -> str | list[str]:
@@ -35,16 +38,23 @@ class RoboSim:
         return ",".join(numbers) if to_str else numbers
 
     def image_data(self, datatype: str = "dataframe", mode: str = "rgb") -> Any:
-        """The logged images: a data frame of side, vals and clock, or the raw list."""
+        """The logged images: a data frame of side, vals and clock, or the raw list.
+
+        A notebook asks again and again, so only entries that are new are taken apart.
+        """
         if datatype == "raw":
             return self.raw_image_data
         import pandas as pd  # here alone: some assignments do without it
 
-        rows = []
-        for entry in self.raw_image_data:
+        return pd.DataFrame(
+            [self._row(entry, mode) for entry in self.raw_image_data], columns=["side", "vals", "clock"]
+        )
+
+    def _row(self, entry: str, mode: str) -> tuple[str, ...]:
+        if (entry, mode) not in self._rows:
             side, values, clock = entry.split(" ")[:3]
-            rows.append((side, self.process_raw_image_data(values, mode), clock))
-        return pd.DataFrame(rows, columns=["side", "vals", "clock"])
+            self._rows[entry, mode] = (side, str(self.process_raw_image_data(values, mode)), clock)
+        return self._rows[entry, mode]
 
     def collect(self, data: list[list[Any]], images: list[str]) -> None:
         """What the robot has logged: each of ``data`` is name, value, the program's time or None, and the time."""
@@ -56,6 +66,7 @@ class RoboSim:
     def clear_datalog(self) -> None:
         self.results_log.clear()
         self.raw_image_data.clear()
+        self._rows.clear()
 
 
 class Eds:

@@ -9,8 +9,10 @@ import importlib.abc
 import importlib.machinery
 import sys
 import types
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
+
+from nbev3devsim.tqdma import BARS
 
 _SHOWING = ("matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", "plotly", "palettable", "pylab", "mpl_toolkits")
 
@@ -21,10 +23,10 @@ class Unseen:
     def __call__(self, *args: Any, **kwargs: Any) -> Unseen:
         return Unseen()
 
-    def __getattr__(self, name: str) -> Unseen:
+    def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        return Unseen()
+        return _RETURNS.get(name) or Unseen()
 
     def __getitem__(self, key: Any) -> Unseen:
         return Unseen()
@@ -45,12 +47,41 @@ class Unseen:
     def __repr__(self) -> str:
         return "<not shown>"
 
+    def __float__(self) -> float:
+        return 0.0
+
+    def _reckon(self, *_: object) -> Unseen:
+        return Unseen()
+
+    # As in ``bar.get_x() + bar.get_width() / 2``.
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __neg__ = _reckon
+
+
+def _subplots(nrows: int = 1, ncols: int = 1, *args: Any, squeeze: bool = True, **kwargs: Any) -> tuple[Unseen, Any]:
+    """A figure, and as many axes as were asked for."""
+    import numpy as np  # here alone: some assignments do without it
+
+    axes = np.empty((nrows, ncols), dtype=object)
+    for place in np.ndindex(axes.shape):
+        axes[place] = Unseen()
+    if not squeeze:
+        return Unseen(), axes
+    return Unseen(), axes.item() if axes.size == 1 else axes.squeeze()
+
+
+#: What is unpacked into something else than two.
+_RETURNS: dict[str, Any] = {
+    "subplots": _subplots,
+    "plot": lambda *args, **kwargs: [Unseen()],
+    "hist": lambda *args, **kwargs: (Unseen(), Unseen(), Unseen()),
+}
+
 
 class _UnseenModule(types.ModuleType):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        return Unseen()
+        return _RETURNS.get(name) or Unseen()
 
 
 class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -71,12 +102,9 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         module.__dict__.update(self._known.get(module.__name__, {}))
 
 
-def _each(iterable: Iterable[Any] = (), *args: Any, **kwargs: Any) -> Iterable[Any]:
-    return iterable
-
-
-def _counted(*args: int, **kwargs: Any) -> range:
-    return range(*args)
+def _interact(function: Any = None, *args: Any, **kwargs: Any) -> Any:
+    """As a decorator or not, it gives back the function that a widget would call."""
+    return function if callable(function) else lambda decorated: decorated
 
 
 def display(*values: Any, **kwargs: Any) -> None:
@@ -87,22 +115,22 @@ def display(*values: Any, **kwargs: Any) -> None:
 
 def install(shell: Any) -> None:
     """Let drawing, progress and display modules be imported; ``shell`` is what ``get_ipython()`` gives."""
-    bars = {"tqdm": _each, "trange": _counted, "tqdm_notebook": _each, "tnrange": _counted}
     known: dict[str, dict[str, Any]] = {
-        "tqdm": bars,
-        "tqdm.notebook": bars,
-        "tqdm.auto": bars,
+        **{f"tqdm{part}": BARS for part in ("", ".auto", ".autonotebook", ".contrib.concurrent", ".notebook", ".std")},
         "IPython": {"get_ipython": lambda: shell},
         "IPython.display": {"display": display},
-        "matplotlib.pyplot": {"hist": lambda *args, **kwargs: (Unseen(), Unseen(), Unseen())},
+        "ipywidgets": {"interact": _interact, "interact_manual": _interact},
     }
     sys.meta_path.insert(0, _Finder(known))
     if "pandas" in sys.modules:
-        _hide_pandas_plots()
+        _hide_pandas_plots_and_styles()
 
 
-def _hide_pandas_plots() -> None:
+def _hide_pandas_plots_and_styles() -> None:
+    import pandas as pd
     import pandas.plotting._core as core
+
+    pd.DataFrame.style = property(lambda _: Unseen())  # type: ignore[assignment]
 
     backend = types.ModuleType("unseen_plots")
     backend.plot = Unseen()  # type: ignore[attr-defined]

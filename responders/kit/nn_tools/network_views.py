@@ -6,12 +6,12 @@ Predicting divides an image by its brightest pixel, training by its length, as t
 from __future__ import annotations
 
 import os
-import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 from sklearn.metrics import classification_report, confusion_matrix
@@ -19,9 +19,11 @@ from sklearn.neural_network import MLPClassifier
 from sklearn.preprocessing import normalize
 
 from nn_tools.sensor_data import (
+    as_image,
     crop_and_zoom_to_fit,
     generate_signature,
     get_image_features,
+    get_images_features,
     jiggle,
     make_image_black_and_white,
 )
@@ -58,29 +60,32 @@ def class_predict_from_image(
 def predict_and_report_from_image(
     MLP: Any,
     img: Image.Image,
-    label: Any = None,
-    quiet: bool = False,
-    zoomview: bool = False,
+    label: Any = "",
     jiggled: bool = False,
     cropzoom: bool = False,
-    **_: Any,
+    quiet: bool = False,
+    zoomview: bool = False,
+    confidence: bool = False,
+    signature: bool = False,
 ) -> None:
-    """Print what the network makes of the image, and what it is."""
+    """Print what the network makes of the image, and whether that is its label."""
     if jiggled:
         img = jiggle(img)
     if cropzoom:
         img = crop_and_zoom_to_fit(img)
-    print(f"MLP predicts {class_predict_from_image(MLP, img)} compared to label {label}; ")
+    prediction = class_predict_from_image(MLP, img, signature=signature)
+    named = label is not None and label != ""
+    beside = f" compared to label {label}; classification is {prediction == label}" if named else ""
+    print(f"MLP predicts {prediction}{beside}")
 
 
 def image_class_predictor(
     MLP: Any,
     img: Image.Image,
-    label: Any = None,
+    label: Any = "",
     size: tuple[int, int] | None = None,
     greyscale_convert: bool = True,
     eds_crop: bool = False,
-    **_: Any,
 ) -> None:
     """Print the predicted label. A sensor image of 20 x 20 is cut to 15 x 15, as in the original."""
     if greyscale_convert:
@@ -98,94 +103,187 @@ def progress_tracked_training(
     MLP: Any = None,
     hidden_layer_sizes: Any = (30,),
     max_iterations: int = 40,
-    quiet: bool = True,
-    **_: Any,
+    loss: bool = True,
+    report: bool = True,
+    structure: bool = False,
+    weights: bool = False,
 ) -> Any:
-    """A network trained one pass at a time."""
+    """A network trained one pass at a time; ``report`` prints how it names what it was trained on."""
     classes = np.unique(labels)
     if MLP is None:
         MLP = MLPClassifier(hidden_layer_sizes=hidden_layer_sizes, max_iter=1)
     for _pass in range(max_iterations):
         MLP.partial_fit(data, labels, classes=classes)
+    if structure:
+        network_structure(MLP)
+    if report:
+        test_and_report(MLP, data, labels)
     return MLP
 
 
 def quick_progress_tracked_training(
-    images: Sequence[Image.Image],
+    images_list: Any,
     labels: Sequence[Any],
+    test_limit: int | None = None,
     MLP: Any = None,
     hidden_layer_sizes: Any = (30,),
     max_iterations: int = 40,
-    report: bool = False,
-    test_limit: int | None = None,
-    size: tuple[int, int] | None = None,
+    loss: bool = True,
+    structure: bool = True,
+    report: bool = True,
+    weights: bool = False,
     jiggled: bool = False,
-    signature: bool = False,
-    **_: Any,
+    size: tuple[int, int] | None = None,
+    use_signature: bool = False,
+    image_data: bool = True,
+    fill: int = 0,
 ) -> Any:
-    """A network trained on all images but the last tenth."""
-    if size is not None:
-        images = resized_images_pipeline(images, size)
-    if jiggled:
-        images = [jiggle(image) for image in images]
-    rows = [generate_signature(image, linear=True) if signature else get_image_features(image) for image in images]
+    """A network trained on all images but the last tenth; on rows of numbers without ``image_data``.
+
+    With ``report`` it prints how the network names those last ones.
+    """
+    rows = _rows(images_list, size, jiggled, use_signature, fill) if image_data else images_list
     kept = len(rows) - (max(len(rows) // 10, 1) if test_limit is None else test_limit)
     MLP = progress_tracked_training(
-        normalize(rows[:kept], axis=1), list(labels)[:kept], MLP, hidden_layer_sizes, max_iterations
+        normalize(rows[:kept], axis=1),
+        list(labels)[:kept],
+        MLP,
+        hidden_layer_sizes,
+        max_iterations,
+        report=False,
+        structure=structure,
     )
     if report and kept < len(rows):
-        how_did_I_do(MLP, normalize(rows[kept:], axis=1), list(labels)[kept:])
+        test_and_report(MLP, normalize(rows[kept:], axis=1), list(labels)[kept:])
     return MLP
 
 
+def _rows(images: Any, size: tuple[int, int] | None, jiggled: bool, use_signature: bool, fill: int) -> list[Any]:
+    shown = [as_image(image) for image in images] if size is None else resized_images_pipeline(images, size)
+    shown = [jiggle(image) for image in shown] if jiggled else shown
+    if use_signature:
+        return [generate_signature(image, linear=True, fill=fill) for image in shown]
+    return [get_image_features(image) for image in shown]
+
+
 def resized_images_pipeline(
-    images_list: Sequence[Image.Image],
+    images_array: Any,
     size: tuple[int, int] = (14, 14),
     bw: bool = True,
-    normalise: bool = False,
+    normalise: bool = True,
     images: bool = True,
 ) -> Any:
-    """The images resized, and cut to black and white at a grey of 100; rows of values with ``images=False``."""
-    resized = [image.resize(size, Image.Resampling.LANCZOS) for image in images_list]
+    """The images resized, and cut to black and white at a grey of 100.
+
+    With ``images=False`` rows of values, of length 1 unless ``normalise`` is off.
+    """
+    resized = [as_image(image).resize(size, Image.Resampling.LANCZOS) for image in images_array]
     if bw:
         resized = [make_image_black_and_white(image, 100).convert("L") for image in resized]
-    if images and not normalise:
-        return resized
-    rows = [get_image_features(image) for image in resized]
-    return normalize(rows, axis=1) if normalise else rows
+    return resized if images else get_images_features(resized, normalise)
 
 
-def how_did_I_do(MLP: Any, data: Any, labels: Any) -> None:
+def how_did_I_do(MLP: Any, df: Any, samples: str, expected: str) -> Any:
+    """A table of what the network makes of the column ``samples``, beside the column ``expected``."""
+    table = pd.DataFrame({"Expected": df[expected], "Predicted": MLP.predict(df[samples].to_list())})
+    table["Correct"] = table["Expected"] == table["Predicted"]
+    print(f"The network got {table['Correct'].sum()} out of {len(table)} correct.")
+    return table
+
+
+def test_and_report(
+    MLP: Any,
+    test_data: Any,
+    test_labels: Any,
+    loss: bool = False,  # noqa: PT028
+) -> None:
     """Print the classification report and the confusion matrix."""
-    predictions = MLP.predict(data)
-    print(classification_report(labels, predictions, zero_division=0))
-    print(confusion_matrix(labels, predictions))
+    predictions = MLP.predict(test_data)
+    print(classification_report(test_labels, predictions, zero_division=0))
+    print(confusion_matrix(test_labels, predictions))
 
 
-test_and_report = how_did_I_do
+def test_and_report_image_data(
+    MLP: Any,
+    test_images: Any,
+    test_labels: Any,
+    loss: bool = False,  # noqa: PT028
+) -> None:
+    """The same for images, or for arrays of them."""
+    rows = [np.asarray(image).ravel() for image in test_images]
+    test_and_report(MLP, normalize(rows, norm="max"), test_labels)
 
 
-def test_and_report_image_data(MLP: Any, images: Sequence[Image.Image], labels: Any, **_: Any) -> None:
-    how_did_I_do(MLP, normalize([get_image_features(image) for image in images], norm="max"), labels)
+def generate_N_random_samples(
+    randfunc: Callable[[Any, Any], tuple[Image.Image, Any]],
+    images_array: Any,
+    labels: Sequence[Any],
+    num_samples: int = 100,
+    jiggled: bool = False,
+    cropzoom: bool = False,
+    use_signature: bool = False,
+    fill: int = 0,
+) -> tuple[list[Any], list[Any]]:
+    """As many rows of pixels, or signatures, and their labels, as ``randfunc(images_array, labels)`` draws."""
+    drawn = [randfunc(images_array, labels) for _ in range(num_samples)]
+    images = [jiggle(image) if jiggled else image for image, _ in drawn]
+    images = [crop_and_zoom_to_fit(image) if cropzoom else image for image in images]
+    if use_signature:
+        rows = [generate_signature(image, fill=fill, linear=True) for image in images]
+    else:
+        rows = [np.array([get_image_features(image)]) for image in images]
+    return rows, [label for _, label in drawn]
 
 
 def test_and_report_random_images(
     MLP: Any,
-    images: Sequence[Image.Image],
+    randfunc: Callable[[Any, Any], tuple[Image.Image, Any]],
+    images_array: Any,
     labels: Sequence[Any],
-    num_samples: int = 10,  # noqa: PT028
-    **_: Any,
+    num_samples: int = 100,  # noqa: PT028
+    jiggled: bool = False,  # noqa: PT028
+    cropzoom: bool = False,  # noqa: PT028
+    use_signature: bool = False,  # noqa: PT028
+    loss: bool = False,  # noqa: PT028
 ) -> None:
-    """Print what the network makes of images drawn by chance."""
-    for place in random.sample(range(len(images)), min(num_samples, len(images))):
-        predict_and_report_from_image(MLP, images[place], labels[place])
+    """Print the report on images that ``randfunc`` draws, such as ``get_random_image``."""
+    rows, drawn = generate_N_random_samples(
+        randfunc, images_array, labels, num_samples, jiggled, cropzoom, use_signature
+    )
+    if use_signature:
+        test_and_report(MLP, normalize(rows, axis=1), drawn)
+    else:
+        test_and_report_image_data(MLP, rows, drawn)
+
+
+def network_structure_report(MLP: Any) -> None:
+    """Print how a trained network is made up."""
+    print(f"Number of input features: {MLP.n_features_in_}")
+    print(f"Number of layers: {MLP.n_layers_}")
+    print(f"Number of outputs: {MLP.n_outputs_}")
+    print(f"Hidden layer sizes: {MLP.hidden_layer_sizes}")
+    print(f"Number of training iterations: {MLP.n_iter_}")
+
+
+def network_structure(
+    MLP: Any,
+    report: bool = True,
+    show: bool = False,
+    weights: bool = False,
+    loss: bool = False,
+    retval: bool = False,
+) -> Any:
+    """Print it; with ``retval`` give inputs, layers, outputs and hidden layers. Its drawing is left out."""
+    if report:
+        network_structure_report(MLP)
+    return (MLP.n_features_in_, MLP.n_layers_, MLP.n_outputs_, MLP.hidden_layer_sizes) if retval else None
 
 
 def _shows_nothing(*_args: Any, **_kwargs: Any) -> None:
     """Draws in a notebook; nothing here."""
 
 
-network_structure = network_structure_report = show_loss = preview_weights = _shows_nothing
+show_loss = preview_weights = multiply_image_by_weights = _shows_nothing
 prediction_class_chart = displayImageLabelPairFromArray = test_display = _shows_nothing
 
 

@@ -21,25 +21,25 @@ _FOCUS: Box = (3, 3, 17, 17)
 _SIZE = (20, 20, 3)
 
 
-def load_MNIST_images_array(fn: str) -> np.ndarray:
+def load_MNIST_images_array(fn: str = "mnist_batch_0.png") -> np.ndarray:
     """A strip of 28 x 28 images under each other as an array (n, 28, 28)."""
     return np.asarray(Image.open(fn).convert("L")).reshape(-1, 28, 28)
 
 
-def load_MNIST_labels(fn: str) -> list[int]:
+def load_MNIST_labels(fn: str = "labels.txt") -> list[int]:
     labels: list[int] = json.loads(Path(fn).read_text())
     return labels
 
 
 def load_MNIST_images_and_labels(
-    image_fn: str = "mnist_batch_0.png", label_fn: str = "labels.txt", images: bool = True
+    images_file: str = "mnist_batch_0.png", labels_file: str = "labels.txt", images: bool = True
 ) -> tuple[Any, list[int]]:
     """Images (a list, or an array with ``images=False``) and their labels."""
-    array = load_MNIST_images_array(image_fn)
-    return (get_images_list_from_images_array(array) if images else array), load_MNIST_labels(label_fn)
+    array = load_MNIST_images_array(images_file)
+    return (get_images_list_from_images_array(array) if images else array), load_MNIST_labels(labels_file)
 
 
-def report_light_sensor(state: Any, side: str) -> None:
+def report_light_sensor(state: Any, side: str = "left") -> None:
     """Print what the simulator's state says of one light sensor."""
     values = getattr(state, "state", state)
     print(
@@ -77,11 +77,19 @@ def get_sensor_image_pair(
 
 
 def get_random_image(
-    images: Sequence[Image.Image], labels: Sequence[Any] | None = None, show: bool = False, index: int | None = None
+    images_array: Any, labels: Sequence[Any] | None = None, show: bool = False, index: int | None = None
 ) -> tuple[Image.Image, Any]:
-    """An image and its label, by chance unless ``index`` is given."""
-    place = random.randrange(len(images)) if index is None else index
-    return images[place], None if labels is None else labels[place]
+    """An image and its label, by chance unless ``index`` is given, of a list of images or an array of them."""
+    place = random.randrange(len(images_array)) if index is None else index
+    label = None if labels is None else labels[place]
+    if show:
+        print(f"Image label: {label}")
+    return as_image(images_array[place]), label
+
+
+def as_image(image: Any) -> Image.Image:
+    """An image as it is, of an array one of greys."""
+    return image if isinstance(image, Image.Image) else image_from_array(image)
 
 
 def image_data_to_array(list_of_values: Sequence[Any], index: int = 0, size: tuple[int, ...] = _SIZE) -> np.ndarray:
@@ -89,8 +97,8 @@ def image_data_to_array(list_of_values: Sequence[Any], index: int = 0, size: tup
     return np.array(list(list_of_values)).reshape(size).astype(np.uint8)
 
 
-def get_resized_images_array(images: Sequence[Image.Image], size: tuple[int, int] = (20, 20)) -> np.ndarray:
-    return np.array([np.asarray(image.resize(size, Image.Resampling.LANCZOS)) for image in images])
+def get_resized_images_array(images_array: Any, size: tuple[int, int] = (20, 20)) -> np.ndarray:
+    return np.array([np.asarray(as_image(image).resize(size, Image.Resampling.LANCZOS)) for image in images_array])
 
 
 def array_from_image(img: Image.Image, size: tuple[int, int] = (28, 28)) -> np.ndarray:
@@ -111,16 +119,17 @@ def image_data_from_image(img: Image.Image) -> list[int]:
     return [int(value) for value in np.asarray(img.convert("L")).ravel()]
 
 
-def df_from_image(img: Image.Image, show: bool = False) -> pd.DataFrame:
+def df_from_image(img: Image.Image, show: bool = True, colorTheme: str = "Blues") -> pd.DataFrame:
     """A data frame with one cell a pixel."""
     return pd.DataFrame(np.asarray(img.convert("L")).astype(int))
 
 
-def image_from_df(df: pd.DataFrame) -> Image.Image:
-    return image_from_array(df.to_numpy())
+def image_from_df(df: Any) -> Image.Image:
+    """The image that a data frame has the pixels of; an image is one already."""
+    return as_image(df.to_numpy() if isinstance(df, pd.DataFrame) else df)
 
 
-def style_df(df: pd.DataFrame) -> None:
+def style_df(df: pd.DataFrame, bw: bool = False, colorTheme: str = "Blues", threshold: int = 127) -> None:
     """Shows colours in a notebook; nothing here."""
 
 
@@ -187,9 +196,13 @@ def generate_bw_image(
     return make_image_black_and_white(generate_image(df, index, size, "greyscale", crop, resize), threshold)
 
 
-def generate_signature_from_series(row: Sequence[int], fill: int = 255) -> list[int]:
+def generate_signature_from_series(
+    s: Sequence[int], fill: int = 255, threshold: int = 127, binarise: bool = False
+) -> list[int]:
     """Transitions, first value, longest run of white, longest run of black."""
-    values = [int(value) for value in row]
+    values = [int(value) for value in s]
+    if binarise:
+        values = [255 if value > threshold else 0 for value in values]
     longest = {True: 0, False: 0}
     transitions, run = 0, 0
     for place, value in enumerate(values):
@@ -202,54 +215,87 @@ def generate_signature_from_series(row: Sequence[int], fill: int = 255) -> list[
 
 
 def generate_signature(
-    img: Image.Image,
-    threshold: int = 127,
+    img: Any,
+    threshold: int | None = 127,
     normalise: Any = None,
     linear: bool = False,
     segment: Any = None,
     fill: int = 255,
+    show: bool = False,
 ) -> Any:
-    """Four numbers a row of the black-and-white image, as a data frame, or flat with ``linear``."""
-    pixels = np.asarray(make_image_black_and_white(img, threshold).convert("L"))
+    """Four numbers a row of the black-and-white image, as a data frame, or flat with ``linear``.
+
+    ``segment`` is a row, or rows, to leave out; of a flat one ``normalise`` makes a row of length 1.
+    """
+    if isinstance(img, Image.Image):
+        image = img if threshold is None else make_image_black_and_white(img, threshold)
+        pixels = np.asarray(image.convert("L"))
+    else:
+        pixels = np.asarray(img)
+    if segment:
+        pixels = np.delete(pixels, segment, axis=0)
     rows = [generate_signature_from_series(row, fill) for row in pixels]
-    return [number for row in rows for number in row] if linear else pd.DataFrame(rows)
+    if not linear:
+        return pd.DataFrame(rows)
+    flat = [number for row in rows for number in row]
+    return _normalised([flat], "l2") if normalise else flat
 
 
-def get_image_from_state(csv: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB") -> Image.Image:
+def get_image_from_state(
+    data: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB", zoom: bool = True
+) -> Image.Image:
     """The image in a sensor's raw string, alpha included."""
-    return Image.fromarray(image_data_to_array([int(number) for number in csv.split(",")], size=size)).convert(mode)
+    return Image.fromarray(image_data_to_array([int(number) for number in data.split(",")], size=size)).convert(mode)
 
 
-def preview_state_image(*_args: Any, **_kwargs: Any) -> None:
-    """Shows an image in a notebook; nothing here."""
+def preview_state_image(
+    data: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB", zoom: bool = True, retval: bool = True
+) -> Image.Image | None:
+    """The same unless ``retval`` is off; it is shown in a notebook, and not here."""
+    return get_image_from_state(data, size, mode) if retval else None
 
 
-def _trimmed(pixels: np.ndarray, background: int) -> np.ndarray:
-    inside = pixels != background
-    rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-    if not rows.size:
-        return pixels
-    return pixels[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+def background_column(s: Sequence[int], background: int = 255, threshold: Any = None) -> bool:
+    return all(int(value) == background for value in s)
 
 
-def background_column(column: Sequence[int], background: int = 255) -> bool:
-    return all(int(value) == background for value in column)
+def clear_columns(
+    df: pd.DataFrame, reverse: bool = False, transpose: bool = False, background: int = 255, threshold: Any = None
+) -> pd.DataFrame:
+    """Without the columns of background at the left; at the right with ``reverse``; of rows with ``transpose``."""
+    table = df.T if transpose else df
+    inside = np.flatnonzero((table.to_numpy() != background).any(axis=0))
+    if inside.size:
+        table = table.iloc[:, : inside[-1] + 1] if reverse else table.iloc[:, inside[0] :]
+    return table.T if transpose else table
 
 
-def clear_columns(df: pd.DataFrame, background: int = 255) -> pd.DataFrame:
-    """Without the uniform columns at either side."""
-    keep = [place for place in range(df.shape[1]) if not background_column(df.iloc[:, place].tolist(), background)]
-    return df.iloc[:, keep[0] : keep[-1] + 1] if keep else df
+def trim_image(
+    bw_df: Any,
+    background: int = 255,
+    reindex: bool = False,
+    show: bool = True,
+    colorTheme: str = "Blues",
+    image: bool = False,
+    threshold: Any = False,
+) -> Any:
+    """Without the rows and columns of background round the edge.
+
+    Of an image an image; of a data frame one, with the old names of its rows and columns unless ``reindex``, or an
+    image if that is asked for.
+    """
+    table = bw_df if isinstance(bw_df, pd.DataFrame) else df_from_image(bw_df)
+    for reverse in (False, True):
+        for transpose in (False, True):
+            table = clear_columns(table, reverse, transpose, background)
+    if image or not isinstance(bw_df, pd.DataFrame):
+        return image_from_df(table)
+    return pd.DataFrame(table.to_numpy()) if reindex else table.copy()
 
 
-def trim_image(img: Any, background: int = 255) -> Any:
-    """Without the rows and columns of background round the edge; a data frame stays one."""
-    if isinstance(img, pd.DataFrame):
-        return pd.DataFrame(_trimmed(img.to_numpy(), background))
-    return image_from_array(_trimmed(np.asarray(img.convert("L")), background))
-
-
-def crop_and_pad_to_fit(img: Image.Image, background: int = 255) -> Image.Image:
+def crop_and_pad_to_fit(
+    img: Image.Image, background: int = 255, scale: float = 1, quiet: bool = True, threshold: Any = None
+) -> Image.Image:
     """The trimmed image in the middle of a canvas of the old size."""
     trimmed = trim_image(img, background)
     canvas = Image.new("L", img.size, background)
@@ -257,7 +303,7 @@ def crop_and_pad_to_fit(img: Image.Image, background: int = 255) -> Image.Image:
     return canvas
 
 
-def crop_and_zoom_to_fit(img: Image.Image, background: int = 0) -> Image.Image:
+def crop_and_zoom_to_fit(img: Image.Image, background: int = 0, scale: float = 1, quiet: bool = True) -> Image.Image:
     """The trimmed image enlarged to the old size."""
     zoomed: Image.Image = trim_image(img, background).resize(img.size, Image.Resampling.LANCZOS)
     return zoomed
@@ -272,13 +318,13 @@ def jiggle(img: Image.Image, background: int = 0, quiet: bool = True) -> Image.I
     return canvas
 
 
-def get_image_features(img: Image.Image) -> list[int]:
-    return image_data_from_image(img)
+def get_image_features(image: Image.Image) -> list[int]:
+    return image_data_from_image(image)
 
 
-def get_images_features(images: Sequence[Image.Image], normalise: bool = True) -> Any:
+def get_images_features(images_list: Sequence[Image.Image], normalise: bool = True) -> Any:
     """One row of pixel values an image, of length 1 unless ``normalise`` is off."""
-    rows = [get_image_features(image) for image in images]
+    rows = [get_image_features(image) for image in images_list]
     return _normalised(rows, "l2") if normalise else rows
 
 

@@ -11,6 +11,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+#: Cell magics that run the rest of their cell as Python, whatever they show or measure of it.
+WRAPPERS = frozenset(
+    ("capture", "heat", "lprun", "memit", "mprun", "nbtutor", "prun", "scalene", "snakeviz", "time", "timeit")
+)
+#: Line magics that do so with the rest of their line, after their options.
+LINE_WRAPPERS = frozenset(("time", "timeit", "prun", "memit"))
+
+_OPTIONS = re.compile(r"(?:-[nrpl][ \t]*\d+[ \t]+|-s[ \t]+\w+[ \t]+|-\w+[ \t]+)*")
 _CELL_MAGIC = re.compile(r"%%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
 _LINE_MAGIC = re.compile(r"%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
 _ASSIGNED = re.compile(r"(?P<target>[A-Za-z_][\w.,\[\]'\" ]*=[ \t]*)(?P<rest>[%!].*)\Z")
@@ -41,6 +49,11 @@ def cell_magic(source: str) -> CellMagic | None:
             return None
         return CellMagic(match["name"], match["line"] or "", "\n".join(lines[place + 1 :]), place + 1)
     return None
+
+
+def wrapped(line: str) -> str:
+    """The Python in the line of a magic that runs it."""
+    return python_source(line[_OPTIONS.match(line).end() :])  # type: ignore[union-attr]
 
 
 def python_source(source: str) -> str:

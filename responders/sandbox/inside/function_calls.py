@@ -6,25 +6,31 @@ What is called and what the value is worth is the worker's business, on the othe
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
-from . import student_code
 from .frames import Frame, fits
+from .student_code import StudentFiles
 
 #: In place of a responder's name: the module needs none.
 NO_RESPONDER = ""
 
 
-def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
-    """The answer to one ``call`` spec; ``name`` is that of the student's file, for line numbers."""
+def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Frame:
+    """The answer to one ``call`` spec."""
     function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
+    return value_frame(lambda: function(*spec["arguments"], **spec["named"]), files)
+
+
+def value_frame(call: Callable[[], Any], files: StudentFiles) -> Frame:
+    """What a call of the student's gives, or what went wrong instead."""
     try:
-        value = function(*spec["arguments"], **spec["named"])
-        text = _as_json(value)
+        value = call()
+        text = as_json(value)
     except BaseException as error:
-        return {"do": "returned", "kind": "error", "error": student_code.describe(error, name)}
+        return {"do": "returned", "kind": "error", "error": files.described(error)}
     if text is None:
         return {"do": "returned", "kind": "other", "type": type(value).__name__[:100]}
     if not fits(text):
@@ -32,7 +38,7 @@ def returned(namespace: dict[str, Any], name: str, spec: Frame) -> Frame:
     return {"do": "returned", "kind": "value", "text": text}
 
 
-def _as_json(value: Any) -> str | None:
+def as_json(value: Any) -> str | None:
     """None for what JSON does not have; arrays are lists."""
     try:
         return json.dumps(value, allow_nan=False, default=_plain)

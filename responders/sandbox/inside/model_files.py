@@ -14,8 +14,6 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from .student_code import line_of
-
 
 def preload_runtimes() -> None:
     """Import onnxruntime and ai-edge-litert, where they may be had; each does with one thread: there are no more."""
@@ -77,7 +75,7 @@ def explain_joblib() -> None:
     joblib.load = numpy_pickle.load = explained
 
 
-def install_version_notes(name: str, tell: Callable[[str, int | None], None]) -> None:
+def install_version_notes(tell: Callable[[str], None]) -> None:
     """Tell, once for each version, that a model was saved by another scikit-learn; other warnings are shown as ever."""
     if "sklearn" not in sys.modules:
         return
@@ -94,6 +92,6 @@ def install_version_notes(name: str, tell: Callable[[str, int | None], None]) ->
         if saved not in told and len(told) < 3:
             told.add(saved)
             sentence = f"a model was saved by scikit-learn {saved} and is read by {read}; it may answer differently"
-            tell(sentence, line_of(sys._getframe(), name))
+            tell(sentence)
 
     warnings.showwarning = show_or_tell

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from . import cell_source, student_code
+from . import cell_source, own_modules, student_code
 from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
 from .responder_role import ResponderRole
@@ -30,9 +30,11 @@ class NotebookRole(ResponderRole):
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
         super().__init__(wire, grants, spec)
         self._notes = 0
-        self._muted = False
+        self._captured: list[str] | None = None
+        self._body_above = 0
         self._robot_runs = False
         self._given_msg: str | None = None
+        self._shell = Shell(self)
 
     @property
     def namespace(self) -> dict[str, Any]:
@@ -42,18 +44,19 @@ class NotebookRole(ResponderRole):
     def run(self) -> None:
         """Execute all cells, then answer until the worker closes the wire."""
         from nbev3devsim import unseen
+        from nbev3devsim.load_nbev3devwidget import roboSim
 
         self._prepare()
-        shell = Shell(self)
-        unseen.install(shell)
-        self._namespace.update(get_ipython=lambda: shell, display=unseen.display, In=[], Out={})
+        roboSim.look = self._look
+        unseen.install(self._shell)
+        self._namespace.update(get_ipython=lambda: self._shell, display=unseen.display, In=[], Out={})
         builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
         text = "".join(source + "\n" for source in self._spec["cells"])
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
         above = 0
         for place, source in enumerate(self._spec["cells"]):
             self._wire.send({"do": "cell", "place": place})
-            error = self._execute(source, above, shell)
+            error = self._execute(source, above)
             if error is not None:
                 self._wire.send({"do": "raised", "error": error})
             above += source.count("\n") + 1
@@ -65,8 +68,7 @@ class NotebookRole(ResponderRole):
         """Tell the worker, with the line that is being run."""
         self._notes += 1
         if self._notes <= _MOST_NOTES:
-            line = student_code.line_of(sys._getframe(), self._name)
-            self._wire.send({"do": "note", "text": clip(text, 300), "line": line})
+            self._wire.send({"do": "note", "text": clip(text, 300), **self._files.place(sys._getframe())})
 
     def expand(self, line: str) -> str:
         """``{expression}`` and ``$name`` in a magic's line, by the names that the cell has there."""
@@ -77,17 +79,30 @@ class NotebookRole(ResponderRole):
             frame = frame.f_back  # type: ignore[assignment]
         return cell_source.expanded(line, self._namespace | (frame.f_locals if frame is not None else {}))
 
-    def run_python(self, text: str) -> None:
-        """More code of the cell's, as ``%time`` has it."""
-        exec(compile(text, self._name, "exec", dont_inherit=True), self._namespace)
+    def run_line(self, text: str) -> Any:
+        """More code in the line that is being run, as ``%time`` has it; its value, if it has one."""
+        return self._evaluated(text, (self._files.line_in_main(sys._getframe()) or 1) - 1)
 
-    def muted(self, work: Callable[[], None]) -> None:
-        """Do ``work`` and drop what is printed meanwhile."""
-        self._muted = True
+    def run_body(self, body: str) -> None:
+        """The rest of a cell whose magic runs it."""
+        self._run_source(body, self._body_above)
+
+    def run_file(self, name: str) -> None:
+        """A Python file beside the notebook, among the cells' names, as ``%run`` has it."""
+        text = own_modules.in_folder(name.removesuffix(".py"))
+        if text is None:
+            raise FileNotFoundError(f"there is no file {name} beside the notebook")
+        self._files.imported.add(name)
+        exec(student_code.compile_source(text, name), self._namespace)
+
+    def captured(self, work: Callable[[], None]) -> str:
+        """Do ``work`` and give what is printed meanwhile."""
+        outer, self._captured = self._captured, []
         try:
             work()
+            return "".join(f"{text}\n" for text in self._captured)
         finally:
-            self._muted = False
+            self._captured = outer
 
     def start_robot(self, name: str, arguments: str, body: str | None) -> None:
         """Hand a robot program or its flags to the worker, and answer until the robot has come to its end."""
@@ -102,7 +117,7 @@ class NotebookRole(ResponderRole):
         self._fix_msg()
         self._robot_runs = True
         began = self._units
-        line = student_code.line_of(sys._getframe(), self._name)
+        line = self._files.line_in_main(sys._getframe())
         self._wire.send(
             {
                 "do": "magic",
@@ -122,35 +137,53 @@ class NotebookRole(ResponderRole):
         self._robot_runs = False
         self._units = max(self._units, began + frame["t"])
         roboSim.collect(frame["data"], frame["images"])
-        if frame["state"] is not None:
-            roboSim.robot_state = frame["state"]
+        roboSim.robot_state = frame["state"] or {}
 
-    def _execute(self, source: str, above: int, shell: Shell) -> Frame | None:
+    def _look(self) -> dict[str, Any]:
+        if self._robot_runs:
+            return {}
+        self._wire.send({"do": "state"})
+        state: dict[str, Any] = self._wire.receive()["state"]
+        return state
+
+    def _execute(self, source: str, above: int) -> Frame | None:
         """Run one cell, ``above`` being the lines of all before it. The error that ended it, if any."""
         try:
-            magic = cell_source.cell_magic(source)
-            if magic is not None:
-                self._call_cell_magic(magic, above, shell)
-            else:
-                self._run_cell(cell_source.python_source(source), above)
+            self._run_source(source, above)
         except BaseException as error:
             if isinstance(error, SystemExit) and error.code in (None, 0):
                 return None
-            return student_code.describe(error, self._name)
+            return self._files.described(error)
         return None
 
-    def _call_cell_magic(self, magic: cell_source.CellMagic, above: int, shell: Shell) -> None:
+    def _run_source(self, source: str, above: int) -> None:
+        magic = cell_source.cell_magic(source)
+        if magic is not None:
+            self._call_cell_magic(magic, above)
+        else:
+            self._run_cell(cell_source.python_source(source), above)
+
+    def _call_cell_magic(self, magic: cell_source.CellMagic, above: int) -> None:
+        self._body_above = above + magic.number
         tree = ast.parse("get_ipython().run_cell_magic(_robomark_name, _robomark_line, _robomark_body)", self._name)
         ast.increment_lineno(tree, above + magic.number - 1)
         names = {
             "_robomark_name": magic.name,
             "_robomark_line": magic.line,
             "_robomark_body": magic.body,
-            "get_ipython": lambda: shell,
+            "get_ipython": lambda: self._shell,
         }
         exec(compile(tree, self._name, "exec", dont_inherit=True), names)
 
     def _run_cell(self, text: str, above: int) -> None:
+        value = self._evaluated(text, above)
+        if value is not None and not text.rstrip().endswith(";"):
+            self._namespace["_"] = value
+            # Where in memory a thing lies is nobody's business, and another place each time.
+            print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
+
+    def _evaluated(self, text: str, above: int) -> Any:
+        """Run it, ``above`` being the lines before it; the value of its last line, if that is an expression."""
         try:
             tree = ast.parse(text, self._name)
         except SyntaxError as error:
@@ -161,15 +194,11 @@ class NotebookRole(ResponderRole):
         ast.increment_lineno(tree, above)
         exec(compile(tree, self._name, "exec", dont_inherit=True), self._namespace)
         if last is None:
-            return
+            return None
         assert isinstance(last, ast.Expr)
         shown = ast.Expression(last.value)
         ast.increment_lineno(shown, above)
-        value = eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
-        if value is not None and not text.rstrip().endswith(";"):
-            self._namespace["_"] = value
-            # Where in memory a thing lies is nobody's business, and another place each time.
-            print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
+        return eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
 
     def _missing(self) -> str | None:
         """Why there is nothing in force that could answer the robot, if so."""
@@ -191,8 +220,10 @@ class NotebookRole(ResponderRole):
         return frame
 
     def _emit(self, text: str) -> None:
-        if not self._muted:
+        if self._captured is None:
             super()._emit(text)
+        else:
+            self._captured.append(self._files.without_folders(text))
 
 
 def _leave(code: object = None) -> None:

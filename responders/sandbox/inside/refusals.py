@@ -12,7 +12,7 @@ from typing import Any
 
 from . import withheld
 from .lockdown import Grants
-from .student_code import line_of
+from .student_code import StudentFiles
 
 NETWORK = "programs here may not open network connections"
 PROGRAMS = "programs here may not start other programs"
@@ -35,20 +35,21 @@ _SENTENCES = {
 }
 
 
-def install(grants: Grants, name: str, tell: Callable[[str, int | None], None]) -> None:
-    """Refuse with a sentence from now on; ``tell(sentence, line)`` for the first few, line being the student's."""
+def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
+    """Refuse with a sentence from now on; ``tell(sentence)`` for the first few, from within what was refused."""
     here = os.getcwd()
     own = (here,) if here != "/" else ()
     libraries = tuple(path.rstrip("/") + "/" for path in grants.read)
     folders = (*libraries, *(f"{path}/" for path in own))
     files = frozenset((*grants.read, *own))
-    told: set[tuple[str, int | None]] = set()
+    told: set[tuple[str, str | None, int | None]] = set()
 
     def note(sentence: str) -> None:
-        line = line_of(sys._getframe(), name)
-        if (sentence, line) not in told and len(told) < _MOST_TOLD:
-            told.add((sentence, line))
-            tell(sentence, line)
+        place = student.place(sys._getframe())
+        once = (sentence, place["file"], place["line"])
+        if once not in told and len(told) < _MOST_TOLD:
+            told.add(once)
+            tell(sentence)
 
     def refuse(sentence: str) -> PermissionError:
         note(sentence)
@@ -61,7 +62,7 @@ def install(grants: Grants, name: str, tell: Callable[[str, int | None], None]) 
         if event == "open" and isinstance(args[0], str) and args[0].startswith("/"):
             path = args[0]
             if path not in files and not path.startswith(folders):
-                if sys._getframe(1).f_code.co_filename == name:
+                if student.has(sys._getframe(1).f_code.co_filename):
                     raise refuse(FILES)
                 # A library that looks round by itself is refused too, but that is no news for a report.
                 raise PermissionError(1, FILES)

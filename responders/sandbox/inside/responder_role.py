@@ -14,11 +14,12 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, function_calls, model_files, refusals, student_code
+from . import determinism, function_calls, model_files, other_agents, own_modules, refusals, student_code
 from .frames import Frame, Wire, clip, fits, fitted
 from .lockdown import Grants
 
 _NOTED = ("parser", "agent", "logger")
+_FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
 class ResponderRole:
@@ -29,10 +30,12 @@ class ResponderRole:
         self._grants = grants
         self._spec = spec
         self._name: str = spec["name"]
+        self._files = student_code.StudentFiles(self._name)
         self._function: str | None = spec["function"]
+        self._own_name = "responder"
         self._units = 0
         self._namespace: dict[str, Any] = {}
-        self._defines_msg = False
+        self._defines_msg = self._defines_sender = False
         self._stack: list[str] = []
         self._calls = 0
 
@@ -50,20 +53,20 @@ class ResponderRole:
         student_code.install_output(self._emit)
         determinism.install_clock(lambda: self._units, self._sleep)
         determinism.install_chance(self._spec["seed"])
-        refusals.install(self._grants, self._name, self._refused)
-        model_files.install_version_notes(self._name, self._refused)
-        # Last, so that no file of the student's stands in for a library's.
-        sys.path.append(os.getcwd())
+        refusals.install(self._grants, self._files, self._refused)
+        model_files.install_version_notes(self._refused)
+        own_modules.install(own_modules.in_folder, own_modules.names_in_folder(), self._files, self._refused)
         module = types.ModuleType("__main__")
         sys.modules["__main__"] = module
         self._namespace = module.__dict__
         self._namespace.update(roboSim=roboSim, eds=eds)
+        self._namespace.update(other_agents.functions(self._spec.get("agents", ()), self._wire, self._waited))
 
     def _serve(self) -> None:
         while True:
             message = self._wire.receive()
             if message["do"] == "call":
-                self._wire.send(function_calls.returned(self._namespace, self._name, message))
+                self._wire.send(function_calls.returned(self._namespace, self._files, message))
             else:
                 self._hear(message, 0)
 
@@ -73,6 +76,8 @@ class ResponderRole:
 
         self._units = max(self._units, began + message["t"])
         roboSim.collect(message.get("data", []), message.get("images", []))
+        if "sender" in message and not self._defines_sender:
+            self._namespace["sender"] = message["sender"]
         self._wire.send(self._answer(message["text"]))
 
     def _load(self, text: str) -> Frame | None:
@@ -82,8 +87,8 @@ class ResponderRole:
             if self._function != function_calls.NO_RESPONDER:
                 self._find()
         except BaseException as error:
-            return student_code.describe(error, self._name)
-        self._defines_msg = "msg" in self._namespace
+            return self._files.described(error)
+        self._defines_msg, self._defines_sender = "msg" in self._namespace, "sender" in self._namespace
         return None
 
     def _find(self) -> Callable[[str], Any]:
@@ -121,7 +126,7 @@ class ResponderRole:
         try:
             answer = self._find()(text)
         except BaseException as error:
-            return {"do": "answer", "kind": "error", "error": student_code.describe(error, self._name)}
+            return {"do": "answer", "kind": "error", "error": self._files.described(error)}
         if not isinstance(answer, str):
             return {"do": "answer", "kind": "other", "type": type(answer).__name__}
         if not fits(answer):
@@ -132,7 +137,8 @@ class ResponderRole:
         """Wrap what parser, agent and logger are bound to now, and the predict of every bound network."""
         for name, value in list(self._namespace.items()):
             if name in _NOTED:
-                if callable(value) and not hasattr(value, "_robomark_noted"):
+                # An object that is called may keep something that a function in its place would not.
+                if name != self._own_name and isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
                     self._namespace[name] = self._noted(name, value)
                 continue
             predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
@@ -177,15 +183,18 @@ class ResponderRole:
         self._units += units
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
 
-    def _emit(self, text: str) -> None:
-        self._wire.send({"do": "print", "text": fitted(text)})
+    def _waited(self, until: int) -> None:
+        self._units = max(self._units, until)
 
-    def _refused(self, what: str, line: int | None) -> None:
-        self._wire.send({"do": "refused", "what": what, "line": line})
+    def _emit(self, text: str) -> None:
+        self._wire.send({"do": "print", "text": fitted(self._files.without_folders(text))})
+
+    def _refused(self, what: str) -> None:
+        self._wire.send({"do": "refused", "what": what, **self._files.place(sys._getframe())})
 
     def _busy(self, _: int, frame: FrameType | None) -> None:
         try:
-            self._wire.send({"do": "busy", "line": student_code.line_of(frame, self._name)})
+            self._wire.send({"do": "busy", **self._files.place(frame)})
         finally:
             os._exit(0)
 

@@ -1,6 +1,6 @@
-"""The responders' zygote: what is imported before any fork, and whether a module or a notebook is to be run.
+"""The responders' zygote: what is imported before any fork, and whether a module, an agent or a notebook is to be run.
 
-What runs then is in ``responder_role.py`` and ``notebook_role.py``.
+What runs then is in ``responder_role.py``, ``agent_role.py`` and ``notebook_role.py``.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import contextlib
 import importlib
 
 from . import model_files, source_reader  # noqa: F401
+from .agent_role import AgentRole
 from .frames import Wire
 from .lockdown import Grants
 from .notebook_role import NotebookRole
@@ -66,5 +67,5 @@ def _ask_the_machine() -> None:
 def run(wire: Wire, grants: Grants) -> None:
     """Receive a module or a notebook, run it, and answer."""
     spec = wire.receive()
-    requester = NotebookRole if "cells" in spec else ResponderRole
-    requester(wire, grants, spec).run()
+    role = NotebookRole if "cells" in spec else AgentRole if "agent" in spec else ResponderRole
+    role(wire, grants, spec).run()

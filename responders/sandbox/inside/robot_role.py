@@ -12,7 +12,7 @@ import types
 from types import FrameType
 from typing import Any
 
-from . import determinism, refusals, student_code
+from . import determinism, own_modules, refusals, student_code
 from .frames import Frame, Wire, clip, fitted
 from .lockdown import Grants
 
@@ -30,13 +30,13 @@ def run(wire: Wire, grants: Grants) -> None:
     from brick_preambles import PREAMBLES
 
     spec = wire.receive()
-    name: str = spec["name"]
+    files = student_code.StudentFiles(spec["name"])
 
     def stuck() -> None:
-        _leave(wire, {"do": "stuck", "line": student_code.line_of(sys._getframe(), name)})
+        _leave(wire, {"do": "stuck", **files.place(sys._getframe())})
 
     def busy(_: int, frame: FrameType | None) -> None:
-        _leave(wire, {"do": "busy", "line": student_code.line_of(frame, name)})
+        _leave(wire, {"do": "busy", **files.place(frame)})
 
     def emit(text: str) -> None:
         link.tell({"do": "print", "text": fitted(text)})
@@ -48,30 +48,34 @@ def run(wire: Wire, grants: Grants) -> None:
     def sleep(units: int) -> None:
         link.ask({"do": "wait", "units": units})
 
+    def refused(what: str) -> None:
+        wire.send({"do": "refused", "what": what, **files.place(sys._getframe())})
+
     signal.signal(signal.SIGXCPU, busy)
-    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"])
+    link.number = spec.get("number", 1)
+    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"], spec["tick"])
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(spec["seed"])
-    refusals.install(grants, name, lambda what, line: wire.send({"do": "refused", "what": what, "line": line}))
+    refusals.install(grants, files, refused)
+    own_modules.install(own_modules.given(spec["modules"]), spec["modules"], files, refused)
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
-    wire.send({"do": "end", "error": _execute(spec, PREAMBLES[spec["preamble"]], module.__dict__)})
+    wire.send({"do": "end", "error": _execute(spec, PREAMBLES[spec["preamble"]], module.__dict__, files)})
     wire.receive()
 
 
-def _execute(spec: Frame, preamble: str, namespace: dict[str, Any]) -> Frame | None:
+def _execute(spec: Frame, preamble: str, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
     """The error that ended the program, or None."""
-    name: str = spec["name"]
     try:
         exec(compile(preamble, "<preamble>", "exec", dont_inherit=True), namespace)
-        exec(student_code.compile_source(spec["text"], name), namespace)
+        exec(student_code.compile_source(spec["text"], files.main), namespace)
     except SystemExit as ending:
         if ending.code in (None, 0):
             return None
-        return {"type": "SystemExit", "text": clip(str(ending.code)), "line": None}
+        return {"type": "SystemExit", "text": clip(str(ending.code)), "line": None, "file": None}
     except BaseException as error:
-        return student_code.describe(error, name)
+        return files.described(error)
     return None
 
 

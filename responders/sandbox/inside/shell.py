@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from . import refusals
-from .cell_source import python_source
+from .cell_source import LINE_WRAPPERS, WRAPPERS, wrapped
 
 _ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
 #: Drawn from the text of their cells, by the report.
@@ -22,6 +22,7 @@ _WITHOUT_EFFECT = frozenset(
     (
         *("load_ext", "reload_ext", "unload_ext", "matplotlib", "pylab", "config", "autoreload", "precision", "xmode"),
         *("colors", "autosave", "alias_magic", "pinfo", "pdoc", "psource"),
+        *("who", "who_ls", "whos", "hist", "history", "lsmagic", "magic", "quickref", "pdef", "pfile", "pinfo2", "pdb"),
         *("html", "HTML", "javascript", "js", "markdown", "latex", "svg", "SVG"),
     )
 )
@@ -47,14 +48,39 @@ class RunRequester(Protocol):
     def start_robot(self, name: str, arguments: str, body: str | None) -> None:
         """Run a robot program, or set its flags, as the magic ``%name`` asks; ``body`` is the rest of its cell."""
 
-    def run_python(self, text: str) -> None:
-        """Run more code among the cell's names."""
+    def run_line(self, text: str) -> Any:
+        """Run more code in the line that is being run; its value, if it has one."""
+
+    def run_body(self, body: str) -> None:
+        """Run the rest of a magic's cell."""
+
+    def run_file(self, name: str) -> None:
+        """Run a Python file beside the notebook among the cells' names."""
 
     def expand(self, line: str) -> str:
         """Put values in the places of ``{expression}`` and ``$name`` in a magic's line."""
 
-    def muted(self, work: Callable[[], None]) -> None:
-        """Do ``work`` and drop what is printed meanwhile."""
+    def captured(self, work: Callable[[], None]) -> str:
+        """Do ``work`` and give what is printed meanwhile."""
+
+
+class CapturedOutput:
+    """What ``%%capture name`` binds to the name."""
+
+    def __init__(self, stdout: str) -> None:
+        self.stdout = stdout
+        self.stderr = ""
+        self.outputs: list[Any] = []
+
+    def show(self) -> None:
+        """Print it after all."""
+        if self.stdout:
+            print(self.stdout.removesuffix("\n"))
+
+    __call__ = show
+
+    def __str__(self) -> str:
+        return self.stdout
 
 
 class Shell:
@@ -68,13 +94,14 @@ class Shell:
             "more": self._cat,
             "pycat": self._cat,
             "ls": self._ls,
-            "time": lambda line: self._requester.run_python(python_source(line)),
+            "run": self._run,
+            **dict.fromkeys(LINE_WRAPPERS, lambda line: self._requester.run_line(wrapped(line))),
         }
         self._cells: dict[str, Callable[[str, str], Any]] = {
+            **dict.fromkeys(WRAPPERS, lambda _, body: self._requester.run_body(body)),
+            "capture": self._capture,
             "writefile": self._write,
             "file": self._write,
-            "time": lambda _, body: self._requester.run_python(python_source(body)),
-            "capture": lambda _, body: self._requester.muted(lambda: self._requester.run_python(python_source(body))),
         }
 
     @property
@@ -140,6 +167,18 @@ class Shell:
         for name in _words(line):
             with open(name, encoding="utf-8", errors="replace") as file:
                 print(file.read())
+
+    def _run(self, line: str) -> None:
+        name = next((word for word in _words(line) if not word.startswith("-")), "")
+        if name.endswith(".ipynb"):
+            self._requester.note(f"%run {_short(name)} was skipped: another notebook cannot be run here")
+        else:
+            self._requester.run_file(name if name.endswith(".py") else f"{name}.py")
+
+    def _capture(self, line: str, body: str) -> None:
+        text = self._requester.captured(lambda: self._requester.run_body(body))
+        for name in [word for word in _words(line) if not word.startswith("-")][:1]:
+            self._requester.namespace[name] = CapturedOutput(text)
 
     def _ls(self, _: str) -> None:
         print("  ".join(sorted(os.listdir("."))))

@@ -346,12 +346,18 @@ class Walk:
         expressions = list(cell_source.expressions(line))
         for expression in expressions:
             self._run_text(expression, number, here)
-        if name == "time" and body is None:
+        if name in cell_source.LINE_WRAPPERS and body is None:
             if expressions:
-                self._add("any_name", "a value in the line of %time", place, here)
-            self._run_text(cell_source.python_source(line), number, here)
-        elif name in ("time", "capture") and body is not None:
-            self._run_text(cell_source.python_source(body), number + 1, here)
+                self._add("any_name", f"a value in the line of %{name}", place, here)
+            self._run_text(cell_source.wrapped(line), number, here)
+        elif name in cell_source.WRAPPERS and body is not None:
+            inner = cell_source.cell_magic(body)
+            if inner is not None:
+                self._magic(inner.name, inner.line, inner.body, number + inner.number, here)
+            else:
+                self._run_text(cell_source.python_source(body), number + 1, here)
+        elif name == "run" and body is None:
+            self._add("import", line.split()[0].removesuffix(".py") if line.split() else "", place, here)
         elif name in ("writefile", "file") and body is not None:
             self.written.append(("".join(line.split()[-1:]).strip("'\""), body))
 

@@ -1,13 +1,16 @@
-"""Compiling and running a student's file, and saying where in it something went wrong.
+"""Compiling and running a student's files, and saying where in them something went wrong.
 
-Only frames of that file count: a line number is always one that the student can look up.
+Only frames of those files count: a line number is always one that the student can look up.
 """
 
 from __future__ import annotations
 
 import builtins
 import linecache
+import os
+import sys
 import traceback
+import warnings
 from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import Any
@@ -23,18 +26,75 @@ def compile_source(text: str, name: str) -> CodeType:
     return compile(text, name, "exec", dont_inherit=True)
 
 
-def describe(error: BaseException, name: str) -> Frame:
-    """The error as a frame: its type, its words, and the last line of the student's file on the way to it."""
-    line: int | None = None
-    if isinstance(error, SyntaxError) and error.filename == name:
-        line = error.lineno
-        words = error.msg or "invalid syntax"
-    else:
-        for frame, number in traceback.walk_tb(error.__traceback__):
-            if frame.f_code.co_filename == name:
-                line = number
-        words = _words(error)
-    return {"type": type(error).__name__, "text": clip(words), "line": line}
+class StudentFiles:
+    """The file that is run, and those beside it that it has imported; what of them is meant by a frame or an error."""
+
+    def __init__(self, main: str) -> None:
+        self.main = main
+        self.imported: set[str] = set()
+        here = os.getcwd()
+        self._folder = f"{here}/" if here != "/" else None
+        folders = {here, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
+        # The longest first: one may lie in another.
+        self._folders = [f"{folder}/" for folder in sorted(folders, key=len, reverse=True)]
+
+    def has(self, name: str) -> bool:
+        """Whether code with this file name is the student's."""
+        return name == self.main or self._beside(name) is not None
+
+    def place(self, frame: FrameType | None) -> Frame:
+        """``line`` and ``file`` of what is being run, from an inner frame outwards; the main file is None."""
+        while frame is not None:
+            if self.has(frame.f_code.co_filename):
+                return self._place(frame.f_code.co_filename, frame.f_lineno)
+            frame = frame.f_back
+        return {"line": None, "file": None}
+
+    def line_in_main(self, frame: FrameType | None) -> int | None:
+        """The line of the main file that has led here."""
+        while frame is not None:
+            if frame.f_code.co_filename == self.main:
+                return frame.f_lineno
+            frame = frame.f_back
+        return None
+
+    def described(self, error: BaseException) -> Frame:
+        """The error as a frame: its type, its words, and the last line of the student's files on the way to it."""
+        place: Frame = {"line": None, "file": None}
+        if isinstance(error, SyntaxError) and error.filename is not None and self.has(error.filename):
+            place = self._place(error.filename, error.lineno)
+            words = error.msg or "invalid syntax"
+        else:
+            for frame, number in traceback.walk_tb(error.__traceback__):
+                if self.has(frame.f_code.co_filename):
+                    place = self._place(frame.f_code.co_filename, number)
+            words = _words(error)
+        return {"type": type(error).__name__, "text": clip(self.without_folders(words)), **place}
+
+    def without_folders(self, text: str) -> str:
+        """``text`` without what leads to this machine's modules and to the working folder."""
+        if "/" not in text:
+            return text
+        for folder in self._folders:
+            text = text.replace(folder, "")
+        return text if self._folder is None else text.replace(self._folder[:-1], ".")
+
+    def _place(self, name: str, line: int | None) -> Frame:
+        return {"line": line, "file": None if name == self.main else self._beside(name)}
+
+    def _beside(self, name: str) -> str | None:
+        """The flat name of a file beside the main one."""
+        if name in self.imported:
+            return name
+        if self._folder is not None and name.startswith(self._folder):
+            flat = name.removeprefix(self._folder)
+            return flat if is_module_file(flat) else None
+        return None
+
+
+def is_module_file(name: str) -> bool:
+    """Whether a file of this name can be imported by its stem."""
+    return name.endswith(".py") and name.removesuffix(".py").isidentifier()
 
 
 def _words(error: BaseException) -> str:
@@ -42,15 +102,6 @@ def _words(error: BaseException) -> str:
         return str(error)
     except Exception:
         return "(its message cannot be shown)"
-
-
-def line_of(frame: FrameType | None, name: str) -> int | None:
-    """The line of the student's file that is being run, counted from an inner frame outwards."""
-    while frame is not None:
-        if frame.f_code.co_filename == name:
-            return frame.f_lineno
-        frame = frame.f_back
-    return None
 
 
 class Output:
@@ -95,11 +146,10 @@ class Output:
 
 def install_output(emit: Callable[[str], None]) -> None:
     """Let one call of ``print`` be one text, without its end, and refuse ``input``."""
-    import sys
-
     stream = Output(emit)
     sys.stdout = sys.stderr = stream
     sys.stdin = None
+    warnings.formatwarning = _without_its_folder
     real_print = builtins.print
 
     def one_text(
@@ -118,3 +168,8 @@ def install_output(emit: Callable[[str], None]) -> None:
     one_text.__name__, no_input.__name__ = "print", "input"
     builtins.print = one_text
     builtins.input = no_input
+
+
+def _without_its_folder(message: Any, category: type[Warning], filename: str, lineno: int, line: Any = None) -> str:
+    """As Python has it, but for the folder of the file, which is another on each machine."""
+    return f"{os.path.basename(filename)}:{lineno}: {category.__name__}: {message}\n"

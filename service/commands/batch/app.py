@@ -18,19 +18,29 @@ from service.commands.batch.awaited import marks_awaited
 from service.commands.batch.control import BatchId, cancel, pause, resume, retry
 from service.commands.batch.export import export
 from service.commands.batch.regrade import publish, regrade
-from service.commands.batch.tables import changes_table, history_table, marks_table, summary, unjudged_words
+from service.commands.batch.tables import (
+    changes_table,
+    history_table,
+    marks_table,
+    rank_table,
+    refusals_table,
+    summary,
+    unjudged_words,
+)
 from service.queue.celery_app import make_celery
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
 from service.report_files import write_batch
 from service.reports.written import prepare_folder
 from service.settings import Settings, load_settings
-from service.store import audit, batches, intake, metrics, regrades
+from service.store import audit, batches, intake, metrics, rankings, regrades, workers
 from service.store.batches import JobLine
 from service.store.engine import Store, open_store
 from service.store.states import JobState, Lane
+from service.store.workers import WorkerDescription
 from sim.errors import Cancelled, HostError, UsageError
 from submissions.batch_folder import BatchContents, read_batch
+from submissions.people import Refusal, read_people
 
 batch_app = typer.Typer(help="Grade many submissions through the queue.", no_args_is_help=True)
 
@@ -48,38 +58,60 @@ def submit(
         Path | None, typer.Option(help="Write a report for each submission into this folder; waits.")
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="Grade again what was submitted already.")] = False,
+    people: Annotated[
+        Path | None,
+        typer.Option(help="Who is in the course: a .csv with id, name, email; Moodle's grading worksheet is one."),
+    ] = None,
 ) -> None:
     """Queue a submission for each student; bad ones are named and stop no other.
 
-    A roster has the columns student, file and assignment, the last not needed with -a; files lie below it. A
-    student's newest submission replaces one that still waits, and the same one again changes nothing.
+    Downloads of Moodle, Gradescope and nbgrader are taken as they are. A roster has the columns student (or id), file
+    and, where it has them, name, email, assignment; files lie below it. A student's newest submission replaces one
+    that still waits, and the same one again changes nothing.
 
     Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
     not be graded.
     """
     if wait or report is not None:
-        refused = submit_and_wait(grading_requests, assignment, report=report, again=again)
+        refused = submit_and_wait(grading_requests, assignment, report=report, again=again, people=people)
     else:
-        refused = _submit(grading_requests, assignment, again=again)
+        refused = _submit(grading_requests, assignment, again=again, people=people)
     if refused:
         raise UsageError(f"{refused} of the submissions could not be taken in; the others were")
 
 
-def _submit(grading_requests: Path, assignment: str | None, *, again: bool) -> int:
+def _submit(grading_requests: Path, assignment: str | None, *, again: bool, people: Path | None) -> int:
     settings = load_settings()
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
-        checked = _checked(grading_requests, assignment, console)
+        checked = _checked(grading_requests, assignment, people, console)
         accepted = _accept(store, settings, grading_requests, checked, again=again, console=console)
         if settings.broker_url:
             _notifier(settings, store).grade(Lane.BATCH, _new(accepted))
-    if accepted.batch is not None and not settings.broker_url:
-        console.print("A worker grades them: robomark worker", highlight=False)
-    return len(checked.problems) + len(accepted.refused)
+        if accepted.batch is not None:
+            with store.reading() as session:
+                lively = [seen.worker for seen in workers.known_workers(session) if seen.lately]
+            console.print(_who_grades(lively), highlight=False, soft_wrap=True)
+    return len(checked.refusals) + len(accepted.refused)
 
 
-def submit_and_wait(grading_requests: Path, assignment: str | None, *, report: Path | None, again: bool = True) -> int:
+def _who_grades(lively: Sequence[WorkerDescription]) -> str:
+    if not lively:
+        return "no worker runs: robomark worker starts one, and so does robomark up"
+    slots = sum(worker.concurrency for worker in lively)
+    many = f"{len(lively)} workers grade" if len(lively) > 1 else "1 worker grades"
+    return f"{many} them, {slots} at a time"
+
+
+def submit_and_wait(
+    grading_requests: Path,
+    assignment: str | None,
+    *,
+    report: Path | None,
+    again: bool = True,
+    people: Path | None = None,
+) -> int:
     """Queue submissions, grade them with the services that run or with our own, and show the marks.
 
     Returns how many were refused. What was submitted already is graded ``again``, or shown as it is. Raises
@@ -92,16 +124,16 @@ def submit_and_wait(grading_requests: Path, assignment: str | None, *, report: P
     configure_logging(settings.log_level)
     console = Console()
     with open_store(settings) as store:
-        checked = _checked(grading_requests, assignment, console)
+        checked = _checked(grading_requests, assignment, people, console)
         accepted = _accept(store, settings, grading_requests, checked, again=again, console=console)
+        refusals = (*checked.refusals, *accepted.refused)
         try:
-            lines = _wait(store, settings, accepted, console)
+            lines = _wait(store, settings, accepted, refusals, console)
         except KeyboardInterrupt:
             where = f"status {accepted.batch.id}" if accepted.batch else "list"
             raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
         if report is not None:
-            problems = (*checked.problems, *accepted.refused)
-            page = write_batch(store, f"Batch {grading_requests.name}", lines, problems, report)
+            page = write_batch(store, f"Batch {grading_requests.name}", lines, refusals, report)
             console.print(f"report: {page}", highlight=False, soft_wrap=True)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
@@ -109,7 +141,7 @@ def submit_and_wait(grading_requests: Path, assignment: str | None, *, report: P
     cancelled = [line for line in lines if line.state is JobState.CANCELLED]
     if cancelled:
         raise Cancelled(f"{len(cancelled)} of {len(lines)} not graded; {cancelled[0].source}: {cancelled[0].error}")
-    return len(checked.problems) + len(accepted.refused)
+    return len(refusals)
 
 
 @batch_app.command("list")
@@ -121,7 +153,7 @@ def list_batches() -> None:
     table = Table("batch", "name", "taken in", "submissions", "refused", "state", box=None, pad_edge=False)
     for line in lines:
         when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        row = (line.id, line.name, when, str(line.jobs), str(len(line.problems)), summary(line))
+        row = (line.id, line.name, when, str(line.jobs), str(len(line.refusals)), summary(line))
         table.add_row(*map(Text, row))
     Console().print(table)
 
@@ -133,6 +165,7 @@ def status(batch: BatchId) -> None:
     with open_store(settings) as store, store.reading() as session:
         line = batches.batch(session, batches.find_batch(session, batch))
         lines = batches.job_lines(session, line.id)
+        ranks = rankings.rank_tables(session, lines)
         changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
         waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, line.id)
         history = audit.entries(session, "batch", line.id)
@@ -141,8 +174,9 @@ def status(batch: BatchId) -> None:
     console.print(Text(f"batch {line.id}: {line.name}: {summary(line)}"))
     if pace is not None:
         console.print(f"{pace.per_minute:.0f} a minute, {pace.left} left", highlight=False)
-    _print_problems(line.problems, console)
-    console.print(marks_table(lines) if line.regrade_of is None else changes_table(changes))
+    console.print(marks_table(lines, line.refusals) if line.regrade_of is None else changes_table(changes))
+    for table in ranks:
+        console.print(rank_table(table))
     if unjudged := unjudged_words(lines):
         console.print(Text(unjudged))
     if waiting:
@@ -160,11 +194,11 @@ batch_app.command()(regrade)
 batch_app.command()(publish)
 
 
-def _checked(grading_requests: Path, assignment: str | None, console: Console) -> BatchContents:
-    checked = read_batch(grading_requests, assignment)
-    _print_problems(checked.problems, console)
+def _checked(grading_requests: Path, assignment: str | None, people: Path | None, console: Console) -> BatchContents:
+    checked = read_batch(grading_requests, assignment, None if people is None else read_people(people))
+    _print_refusals(checked.refusals, console)
     if not checked.grading_requests:
-        raise UsageError(f"{grading_requests}: none of {len(checked.problems)} submissions can be taken in")
+        raise UsageError(f"{grading_requests}: none of {len(checked.refusals)} submissions can be taken in")
     return checked
 
 
@@ -172,13 +206,13 @@ def _accept(
     store: Store, settings: Settings, path: Path, checked: BatchContents, *, again: bool, console: Console
 ) -> intake.AcceptedNew:
     """Take in what passed, and say what was new of it."""
-    batch = (path.name, checked.grading_requests, checked.problems)
+    batch = (path.name, checked.grading_requests, checked.refusals)
     if again:
         made = intake.accept_batch(store, *batch, max_attempts=settings.max_attempts)
         accepted = intake.AcceptedNew(made, (), made.refused)
     else:
         accepted = intake.accept_new(store, *batch, max_attempts=settings.max_attempts)
-    _print_problems(accepted.refused, console)
+    _print_refusals(accepted.refused, console)
     if accepted.known:
         table = Table("nothing new of", "why", box=None, pad_edge=False)
         for known in accepted.known:
@@ -213,13 +247,19 @@ def _new(accepted: intake.AcceptedNew) -> int:
     return 0 if accepted.batch is None else sum(job.copied_from is None for job in accepted.batch.jobs)
 
 
-def _wait(store: Store, settings: Settings, accepted: intake.AcceptedNew, console: Console) -> list[JobLine]:
+def _wait(
+    store: Store,
+    settings: Settings,
+    accepted: intake.AcceptedNew,
+    refusals: Sequence[Refusal],
+    console: Console,
+) -> list[JobLine]:
     """Wait for the marks of what was new and of what was known, show them, and wait for the plots."""
     own = [] if accepted.batch is None else [accepted.batch.id]
     batch_ids = [*own, *(known.batch_id for known in accepted.known if known.batch_id)]
     with marks_awaited(store, settings, batch_ids, _new(accepted), console):
         lines = _lines(store, accepted)
-        console.print(marks_table(lines))
+        console.print(marks_table(lines, refusals))
     return lines
 
 
@@ -235,10 +275,6 @@ def _notifier(settings: Settings, store: Store) -> Notifier:
     return Notifier(make_celery(settings), store, settings)
 
 
-def _print_problems(problems: Sequence[tuple[str, str]], console: Console) -> None:
-    if not problems:
-        return
-    table = Table("not taken in", "why", box=None, pad_edge=False)
-    for name, sentence in problems:
-        table.add_row(Text(name), Text(sentence))
-    console.print(table)
+def _print_refusals(refusals: Sequence[Refusal], console: Console) -> None:
+    if refusals:
+        console.print(refusals_table(refusals))

@@ -10,11 +10,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from service.grading.ranks import RankTable
 from service.store.audit import AuditEntry
 from service.store.batches import BatchLine, JobLine
 from service.store.policies import in_days
 from service.store.regrades import Change, CriterionChange
 from service.store.states import BatchState, JobState, Standing
+from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
@@ -31,26 +33,41 @@ def summary(line: BatchLine) -> str:
     return held + (", ".join(parts) or "empty")
 
 
-def marks_table(lines: Sequence[JobLine]) -> Table:
-    """A row a submission: marks, accuracy, verdict, and what else is to be known of it."""
+def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> Table:
+    """A row a submission, taken in or not: marks, accuracy, verdict, and what else is to be known of it."""
+    named = any(line.name not in ("", line.student) for line in lines)
     table = Table(box=None, pad_edge=False)
-    for heading in ("student", "assignment"):
+    for heading in ("student", *(["name"] if named else []), "assignment"):
         table.add_column(heading, overflow="fold")
     table.add_column("marks", justify="right")
     table.add_column("accuracy", justify="right")
     for heading in ("verdict", "grade"):
         table.add_column(heading)
+
+    def who(student: str, name: str, assignment: str) -> list[Text]:
+        return [Text(student), *([Text(name)] if named else []), Text(assignment)]
+
     for line in lines:
         accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
         outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
         table.add_row(
-            Text(line.student),
-            Text(line.assignment),
+            *who(line.student, line.name, line.assignment),
             _out_of(line.marks, line.max_marks),
             accuracy,
             Text("; ".join([outcome, *remarks(line)]), style=_STYLES.get(line.state, "")),
             line.id,
         )
+    for refusal in refusals:
+        whose = who(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
+        table.add_row(*whose, "", "", Text(f"not taken in: {refusal.sentence}", style="red"), "")
+    return table
+
+
+def refusals_table(refusals: Sequence[Refusal]) -> Table:
+    """What was not taken in, and why."""
+    table = Table("not taken in", "why", box=None, pad_edge=False)
+    for refusal in refusals:
+        table.add_row(Text(refusal.source), Text(refusal.reason))
     return table
 
 
@@ -78,6 +95,18 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
     return Group(table, Text(told)) if shown else Text(told)
 
 
+def rank_table(table: RankTable) -> RenderableType:
+    """A row a student, the best first."""
+    shown = Table("place", "student", ", ".join(filter(None, (table.measure, table.unit))), box=None, pad_edge=False)
+    shown.add_column("95 % interval")
+    shown.add_column("trials that count")
+    for column in shown.columns[0], shown.columns[2]:
+        column.justify = "right"
+    for row in table.texts:
+        shown.add_row(*map(Text, row))
+    return Group(Text(f"{table.assignment}: {table.title}"), shown)
+
+
 def history_table(history: Sequence[AuditEntry]) -> Table:
     """Who did what, and when."""
     table = Table("when", "who", "did", "what came of it", box=None, pad_edge=False)
@@ -94,6 +123,7 @@ def remarks(line: JobLine) -> list[str]:
         f"same as {line.copied_from}": line.copied_from is not None,
         f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
+        f"no {line.missing}": bool(line.missing),
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
         f"{line.surprises} trials that the log explains": line.surprises > 0,
         "suspect": line.suspect is not None,

@@ -133,7 +133,8 @@ def _written(trials: Sequence[TrialResult]) -> int:
     recordings = [trial.recording for trial in trials]
     lines = (line.text for recording in recordings for line in (*recording.printed, *recording.spoken))
     messages = (message.text for recording in recordings for message in recording.messages)
-    texts = (*lines, *(text for text in messages if not text.startswith(_IMAGE)))
+    of_agents = (message.text for recording in recordings for message in recording.agent_messages)
+    texts = (*lines, *of_agents, *(text for text in messages if not text.startswith(_IMAGE)))
     return sum(map(len, texts)) + _A_TEXT * len(texts)
 
 

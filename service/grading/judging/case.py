@@ -6,12 +6,13 @@ Plain data; what any of it is worth is decided in the modules of the families.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from responders.function_calls import Called, Returned
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.source_answers import SourceAnswers
 from submissions.assignment.definition import Assignment
+from submissions.bundle import Part
 from submissions.criteria import Criterion
 from submissions.magics import Flags
 
@@ -28,6 +29,7 @@ class StaticAnalysis:
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Returned] = field(default_factory=dict)
     sandbox: str = ""
+    missing: Part | None = None  # asked for, and not submitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +42,15 @@ class Case:
     results: Mapping[str, CriterionResult]
 
     def looked_at_by(self, criterion: Criterion) -> Indexed:
-        """The trials of the criterion's scenarios."""
+        """The trials of the criterion's scenarios, as the robot had them that it looks at."""
         return [
-            (index, trial)
+            (index, as_had_by(criterion.robot, trial))
             for index, trial in enumerate(self.trials)
             if not criterion.scenarios or trial.scenario in criterion.scenarios
         ]
+
+
+def as_had_by(robot: int, trial: TrialResult) -> TrialResult:
+    """The trial with the recording of that robot; of the first, where there is one."""
+    partner = trial.recording.partner
+    return trial if robot == 1 or partner is None else replace(trial, recording=partner)

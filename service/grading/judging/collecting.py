@@ -14,7 +14,7 @@ from itertools import pairwise
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import footprint_at, part_at
 from service.grading.judging.judges import judges
-from service.grading.judging.label_patches import decoded
+from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.words import quoted
 from sim.floors import label_names
@@ -88,9 +88,8 @@ def _different(found: Sequence[Pair], recording: Recording) -> list[Pair]:
 def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[Pair]:
     """The pairs of images that a recording has: those logged (``log``) or those sent as ``IMG_DATA`` (``sent``)."""
     images = recording.images if source == "sent" else tuple(_logged(recording))
-    return [
-        Pair(image, _truth(recording, image), decoded(image, recording.background, light_noise)) for image in images
-    ]
+    greys = GREYS.get(recording.background, {})
+    return [Pair(image, _truth(recording, image), decoded(image, greys, light_noise)) for image in images]
 
 
 def _logged(recording: Recording) -> Iterator[Image]:
@@ -98,7 +97,7 @@ def _logged(recording: Recording) -> Iterator[Image]:
     log = recording.image_log
     for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
         if side == "left":
-            t = seconds_at(tick)
+            t = seconds_at(recording, tick)
             pixels = _bytes(left)
             beside = _bytes(right) if other == "right" else b""
             yield Image(t, tick, pose_after(recording, tick), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import HEIGHT, WIDTH, sensor_mask
-from sim.recorded import TICKS_PER_SECOND, pose_after, pose_at, robot_of, seconds_at
+from sim.recorded import pose_after, pose_at, robot_of, seconds_at
 from sim.recording import Floats, Pose, Recording
 from sim.robot import LightSensor
 from sim.sensors import Footprint, footprint
@@ -29,7 +29,7 @@ STILL = 0.01
 
 def times(recording: Recording) -> Floats:
     """Seconds, shape (n + 1,)."""
-    return np.arange(len(recording.ticks) + 1) / TICKS_PER_SECOND
+    return np.concatenate([[0.0], recording.ticks.t])
 
 
 def headings(recording: Recording) -> Floats:
@@ -70,7 +70,7 @@ def place_at(recording: Recording, row: int) -> tuple[float, Pose]:
     """Time and pose of a row."""
     if row <= 0 or not len(recording.ticks):
         return 0.0, recording.start
-    return seconds_at(row), pose_after(recording, row)
+    return seconds_at(recording, row), pose_after(recording, row)
 
 
 def travel(recording: Recording) -> tuple[Floats, Floats]:
@@ -148,7 +148,12 @@ def zone_words(zone: Zone) -> str:
 
 
 def distance_to(area: Area, points: Floats) -> Floats:
-    """Signed distance of each point (n, 2) to the edge of the area, mm; a point on the edge has 0."""
+    """Signed distance of each point (n, 2) to the edge of the area, mm, below 0 in it; a point on the edge has 0."""
+    distances = _to_shape(area, points)
+    return -distances if area.outside else distances
+
+
+def _to_shape(area: Area, points: Floats) -> Floats:
     x, y = points[:, 0], points[:, 1]
     if area.circle is not None:
         return np.hypot(x - area.circle[0], y - area.circle[1]) - area.circle[2]

@@ -11,10 +11,12 @@ from types import MappingProxyType
 
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.case import Case, StaticAnalysis
-from service.grading.judging.judges import Judge
+from service.grading.judging.judges import Judge, once
+from service.grading.judging.outcome import failed
 from sim.errors import HostError
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
+from submissions.bundle import PART_FILES
 from submissions.criteria import SCHEMAS, Criterion
 
 _NOTHING_FOUND = StaticAnalysis()
@@ -59,5 +61,8 @@ def in_turn(assignment: Assignment) -> list[Criterion]:
 
 
 def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
-    """The result of one criterion."""
+    """The result of one criterion; one that needs a part that was not submitted has no marks for that alone."""
+    missing = case.analysis.missing
+    if missing in criterion.parts_needed:
+        return once(criterion, failed(f"There is no {PART_FILES[missing]}."))
     return JUDGES[type(criterion)].judge(criterion, case)

@@ -6,6 +6,7 @@ An image in, a label out; where the robot was does not matter here.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -15,7 +16,7 @@ from PIL import Image as Pixels
 from sim.floors import SHAPES
 from sim.recording import Image
 
-#: Of the greys of neighbouring labels, half the smallest distance; a median further off is no label's.
+#: A median further off a label's grey, or nearer to the grey of another, is no label's.
 _TOLERANCE = 12.0
 #: So much of the focus must be of the patch's grey: an edge of a patch in the image makes it no use.
 _UNIFORM_SHARE = 0.98
@@ -23,6 +24,8 @@ _SLACK = 3.0
 
 _SHAPES: Mapping[int, str] = MappingProxyType({int(code * 255 / 6): name for code, name in enumerate(SHAPES)})
 _DIGITS: Mapping[int, str] = MappingProxyType({25 * digit: str(digit) for digit in range(10)})
+#: What the greys of patches stand for, as an assignment names it for an image of its own.
+CODES: Mapping[str, Mapping[int, str]] = MappingProxyType({"shapes": _SHAPES, "digits": _DIGITS})
 #: The grey of each label's patch, by floor: decode_shape_label in 08.4, get_training_label_from_sensor in 08.2.
 GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
     {
@@ -34,18 +37,18 @@ GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
 )
 
 
-def decoded(image: Image, background: str, light_noise: float = 0.0) -> str | None:
-    """The label whose patch fills the right image's focus; None if none does.
+def decoded(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) -> str | None:
+    """The label whose patch fills the right image's focus, by the label of each grey; None if none does.
 
     ``light_noise`` is the amplitude, in grey levels, that pixels may be off.
     """
-    greys = GREYS.get(background)
-    if greys is None or len(image.right) != 4 * image.side**2:
+    if not greys or len(image.right) != 4 * image.side**2:
         return None
     seen = focus(image.right, image.side).astype(np.float64)
     median = float(np.median(seen))
     grey = min(greys, key=lambda known: abs(known - median))
-    if abs(grey - median) > _TOLERANCE:
+    between = min((after - before for before, after in pairwise(sorted(greys))), default=256)
+    if abs(grey - median) > min(_TOLERANCE, between / 2):
         return None
     alike = np.abs(seen - median) <= 2 * light_noise + _SLACK
     return greys[grey] if alike.mean() >= _UNIFORM_SHARE else None

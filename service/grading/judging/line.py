@@ -43,7 +43,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
         Measure("share covered", share),
         Measure("farthest off", float(offsets[farthest]), "mm"),
         Measure("mean off", float(offsets.mean()), "mm"),
-        Measure("seconds to the end", seconds_at(found.first + on_it - 1), "s"),
+        Measure("seconds to the end", seconds_at(recording, found.first + on_it - 1), "s"),
         Measure("share on one side", one_side),
     )
     score = Fraction(min(share / criterion.covers, 1.0)).limit_denominator(1000)
@@ -100,7 +100,7 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             recording.end_t,
             recording.end,
         )
-    crossings = _crossings(criterion, points, found)
+    crossings = _crossings(criterion, points, found, recording.ticks.per_second)
     laps, spoilt = _laps(criterion, found, crossings)
     off = float(np.abs(found.offset[: _last_row(found, crossings)]).max())
     driven = float(found.progress.max() - found.progress[0])
@@ -147,8 +147,8 @@ def _laps_words(count: int) -> str:
     return "a whole lap" if count == 1 else f"{count} whole laps"
 
 
-def _crossings(criterion: Laps, points: Floats, found: Along) -> list[_Crossing]:
-    """Each time the path crosses the start line in the circuit's direction."""
+def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float) -> list[_Crossing]:
+    """Each time the path, of so many points a second, crosses the start line in the circuit's direction."""
     x1, y1, x2, y2 = criterion.start_line
     first, line = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
     away = points - first
@@ -163,7 +163,8 @@ def _crossings(criterion: Laps, points: Floats, found: Along) -> list[_Crossing]
         where = place[row - 1] + share * (place[row] - place[row - 1])
         before, after = found.progress[row - 1 - found.first], found.progress[row - found.first]
         if 0 <= where <= 1 and after > before:
-            crossings.append(_Crossing(seconds_at(row - 1 + share), row, float(before + share * (after - before))))
+            t = (row - 1 + share) / per_second
+            crossings.append(_Crossing(t, row, float(before + share * (after - before))))
     return crossings
 
 

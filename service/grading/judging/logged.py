@@ -10,19 +10,20 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import Side, floor_share, footprint_at, light_of
 from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
 from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.readings import were_read
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.floors import Floor
-from sim.recorded import TICKS_PER_SECOND, floor_of, pose_after, pose_at, seconds_at, ticks_until
+from sim.recorded import floor_of, pose_after, pose_at, seconds_at
 from sim.recording import Datum, Image, Recording
 from sim.sensors import Footprint
-from submissions.criteria.logged import Datalog, ImageLog, Instrument
+from submissions.criteria.logged import Datalog, ImageLog
 
 Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
 
@@ -33,12 +34,18 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     name = criterion.series
     logged = [datum for datum in recording.datalog if datum.name == name]
-    samples = logged if criterion.measured is None else measured_only(logged, criterion.measured, recording)
+    true = _true_ones(criterion, logged, recording)
+    samples = true if criterion.measured is None else _without_repeats(true)
+    made_up = len(logged) - len(true)
     values = [datum.value for datum in samples]
     measures = (Measure("samples", float(len(values))), *_extremes(values))
+    if criterion.measured is not None:
+        measures += (Measure("made up", float(made_up)),)
     if logged and not values:
         return failed(
-            f"Expected {name} to be what the {criterion.measured} read, but none of {len(logged)} samples is."
+            f"Expected {name} to be what {_instrument(criterion)} read, but all {len(logged)} samples are made up: "
+            "none is what it read when they were printed.",
+            measures=measures,
         )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
         return failed(f'Expected the program to log {name}, but the datalog has none (print "{name}: 42").')
@@ -46,11 +53,27 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     if criterion.plateaus:
         checks.append(_plateau_check(criterion, values))
     wrong = next((words for reached, words in checks if reached < 1), None)
+    told = f"; {made_up} of {len(logged)} are made up, not what {_instrument(criterion)} read" if made_up else ""
     if wrong is None:
-        return passed(f"The program logged {len(values)} samples of {name} as expected.", measures=measures)
-    return failed(
-        f"{wrong}.", score=sum((reached for reached, _ in checks), Fraction(0)) / len(checks), measures=measures
-    )
+        outcome = passed(f"The program logged {len(values)} samples of {name} as expected{told}.", measures=measures)
+    else:
+        score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
+        outcome = failed(f"{wrong}{told}.", score=score, measures=measures)
+    return tempered(outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", made_up))
+
+
+def _instrument(criterion: Datalog) -> str:
+    name = criterion.measured or ""
+    return f"the {name} sensor" if name in ("left light", "right light", "ultrasonic") else f"the {name}"
+
+
+def _true_ones(criterion: Datalog, logged: Sequence[Datum], recording: Recording) -> list[Datum]:
+    """The samples that the instrument read; all where the criterion names none."""
+    if criterion.measured is None:
+        return list(logged)
+    values, at = [datum.value for datum in logged], [datum.t for datum in logged]
+    read = were_read(values, at, (criterion.measured,), recording)
+    return [datum for datum, true in zip(logged, read.tolist(), strict=True) if true]
 
 
 def _images(count: int) -> str:
@@ -66,23 +89,29 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     """How many images of each light sensor were logged, in what order, and what those at the start show."""
     recording = trial.recording
     log = recording.image_log
-    checks: list[tuple[bool, str]] = []
-    for side, count in (("left", criterion.left), ("right", criterion.right)):
+    checks: list[Check] = []
+    for side, count, least in (
+        ("left", criterion.left, criterion.left_at_least),
+        ("right", criterion.right, criterion.right_at_least),
+    ):
         got = sum(entry[0] == side for entry in log)
-        if count is not None:
-            checks.append(
-                (got == count, f"Expected {_images(count)} of the {side} sensor to be logged, but {_there(got)}")
-            )
+        asked = f"at least {_images(least)}" if count is None else _images(count)
+        words = f"Expected {asked} of the {side} sensor to be logged, but {_there(got)}"
+        if count is not None or least:
+            reached = min(Fraction(got, least), Fraction(1)) if count is None else Fraction(got == count)
+            checks.append((reached, words))
     if criterion.pairs:
         sides = [entry[0] for entry in log]
         turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
-        checks.append((turns, "Expected left and right images to take turns, but they did not (image_data both)"))
+        checks.append(
+            (Fraction(turns), "Expected left and right images to take turns, but they did not (image_data both)")
+        )
     if criterion.at_start:
         moved = next((entry for entry in log if not _shows_start(entry, recording, trial.light_noise)), None)
         where = _where(recording, moved[2]) if moved else ""
         checks.append(
             (
-                bool(log) and moved is None,
+                Fraction(bool(log) and moved is None),
                 f"Expected every image to be taken at the start pose, but {where or 'there is none'}",
             )
         )
@@ -91,18 +120,18 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         flat = bool(own) and all(_is_uniform(entry[1]) and _shows_something(entry, recording) for entry in own)
         checks.append(
             (
-                flat,
+                Fraction(flat),
                 f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
                 "or shows no label's patch",
             )
         )
     measures = (Measure("images", float(len(log))),)
-    wrong = next((words for holds, words in checks if not holds), None)
+    wrong = next((words for reached, words in checks if reached < 1), None)
     if wrong is None:
         return passed(f"The program logged {len(log)} images as expected.", measures=measures)
-    last = seconds_at(log[-1][2]) if log else None
+    last = seconds_at(recording, log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
-    held = Fraction(sum(holds for holds, _ in checks), len(checks))
+    held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
     return failed(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
 
 
@@ -215,10 +244,8 @@ def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
     if side == "left" or recording.background not in GREYS or not recording.label_patches:
         return True
     pixels = bytes(map(int, csv.split(",")))
-    return (
-        decoded(Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4)), recording.background)
-        is not None
-    )
+    image = Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4))
+    return decoded(image, GREYS[recording.background]) is not None
 
 
 def _where(recording: Recording, tick: int) -> str:
@@ -226,51 +253,14 @@ def _where(recording: Recording, tick: int) -> str:
     return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
 
 
-#: How old a reading may be when it is printed, seconds.
-_AGE = 0.5
-#: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
-_ROUNDED = 1.0
 #: What a reading of a sensor takes, seconds; what is printed sooner after another sample repeats it.
 _READING = 0.01
 
 
-def measured_only(samples: Sequence[Datum], instrument: Instrument, recording: Recording) -> list[Datum]:
-    """The samples that the instrument read in the half second before they were printed, in any unit of the brick's.
-
-    Of those that were printed in less time than a reading takes only the first counts.
-
-    Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
-    of turning degrees. Nothing has been read before the first tick.
-    """
-    readings = _readings(instrument, recording)
-    if not len(readings):
-        return []
+def _without_repeats(samples: Sequence[Datum]) -> list[Datum]:
+    """Of those that were printed in less time than a reading takes only the first."""
     found: list[Datum] = []
     for datum in samples:
-        if _was_read(datum, readings) and not (found and datum.t < found[-1].t + _READING - 1e-9):
+        if not (found and datum.t < found[-1].t + _READING - 1e-9):
             found.append(datum)
     return found
-
-
-def _was_read(datum: Datum, readings: NDArray[np.float64]) -> bool:
-    last = min(max(ticks_until(datum.t), 1), len(readings))
-    first = min(max(int((datum.t - _AGE) * TICKS_PER_SECOND), 1), last)
-    return bool((np.abs(readings[first - 1 : last] - datum.value) <= _ROUNDED).any())
-
-
-def _readings(instrument: Instrument, recording: Recording) -> NDArray[np.float64]:
-    """One row a tick, one column for each unit in which it may be printed."""
-    ticks = recording.ticks
-    match instrument:
-        case "left light" | "right light":
-            rgb = ticks.left_rgb if instrument == "left light" else ticks.right_rgb
-            together = rgb.sum(axis=1)
-            return np.column_stack([rgb, rgb / 2.55, together / 3, together / 7.65])
-        case "ultrasonic":
-            return np.column_stack([ticks.ultrasonic, ticks.ultrasonic / 10, ticks.ultrasonic / 25.4])
-        case "gyro":
-            return ticks.gyro[:, None]
-        case "left wheel":
-            return np.column_stack([ticks.left_position, ticks.left_position / 360])
-        case "right wheel":
-            return np.column_stack([ticks.right_position, ticks.right_position / 360])

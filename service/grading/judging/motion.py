@@ -18,7 +18,7 @@ from service.grading.judging.judges import judges
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.camera import HEIGHT, WIDTH
-from sim.recorded import TICKS_PER_SECOND, robot_of
+from sim.recorded import robot_of
 from sim.recording import Floats, Recording
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
@@ -340,7 +340,8 @@ def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> 
     """Those of the falls after which all that was asked came in order, and in time."""
     ahead, turned = travel(recording)
     motion = _Motion(-np.minimum(ahead, 0), turned, standing(recording))
-    ends = np.searchsorted(times(recording), np.array(falls) / TICKS_PER_SECOND + criterion.seconds, side="right") - 1
+    t = times(recording)
+    ends = np.searchsorted(t, t[falls] + criterion.seconds, side="right") - 1
     return [row for row, end in zip(falls, ends.tolist(), strict=True) if _all_came(criterion.then, motion, row, end)]
 
 

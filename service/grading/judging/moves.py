@@ -20,7 +20,7 @@ from submissions.criteria.motion import AskedMotion
 
 #: What differs by less than this share between the wheels is straight.
 _STRAIGHT = 0.1
-#: Driving straight and turning are two moves where each goes on for so many ticks (0.3 s).
+#: Two ways of moving are two moves where each goes on for so many ticks (0.3 s).
 _LASTING = 9
 #: A bound so far off (mm, degrees, s) is none: no run comes near it.
 _NO_BOUND = 10_000
@@ -59,13 +59,14 @@ class Move:
 def moves_of(recording: Recording) -> tuple[Move, ...]:
     """The moves of a run, in order.
 
-    Standing still for more than two ticks parts moves, and so does the change between driving straight and turning
-    where both go on for 0.3 s.
+    Standing still for more than two ticks parts moves, and so does the change between driving straight on, straight
+    back, turning left and turning right where both go on for 0.3 s.
     """
+    ways = _ways(recording)
     return tuple(
         move_between(recording, first, last)
-        for begin, end in _parted_by_rests(standing(recording))
-        for first, last in _parted_by_kind(recording, begin, end)
+        for begin, end in _parted_by_rests(ways == 0)
+        for first, last in _parted_by_way(ways, begin, end)
     )
 
 
@@ -74,7 +75,7 @@ def move_between(recording: Recording, first: int, last: int) -> Move:
     _, before = place_at(recording, first)
     _, after = place_at(recording, last)
     ahead, left = relative_to(before, after.x, after.y)
-    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(last - first))
+    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(recording, last - first))
 
 
 def straight(recording: Recording) -> NDArray[np.bool_]:
@@ -82,6 +83,13 @@ def straight(recording: Recording) -> NDArray[np.bool_]:
     ahead, turned = travel(recording)
     between_wheels = np.radians(turned) * robot_of(recording).wheel_spacing
     return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~standing(recording)
+
+
+def _ways(recording: Recording) -> NDArray[np.int8]:
+    """How the robot moved in each tick, shape (n,): straight on 1 or back -1, turning left 2 or right -2; 0 is rest."""
+    ahead, turned = travel(recording)
+    ways = np.where(straight(recording), np.sign(ahead), 2 * np.sign(turned))
+    return np.where(standing(recording), 0, ways).astype(np.int8)
 
 
 def misses(wanted: AskedMotion, move: Move) -> str | None:
@@ -141,17 +149,16 @@ def _parted_by_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return stretches(~resting)
 
 
-def _parted_by_kind(recording: Recording, first: int, last: int) -> list[tuple[int, int]]:
-    """A stretch of ticks, cut where a lasting straight part and a lasting other part meet."""
-    driving_straight = straight(recording)[first:last]
+def _parted_by_way(ways: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
+    """A stretch of ticks, cut where two lasting ways of moving meet."""
     lasting = sorted(
-        (begin, end, kind)
-        for kind, mask in ((True, driving_straight), (False, ~driving_straight))
-        for begin, end in stretches(mask)
+        (begin, end, way)
+        for way in (-2, -1, 1, 2)
+        for begin, end in stretches(ways[first:last] == way)
         if end - begin >= _LASTING
     )
     cuts = [first]
-    for (_, end, kind), (_, _, following) in itertools.pairwise(lasting):
-        if kind != following:
+    for (_, end, way), (_, _, following) in itertools.pairwise(lasting):
+        if way != following:
             cuts.append(first + end)
     return list(zip(cuts, [*cuts[1:], last], strict=True))

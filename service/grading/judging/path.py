@@ -118,13 +118,18 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     who = PART_NAMES[criterion.of]
     distances = np.array([distance_to(area, points) for area in criterion.areas])
     measures = (Measure("least clearance", float(np.nanmin(distances)), "mm"), *_bounds(points))
-    within = distances <= 0
+    within = (distances <= 0) | (distances < criterion.clear_of)
     if within.any():
         row = int(np.flatnonzero(within.any(axis=0))[0])
-        area = criterion.areas[int(np.flatnonzero(within[:, row])[0])]
+        number = int(np.flatnonzero(within[:, row])[0])
+        nearest = float(np.nanmin(distances[number]))
+        keep = f"keep {criterion.clear_of:g} mm from" if criterion.clear_of else "keep out of"
+        where = f"at ({points[row, 0]:.0f}, {points[row, 1]:.0f})"
+        told = f"it came into it {where}"
+        if criterion.clear_of:
+            told = f"it came nearer {where}, and {max(nearest, 0):.0f} mm was the nearest"
         return failed(
-            f"Expected {who} to keep out of {area}, but it came into it at "
-            f"({points[row, 0]:.0f}, {points[row, 1]:.0f}).",
+            f"Expected {who} to {keep} {criterion.areas[number]}, but {told}.",
             *place_at(recording, row),
             measures=measures,
         )

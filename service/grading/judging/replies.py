@@ -9,51 +9,62 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 
+from responders.message_format import JSON
 from service.grading.grade import TrialResult
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed, same_value
+from service.grading.judging.asking import VALUE, Pair, pair_of
 from service.grading.judging.judges import judges
+from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.texts import conditions, meets, same_text
 from service.grading.judging.words import listed, quoted
 from sim.recorded import pose_at
-from sim.recording import Message, Recording
+from sim.recording import Message
 from submissions.criteria.replies import Replies
+
+_NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so there was nothing to answer."
 
 
 @judges(Replies)
 def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     """Each text that is expected, or each different question that arrived, and what it was answered."""
-    recording = trial.recording
+    pair = pair_of(criterion, trial.recording)
+    recording = pair.recording
+    sent = [message for message in recording.messages if message.sender == "robot"]
     asked = [
         (index, message)
         for index, message in enumerate(recording.messages)
         if message.sender == "robot" and message.delivered is not None
     ]
     if criterion.expect:
-        return _judge_expected(criterion, asked, recording)
+        return _judge_expected(criterion, asked, sent, pair)
     # A message that is sent again asks nothing new.
     questions: dict[str, list[tuple[int, Message]]] = {}
     for index, message in asked:
-        if _is_asked_about(criterion, message.text):
-            questions.setdefault(message.text, []).append((index, message))
+        if _is_asked_about(criterion, message.received):
+            questions.setdefault(message.received, []).append((index, message))
     count = len(questions)
-    if count < criterion.at_least:
+    unheard = [each for each in sent if each.text not in questions and _is_asked_about(criterion, each.text)]
+    excused = len({message.text for message in unheard if by_chance(message)})
+    if count + excused < criterion.at_least:
         few = f"only {count} different reached it" if count else "none reached it"
-        return failed(
-            f"Expected the responder to be sent at least {criterion.at_least} of {_messages(criterion)}, but {few}.",
-            score=Fraction(0),
-        )
+        astray = next((message for message in unheard if out_of_reach(message)), None)
+        why = f": the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
+        wanted = f"at least {criterion.at_least} of {_messages(criterion, pair)}"
+        return failed(f"Expected {pair.told} to be sent {wanted}, but {few}{why}.", score=Fraction(0))
+    if excused and not count:
+        return passed(_NOTHING_TO_ANSWER)
     answers = Answers(recording)
     wrong: list[tuple[Message, str]] = []
     for times in questions.values():
         mistakes = ((message, _mistake(criterion, answers, index)) for index, message in times)
         wrong += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
     if not wrong:
-        return passed(f"The responder answered {count} of {count} messages as expected.")
+        return passed(f"{pair.told.capitalize()} answered {count} of {count} messages as expected.")
     message, mistake = min(wrong, key=lambda pair: pair[0].t)
     right = count - len(wrong)
     return failed(
-        f"Expected the responder to answer {quoted(message.text)} with {_wanted(criterion)}, but {mistake} "
+        f"Expected {pair.told} to answer {quoted(message.received)} with {_wanted(criterion)}, but {mistake} "
         f"({right} of {count} answered as expected).",
         message.t,
         pose_at(recording, message.t),
@@ -61,32 +72,45 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     )
 
 
-def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], recording: Recording) -> Outcome:
-    answers = Answers(recording)
-    right = 0
+def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], sent: list[Message], pair: Pair) -> Outcome:
+    """What was sent and never arrived by chance alone is left out: the responder could not answer it."""
+    answers = Answers(pair.recording)
+    right = count = 0
     first: Outcome | None = None
     for text, answer in criterion.expect.items():
-        sent = [(index, message) for index, message in asked if same_text(message.text, text, criterion.ignore_case)]
+        heard = [(index, each) for index, each in asked if same_text(each.received, text, criterion.ignore_case)]
         wanted = quoted(as_text(answer)) + (f" at {criterion.path}" if criterion.path else "")
-        if not sent:
-            outcome = failed(f"Expected the responder to be sent {quoted(text)}, but it never was.")
+        if not heard:
+            tries = [message for message in sent if same_text(message.text, text, criterion.ignore_case)]
+            if tries and all(map(by_chance, tries)):
+                continue
+            outcome = failed(f"Expected {pair.told} to be sent {quoted(text)}, but {_unsent(tries)}.")
         else:
-            mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in sent]
+            mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in heard]
             place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
             if place is None:
                 right += 1
+                count += 1
                 continue
-            message = sent[place][1]
+            message = heard[place][1]
             outcome = failed(
-                f"Expected the responder to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
+                f"Expected {pair.told} to answer {quoted(text)} with {wanted}, but {mistakes[place]}.",
                 message.t,
-                pose_at(recording, message.t),
+                pose_at(pair.recording, message.t),
             )
         first = first or outcome
-    count = len(criterion.expect)
+        count += 1
+    if first is None and not count:
+        return passed(_NOTHING_TO_ANSWER)
     if first is None:
-        return passed(f"The responder answered {count} of {count} messages as expected.")
+        return passed(f"{pair.told.capitalize()} answered {count} of {count} messages as expected.")
     return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
+
+
+def _unsent(tries: list[Message]) -> str:
+    """Why a text never reached the responder."""
+    astray = next((message for message in tries if out_of_reach(message)), None)
+    return f"the channel lost it ({loss_words(astray)})" if astray else "it never was"
 
 
 def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
@@ -96,6 +120,10 @@ def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: obje
         return answers.silence(index)
     if criterion.is_json and not is_json_answer(reply.text):
         return f"it answered {quoted(reply.text)}, which is not JSON:: and well-formed JSON"
+    if criterion.agents:
+        said = parsed(JSON + reply.text) if reply.note == VALUE else reply.text
+        mistake = "it answered " + ("the text " if isinstance(said, str) else "") + quoted(reply.text)
+        return "" if same_value(said, answer) else mistake
     if criterion.path is None:
         same = same_text(reply.text, str(answer), criterion.ignore_case)
         return "" if same else f"it answered {quoted(reply.text)}"
@@ -133,12 +161,12 @@ def _is_asked_about(criterion: Replies, text: str) -> bool:
     return not criterion.to_starts_with or text.startswith(criterion.to_starts_with)
 
 
-def _messages(criterion: Replies) -> str:
+def _messages(criterion: Replies, pair: Pair) -> str:
     if criterion.to:
         return f"the texts {listed(criterion.to, 'or')}"
     if criterion.to_starts_with:
         return f"the texts that start with {listed(criterion.to_starts_with, 'or')}"
-    return "the robot's messages"
+    return f"{pair.teller}'s messages"
 
 
 def _wanted(criterion: Replies) -> str:

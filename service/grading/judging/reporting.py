@@ -1,6 +1,6 @@
 """Judging what a program reports: the right figures and words, in the right order, at the right place.
 
-How often a single text comes is judged in ``texts.py``.
+How often a single text comes is judged in ``texts.py``, words one after the other in ``sequence.py``.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import in_zone, part_at, part_at_time, zone_words
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import Token, find_words, listed, quoted, spoken_until, tokens_of, words_of
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.readings import INSTRUMENTS, were_read
+from service.grading.judging.words import Token, find_words, listed, quoted, tokens_of, words_of
 from sim.recorded import floor_of, pose_at
 from sim.recording import Line, Recording
-from submissions.criteria.reporting import EventAt, Events, Reports, WordSequence
+from submissions.criteria.places import Zone
+from submissions.criteria.reporting import EventAt, Events, Reports
 
 Entry = float | str
 
@@ -26,13 +29,19 @@ _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answe
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     """The figures and words that belong to the trial's pose, looked for in order in what was told."""
     wanted = _expected_entries(criterion, trial)
+    lines = _texts(criterion, trial.recording)
+    told = [(token, line.t) for line in lines for token in tokens_of(line.text)]
+    outcome = _reported(criterion, wanted, [line.text for line in lines], [token for token, _ in told])
+    guesses = _guesses(criterion, wanted, told, trial.recording)
+    return tempered(outcome, criterion, len(wanted), Strays(f"{guesses} other numbers came as well", others=guesses))
+
+
+def _reported(criterion: Reports, wanted: Sequence[Entry], texts: Sequence[str], tokens: Sequence[Token]) -> Outcome:
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
     asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
-    texts = _texts(criterion, trial.recording)
     if not texts:
         return failed(f"{asked}, but it did not {deed} anything.")
-    tokens = [token for text in texts for token in tokens_of(text)]
     found, values = _found(wanted, tokens, criterion.tolerance)
     measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(values, 1))
     heard = quoted(" | ".join(texts))
@@ -69,16 +78,16 @@ def label_at_start(recording: Recording) -> str:
     return label or "nothing"
 
 
-def _texts(criterion: Reports, recording: Recording) -> list[str]:
+def _texts(criterion: Reports, recording: Recording) -> list[Line]:
     if criterion.source == "reply":
-        return [m.text for m in recording.messages if m.sender == "responder" and m.note != "duplicated"]
+        return [Line(m.t, m.text) for m in recording.messages if m.sender == "responder" and m.note != "duplicated"]
     printed = recording.printed if criterion.source != "speech" else ()
     # What say() prints as well would be there twice.
     spoken = recording.spoken if criterion.source == "speech" else ()
     if criterion.source == "either":
         shown = {(line.t, line.text) for line in printed}
         spoken = tuple(line for line in recording.spoken if (line.t, line.text) not in shown)
-    return [line.text for line in sorted([*printed, *spoken], key=lambda line: line.t)]
+    return sorted([*printed, *spoken], key=lambda line: line.t)
 
 
 def _found(wanted: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> tuple[int, list[float]]:
@@ -107,6 +116,24 @@ def _is_near(value: float | None, wanted: float, tolerance: float) -> bool:
     return value is not None and abs(value - wanted) <= tolerance + 1e-9
 
 
+def _guesses(
+    criterion: Reports, wanted: Sequence[Entry], told: Sequence[tuple[Token, float]], recording: Recording
+) -> int:
+    """How many numbers nobody asked for and no sensor read; beside each reading one is its time, or its count."""
+    others = [
+        (token.value, t)
+        for token, t in told
+        if token.value is not None and not _is_one_of(token.value, wanted, criterion.tolerance)
+    ]
+    values, at = [value for value, _ in others], [t for _, t in others]
+    read = int(were_read(values, at, INSTRUMENTS, recording).sum())
+    return max(len(others) - 2 * read, 0)
+
+
+def _is_one_of(value: float, wanted: Sequence[Entry], tolerance: float) -> bool:
+    return any(_is_near(value, entry, tolerance) for entry in wanted if not isinstance(entry, str))
+
+
 def _suits_others(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> bool:
     """Whether what belongs to half of the other poses or more was reported as well: then nothing was read off."""
     rows = set(criterion.expected) if criterion.expected != "label" else set()
@@ -126,17 +153,23 @@ def _alike(row: Sequence[Entry], other: Sequence[Entry], tolerance: float) -> bo
 
 
 def _stands_at(place: int, row: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> bool:
-    """Whether the entries come from there on, one right after the other."""
+    """Whether the entries come from there on, one right after the other; of the numbers after a word any will do."""
+    after_word = False
     for entry in row:
         if isinstance(entry, str):
             parts = words_of(entry)
             if [token.word for token in tokens[place : place + len(parts)]] != parts:
                 return False
             place += len(parts)
-        elif place < len(tokens) and _is_near(tokens[place].value, entry, tolerance):
-            place += 1
         else:
-            return False
+            while after_word and place < len(tokens) and tokens[place].value is not None:
+                if _is_near(tokens[place].value, entry, tolerance):
+                    break
+                place += 1
+            if place >= len(tokens) or not _is_near(tokens[place].value, entry, tolerance):
+                return False
+            place += 1
+        after_word = isinstance(entry, str)
     return True
 
 
@@ -149,14 +182,13 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
         inside = any(find_words(entry, parts) is not None for entry in expected)
         if not inside and find_words(words, parts) is not None:
             return f"it named {quoted(text)}"
-    numbers = [entry for entry in wanted if not isinstance(entry, str)]
-    others = [
-        token
-        for token in tokens
-        if token.value is not None and not any(_is_near(token.value, number, criterion.tolerance) for number in numbers)
-    ]
-    if criterion.only and others:
-        return f"it reported {quoted(others[0].word)[1:-1]} as well"
+    if criterion.only:
+        others = (each for each in tokens if each.value is not None)
+        foreign = next(
+            (each for each in others if not _is_one_of(each.value or 0.0, wanted, criterion.tolerance)), None
+        )
+        if foreign is not None:
+            return f"it reported {quoted(foreign.word)[1:-1]} as well"
     return ""
 
 
@@ -170,64 +202,20 @@ def _entries(entries: Sequence[Entry]) -> str:
     return listed(tuple(entry if isinstance(entry, str) else f"{entry:g}" for entry in entries))
 
 
-_SPEECH_ROUNDING = 0.011  # a waiting program looks every 10 ms
-
-
-@judges(WordSequence)
-def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
-    """Words one after the other in what was said or printed; of several beginnings the best counts."""
-    recording = trial.recording
-    lines = recording.spoken if criterion.source == "speech" else recording.printed
-    verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
-    wanted = [[words_of(text) for text in texts] for texts in criterion.words]
-    shown = _shown(criterion)
-    heard = [(word, line) for line in lines for word in words_of(line.text)]
-    if not heard:
-        return failed(f"Expected the robot to {verb} {shown}, but it {past} nothing.")
-    words = [word for word, _ in heard]
-    starts = range(len(words)) if criterion.lead_in else range(1)
-    runs = [_run(wanted, words, start) for start in starts]
-    found, end = max(runs, key=lambda run: run[0])
-    first = heard[end - 1][1] if found else heard[0][1]
-    if found < len(wanted):
-        instead = f"came {quoted(heard[end][0])}" if end < len(heard) else "came nothing"
-        after = f"after {_alternatives(criterion.words[found - 1])} {instead}" if found else f"it began {_began(words)}"
-        return failed(
-            f"Expected the robot to {verb} {shown}, but {after} instead of {_alternatives(criterion.words[found])} "
-            f"({found} of {len(wanted)} in order).",
-            first.t,
-            pose_at(recording, first.t),
-            Fraction(found, len(wanted)),
-        )
-    if end < len(words) and not criterion.more:
-        word, line = heard[end]
-        return failed(
-            f"Expected the robot to {verb} {shown} and nothing after it, but it {past} {quoted(word)} as well.",
-            line.t,
-            pose_at(recording, line.t),
-            Fraction(len(wanted), len(wanted) + len(words) - end),
-        )
-    hurried = _hurried(lines) if criterion.waits else None
-    if hurried is not None:
-        return failed(
-            f"Expected the robot to wait until each word is spoken, but it said {quoted(hurried.text)} while it was "
-            "still speaking.",
-            hurried.t,
-            pose_at(recording, hurried.t),
-            Fraction(1, 2),
-        )
-    measures = (Measure("words", float(len(wanted))), Measure("last at", first.t, "s"))
-    return passed(f"The robot {past} {shown}.", first.t, pose_at(recording, first.t), measures)
-
-
 @judges(Events)
 def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     """Each event is looked for after the one before it; the first mention at the right place counts.
 
     What is said where another event belongs as well does not tell the places apart, and does not count.
     """
-    recording = trial.recording
-    lines = _lines(criterion, recording)
+    lines = _lines(criterion, trial.recording)
+    outcome = _told_in_places(criterion, lines, trial.recording)
+    elsewhere = _elsewhere(criterion, lines, trial.recording)
+    beside = Strays(f"these texts came {elsewhere} times where they do not belong", elsewhere)
+    return tempered(outcome, criterion, len(criterion.events), beside)
+
+
+def _told_in_places(criterion: Events, lines: Sequence[Line], recording: Recording) -> Outcome:
     found: list[Line] = []
     start = 0
     strays = _strays(criterion, lines, recording)
@@ -247,59 +235,42 @@ def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     return passed(f"{texts} came in order, each at its place.", end.t, pose_at(recording, end.t), measures)
 
 
-def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, int]:
-    """How many of the wanted words come without a gap from ``start`` on, and where the next word is."""
-    place = start
-    for count, alternatives in enumerate(wanted):
-        length = next((len(each) for each in alternatives if words[place : place + len(each)] == each), None)
-        if length is None:
-            return count, place
-        place += length
-    return len(wanted), place
-
-
-def _hurried(lines: Sequence[Line]) -> Line | None:
-    """The first text that was said before the one before it had been spoken to its end."""
-    for until, after in zip(spoken_until(lines), lines[1:], strict=False):
-        if after.t < until - _SPEECH_ROUNDING:
-            return after
-    return None
-
-
-def _shown(criterion: WordSequence) -> str:
-    return quoted(" ".join(texts[0] for texts in criterion.words))
-
-
-def _began(words: Sequence[str]) -> str:
-    return f"with {quoted(words[0])}"
-
-
-def _alternatives(texts: tuple[str, ...]) -> str:
-    return listed(texts, "or")
-
-
 def _lines(criterion: Events, recording: Recording) -> list[Line]:
     printed = recording.printed if criterion.source != "speech" else ()
     spoken = recording.spoken if criterion.source != "print" else ()
     return sorted({(line.t, line.text): line for line in (*printed, *spoken)}.values(), key=lambda line: line.t)
 
 
-def _mentions(event: EventAt, line: Line) -> bool:
+def _mentions(texts: Sequence[str], line: Line) -> bool:
     words = words_of(line.text)
-    return any(find_words(words, words_of(text)) is not None for text in event.text)
+    return any(find_words(words, words_of(text)) is not None for text in texts)
 
 
 def _happens(criterion: Events, event: EventAt, line: Line, recording: Recording) -> bool:
-    return _mentions(event, line) and in_zone(
+    return _mentions(event.text, line) and in_zone(
         part_at_time(recording, criterion.sensor, line.t), event.zone, criterion.margin
     )
+
+
+def _elsewhere(criterion: Events, lines: Sequence[Line], recording: Recording) -> int:
+    """How many texts of events came outside of every place that they belong to."""
+    own: dict[tuple[str, ...], list[Zone]] = {}
+    for event in criterion.events:
+        own.setdefault(event.text, []).append(event.zone)
+    count = 0
+    for line in lines:
+        told = [zones for texts, zones in own.items() if _mentions(texts, line)]
+        if told:
+            place = part_at_time(recording, criterion.sensor, line.t)
+            count += sum(not any(in_zone(place, zone, criterion.margin) for zone in zones) for zones in told)
+    return count
 
 
 def _strays(criterion: Events, lines: Sequence[Line], recording: Recording) -> dict[EventAt, Line]:
     """For each event that was mentioned at the place of one with other words the first such line."""
     strays: dict[EventAt, Line] = {}
     for line in lines:
-        mentioned = [event for event in criterion.events if event not in strays and _mentions(event, line)]
+        mentioned = [event for event in criterion.events if event not in strays and _mentions(event.text, line)]
         if not mentioned:
             continue
         place = part_at_time(recording, criterion.sensor, line.t)
@@ -334,7 +305,7 @@ def _missed(
 ) -> Outcome:
     expected = _expected(criterion, event)
     score = Fraction(len(found), len(criterion.events))
-    elsewhere = next((line for line in after if _mentions(event, line)), None)
+    elsewhere = next((line for line in after if _mentions(event.text, line)), None)
     if elsewhere is None:
         behind = f" after {quoted(found[-1].text)}" if found else ""
         t = found[-1].t if found else None

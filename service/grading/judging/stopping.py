@@ -104,7 +104,7 @@ def _stood_still(recording: Recording) -> float:
         if math.hypot(ticks.x[i] - ticks.x[i - 1], ticks.y[i] - ticks.y[i - 1]) > _MM:
             break
         count += 1
-    return seconds_at(count)
+    return seconds_at(recording, count)
 
 
 def _wanted(criterion: StopOn) -> str:

@@ -5,16 +5,20 @@ The texts are a student's, patterns are the instructor's; no pair of them takes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from responders.message_format import JSON, PY
 from service.grading.grade import TrialResult
-from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, is_json_answer, parsed
+from service.grading.judging.asking import pair_of
 from service.grading.judging.judges import judges
+from service.grading.judging.losses import by_chance, loss_words, out_of_reach
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import listed, quoted
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.words import find_words, listed, quoted, words_of
 from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording
 from submissions.criteria.expressions import found_in
@@ -23,19 +27,24 @@ from submissions.criteria.texts import Messages, Prints, Says, TextConditions, T
 
 @dataclass(frozen=True, slots=True)
 class Deed:
-    """The words for what is judged: the robot, say, said."""
+    """The words for what is judged: the robot, say, said; what is addressed to somebody is no note to oneself."""
 
     who: str
     verb: str
     past: str
+    addressed: bool = False
 
 
 #: How conditions begin that are more than quoted texts.
 _SOMETHING = "something that "
+#: What of a text decides whether it is like another.
+_LONG = 200
+_NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
+_EXCUSED = "What the channel lost by chance counts as received."
 _PRINT = Deed("the program", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
-_SEND = Deed("the robot", "send", "sent")
+_SEND = Deed("the robot", "send", "sent", addressed=True)
 _RECEIVE = Deed("the robot", "receive", "received")
 
 
@@ -72,8 +81,11 @@ def judge_sequence(criterion: TextSequence, lines: Sequence[Line], deed: Deed, r
         return _judge_last(criterion, lines, deed, recording)
     chosen = [line for line in lines if meets(criterion, line.text)]
     if criterion.in_order:
-        return _judge_order(criterion, chosen, lines, deed, recording)
-    return _judge_count(criterion, chosen, lines, deed, recording)
+        outcome, found = _judge_order(criterion, chosen, lines, deed, recording)
+        beside = _out_of_order(criterion, chosen, found, deed)
+        return tempered(outcome, criterion, len(criterion.in_order), beside)
+    outcome = _judge_count(criterion, chosen, lines, deed, recording)
+    return tempered(outcome, criterion, max(_bounds(criterion)[0], 1), _beside(criterion, lines, chosen, deed))
 
 
 def meets(criterion: TextConditions, text: str) -> bool:
@@ -86,12 +98,15 @@ def meets(criterion: TextConditions, text: str) -> bool:
         return False
     if not all(_plain(wanted, fold) in plain for wanted in criterion.contains):
         return False
+    if criterion.among and len(_named(criterion.among, text)) != 1:
+        return False
     return criterion.matches is None or found_in(text, criterion.matches, fold)
 
 
 def conditions(criterion: TextConditions) -> str:
     """What is looked for, in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
-    if criterion.equals and not (criterion.starts_with or criterion.contains or criterion.matches is not None):
+    others = criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
+    if criterion.equals and not others:
         return listed(criterion.equals, "or")
     words = []
     if criterion.equals:
@@ -100,6 +115,8 @@ def conditions(criterion: TextConditions) -> str:
         words.append(f"starts with {listed(criterion.starts_with, 'or')}")
     if criterion.contains:
         words.append(f"contains {listed(criterion.contains)}")
+    if criterion.among:
+        words.append(f"names one of {listed(criterion.among)} alone")
     if criterion.matches is not None:
         words.append(f"matches the pattern {quoted(criterion.matches)}")
     return f"{_SOMETHING}{' and '.join(words)}" if words else ""
@@ -129,12 +146,13 @@ def _judge_last(criterion: TextSequence, lines: Sequence[Line], deed: Deed, reco
 
 def _judge_order(
     criterion: TextSequence, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
-) -> Outcome:
+) -> tuple[Outcome, Sequence[Line]]:
+    """The outcome, and the texts that were taken for those in order."""
     wanted = criterion.in_order
     found: list[Line] = []
     extra: Line | None = None
     for line in chosen:
-        if len(found) < len(wanted) and _compares(criterion, line.text, wanted[len(found)]):
+        if len(found) < len(wanted) and _stands_for(criterion, line.text, wanted[len(found)]):
             found.append(line)
         elif extra is None:
             extra = line
@@ -146,9 +164,8 @@ def _judge_order(
     extras = len(chosen) - len(found) if criterion.only else 0
     score = Fraction(len(found), len(wanted) + extras)
     if criterion.only and extra is not None:
-        return failed(
-            f"{expected}, but it {deed.past} {quoted(extra.text)} as well.", extra.t, pose_at(recording, extra.t), score
-        )
+        words = f"{expected}, but it {deed.past} {quoted(extra.text)} as well."
+        return failed(words, extra.t, pose_at(recording, extra.t), score), found
     if len(found) < len(wanted):
         missing = quoted(wanted[len(found)])
         what = (
@@ -156,9 +173,38 @@ def _judge_order(
         )
         at = found[-1].t if found else None
         pose = pose_at(recording, at) if at is not None else None
-        return failed(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score)
+        return failed(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score), found
     end = found[-1]
-    return passed(f"{deed.who.capitalize()} {deed.past} {listed(wanted)} in order.", end.t, pose_at(recording, end.t))
+    words = f"{deed.who.capitalize()} {deed.past} {listed(wanted)} in order."
+    return passed(words, end.t, pose_at(recording, end.t)), found
+
+
+def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
+    """Whether a text is the one that is wanted; one that contains half of the others or more is none of them."""
+    if criterion.compare != "contains" or not _compares(criterion, text, wanted):
+        return _compares(criterion, text, wanted)
+    others = {other for other in criterion.in_order if not _compares(criterion, wanted, other)}
+    return not others or 2 * sum(_compares(criterion, text, other) for other in others) < len(others)
+
+
+def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequence[Line], deed: Deed) -> Strays:
+    """What of the texts that count, or of those that are asked for, came beside those found."""
+    if criterion.only:
+        # Each further text has lowered the score already.
+        return Strays("")
+    taken = set(map(id, found))
+    # A loop that is stuck on one text has not named everything.
+    changed = [line for place, line in enumerate(chosen) if not place or line.text != chosen[place - 1].text]
+    every = criterion.has_conditions or deed.addressed
+    extra = sum(
+        every or any(_compares(criterion, line.text, text) for text in criterion.in_order)
+        for line in changed
+        if id(line) not in taken
+    )
+    words = f"texts of this sort were {deed.past} {extra} times where they do not belong"
+    # What merely contains "1" may be about anything.
+    sure = every or criterion.compare == "equals"
+    return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
 
 
 def _judge_count(
@@ -181,6 +227,22 @@ def _judge_count(
         return failed(f"{expected}, but {_instead(lines, deed)}.")
     score = Fraction(count, least) if count < least else Fraction(most or 0, count)
     return failed(f"{expected}, but it {deed.past} {count} such, the last {quoted(chosen[-1].text)}.", at, pose, score)
+
+
+def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Line], deed: Deed) -> Strays:
+    """The texts beside those that must come; of those that differ in numbers alone one, but for guesses at these."""
+    if not (chosen and criterion.has_conditions and _bounds(criterion)[0]):
+        return Strays("")
+    guessed = {_form(line.text) for line in chosen}
+    counted = set(map(id, chosen))
+    forms = [_form(line.text) for line in lines if id(line) not in counted]
+    others = sum(form in guessed for form in forms) + len(set(forms) - guessed)
+    return Strays(f"it {deed.past} {others} others as well", others=others)
+
+
+def _form(text: str) -> str:
+    """A text without its numbers."""
+    return _NUMBER.sub("#", " ".join(text[:_LONG].casefold().split()))
 
 
 def _bounds(criterion: TextSequence) -> tuple[int, int | None]:
@@ -209,62 +271,104 @@ def _instead(lines: Sequence[Line], deed: Deed) -> str:
 
 def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
-        sent = [Line(message.t, message.text) for message in recording.messages if message.sender == "robot"]
-        return judge_sequence(criterion, sent, _SEND, recording)
-    queue = []
-    for message in _queue(recording):
-        value = parsed(message.text)
-        value = value if criterion.path is None else at_path(value, criterion.path)
+        pair = pair_of(criterion, recording)
+        sent = [Line(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"]
+        deed = Deed(pair.teller, f"tell {pair.told}", f"told {pair.told}") if criterion.agents else _SEND
+        return judge_sequence(criterion, sent, deed, recording)
+    arrived = [message for message in recording.messages if _joined(message)]
+    as_arrived = [(message.delivered or 0.0, message.received) for message in arrived]
+    outcome = judge_sequence(criterion, _lines(criterion, as_arrived), _RECEIVE, recording)
+    astray = [message for message in recording.messages if message.sender == "responder" and by_chance(message)]
+    if outcome.passed or not astray:
+        return outcome
+    # As if chance had done nothing to the answers: the program cannot help what it did.
+    as_answered = {id(message): (message.delivered or message.t, message.text) for message in (*arrived, *astray)}
+    excused = judge_sequence(criterion, _lines(criterion, as_answered.values()), _RECEIVE, recording)
+    if excused.score <= outcome.score:
+        return outcome
+    return replace(excused, message=f"{excused.message} {_EXCUSED}")
+
+
+def _lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[Line]:
+    """What joins the robot's queue of answers with their times, in the order of these; of each what is asked for."""
+    lines = []
+    for t, text in sorted(answers, key=lambda answer: answer[0]):
+        value = parsed(text)
+        value = value if value is NOTHING or criterion.path is None else at_path(value, criterion.path)
         if value is not NOTHING:
-            queue.append(Line(message.delivered or 0.0, as_text(value)))
-    return judge_sequence(criterion, queue, _RECEIVE, recording)
-
-
-def _queue(recording: Recording) -> list[Message]:
-    """What joined the robot's queue, in order of arrival."""
-    return sorted(filter(_joined, recording.messages), key=lambda message: message.delivered or 0.0)
+            lines.append(Line(t, as_text(value)))
+    return lines
 
 
 def _joined(message: Message) -> bool:
     """Whether it is an answer that joined the robot's queue."""
-    well_formed = message.text.startswith(JSON) and message.note != "malformed"
-    return message.sender == "responder" and message.delivered is not None and well_formed
+    if message.sender != "responder" or message.delivered is None:
+        return False
+    if message.arrived_as is not None:
+        return is_json_answer(message.arrived_as)
+    return message.text.startswith(JSON) and message.note != "malformed"
 
 
 def _queue_grows(recording: Recording) -> Outcome:
-    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending."""
-    asked = [
+    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending.
+
+    An answer that the channel lost by chance, or that came when the message was sent again, is not missed.
+    """
+    sent = [
         (index, message)
         for index, message in enumerate(recording.messages)
-        if message.sender == "robot" and message.text.startswith(PY) and message.delivered is not None
+        if message.sender == "robot" and message.text.startswith(PY)
     ]
+    asked = [(index, message) for index, message in sent if message.delivered is not None]
     expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
     if not asked:
-        return failed(f"{expected}, but the robot sent no PY:: message.")
+        astray = next((message for _, message in sent if out_of_reach(message)), None)
+        if sent and not astray:
+            return passed("The channel lost every PY:: message by chance, so there was nothing to queue up.")
+        lost = f"the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
+        return failed(f"{expected}, but {lost or 'the robot sent no PY:: message'}.")
     answers = Answers(recording)
-    replies = [(message, answers.to(index)) for index, message in asked]
+    replies = [(message, _reply(answers, index)) for index, message in asked]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
+    came = {message.text for message, reply in replies if reply is not None and _joined(reply)}
     # A message that is sent again shows nothing new.
     different = {message.text for _, message in asked}
-    failing = {message.text for message, reply in replies if reply is None or not _joined(reply)}
-    score = Fraction(len(different) - len(failing), len(different))
-    for message, reply in replies:
-        if reply is None or not _joined(reply):
-            happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
-            if reply is not None and reply.delivered is None and reply.note == "undelivered":
-                happened = "got its answer only after the program had ended"
-            return failed(
-                f"{expected}, but {quoted(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
-                message.t,
-                pose_at(recording, message.t),
-                score,
-            )
+    missed = [(message, reply) for message, reply in replies if not _excused(message, reply, came)]
+    score = Fraction(len(different - {message.text for message, _ in missed}), len(different))
+    for message, reply in missed:
+        happened = "got no answer" if reply is None else f"was answered with {quoted(reply.text)}"
+        if reply is not None and reply.delivered is None and reply.note == "undelivered":
+            happened = "got its answer only after the program had ended"
+        if reply is not None and out_of_reach(reply):
+            happened = f"was answered and the channel lost the answer ({loss_words(reply)})"
+        return failed(
+            f"{expected}, but {quoted(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
+            message.t,
+            pose_at(recording, message.t),
+            score,
+        )
+    if not arrivals:
+        return passed("The channel lost every answer by chance.")
     times = [arrived or 0.0 for arrived in arrivals]
     if times != sorted(times):
         return failed(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
     return passed(
-        f"The robot's queue grew by one for each of {len(asked)} messages.", times[-1], pose_at(recording, times[-1])
+        f"The robot's queue grew by one for each of {len(arrivals)} messages.",
+        times[-1],
+        pose_at(recording, times[-1]),
     )
+
+
+def _reply(answers: Answers, index: int) -> Message | None:
+    """The answer to a message that joined the queue, of several copies the first; else the first that there is."""
+    return next(filter(_joined, answers.all_to(index)), answers.to(index))
+
+
+def _excused(message: Message, reply: Message | None, came: Container[str]) -> bool:
+    """Whether a message's answer is in the queue, or not there because of the channel alone."""
+    if reply is None:
+        return False
+    return _joined(reply) or by_chance(reply) or (out_of_reach(reply) and message.text in came)
 
 
 def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:
@@ -278,6 +382,12 @@ def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:
             return _plain(text, fold).startswith(_plain(wanted, fold))
         case "matches":
             return found_in(text, wanted, fold)
+
+
+def _named(choices: Sequence[str], text: str) -> list[str]:
+    """Those of the choices that a text has in it, as whole words."""
+    words = words_of(text)
+    return [choice for choice in choices if find_words(words, words_of(choice)) is not None]
 
 
 def _plain(text: str, ignore_case: bool) -> str:

@@ -54,7 +54,8 @@ def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Ou
     unit = f" {measure.unit}" if measure.unit else ""
     found = f"{criterion.measure}: {measure.value:.2f}{unit}"
     if not evidence.passed:
-        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose, measures=(measure,))
+        # A figure that does not count stands in no table of ranks.
+        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
     share = _share(criterion, measure.value)
     best = criterion.steps[0][0]
     if share == 1:
@@ -98,4 +99,4 @@ def _moving(recording: Recording) -> float:
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
     changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
-    return seconds_at(int(np.logical_or.reduce(changes).sum()))
+    return seconds_at(recording, int(np.logical_or.reduce(changes).sum()))

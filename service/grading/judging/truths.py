@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from service.grading.grade import TrialResult
 from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import part_at
-from service.grading.judging.label_patches import decoded
+from service.grading.judging.label_patches import CODES, GREYS, decoded
 from sim.floors import label_names
 from sim.recording import Pose, Recording
 from submissions.assignment.definition import Assignment
@@ -46,7 +46,8 @@ def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[st
     on_floor = () if criterion.truth == "places" else label_names(assignment.world.background)
     listed = criterion.truth if isinstance(criterion.truth, tuple) else ()
     placed = tuple(label for _, _, label in _places(criterion))
-    return tuple(dict.fromkeys([*on_floor, *listed, *placed, *truths, *criterion.aliases]))
+    greys = CODES[criterion.greys].values() if isinstance(criterion.greys, str) else criterion.greys
+    return tuple(dict.fromkeys([*on_floor, *listed, *placed, *greys, *truths, *criterion.aliases]))
 
 
 def _counted(criterion: Recognition, known: Sequence[NumberedTruth]) -> Sequence[NumberedTruth]:
@@ -70,7 +71,7 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
             case "label":
                 truth = image.truth
             case "grey":
-                truth = decoded(image, recording.background, trial.light_noise)
+                truth = decoded(image, _greys(criterion, recording), trial.light_noise)
             case "places":
                 truth = _nearest(_places(criterion), part_at(recording, "left", image.pose), criterion.within)
             case _:
@@ -78,6 +79,14 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
         if truth is not None:
             found.append((number, truth))
     return found
+
+
+def _greys(criterion: Recognition, recording: Recording) -> Mapping[int, str]:
+    """The label of each grey: the assignment's own, else what the floor's patches are."""
+    if isinstance(criterion.greys, str):
+        return CODES[criterion.greys]
+    own = {grey: label for label, grey in criterion.greys.items()}
+    return own or GREYS.get(recording.background, {})
 
 
 def _look_from_start(recording: Recording, pose: Pose) -> float:

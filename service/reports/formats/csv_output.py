@@ -1,4 +1,4 @@
-"""The grades of a batch as comma-separated values: one for spreadsheets, one that Moodle imports.
+"""The grades of a batch as comma-separated values, for spreadsheets: a row a submission, or a row a criterion.
 
 Cells that a spreadsheet would take for a formula are defused; nothing here decides who is in a batch.
 """
@@ -7,47 +7,60 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from service.grading.grade import Grade
 from service.reports.formats.registry import table
 from service.reports.readable import number, one_line
-from service.reports.view import GradebookView, View, gradebook_view, staff_view
+from service.reports.rows import TableRow
+from service.reports.view import View, staff_view
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+_WHO = ("student", "name", "email", "assignment")
+_MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version")
 
 
 @table("csv", ".csv", staff_view)
-def marks_csv(views: Sequence[View]) -> str:
-    """One row a grade: student, assignment, marks, verdict, accuracy, hashes, a column a criterion, words for staff."""
-    grades = [view.grade for view in views]
+def marks_csv(rows: Sequence[TableRow[View]]) -> str:
+    """One row a submission: who, marks, verdict, accuracy, hashes, a column a criterion, words for staff, reason."""
+    grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
-    header = ["student", "assignment", "marks", "max_marks", "verdict"]
-    header += ["accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version"]
-    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff"]
-    return _table([header, *(_row(grade, criteria) for grade in grades)])
+    header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
+    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "file", "reason"]
+    return csv_text([header, *(_wide(row, criteria) for row in rows)])
 
 
-@table("moodle", ".csv", gradebook_view)
-def moodle_csv(views: Sequence[GradebookView]) -> str:
-    """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
-    rows = [["ID number", "Grade", "Feedback comments"]]
-    for view in views:
-        feedback = "; ".join(
-            f"{result.title}: {number(result.marks)} of {number(result.max_marks)}. {result.message}"
-            for result in view.shown.criteria
-        )
-        rows.append([view.entry.student, number(view.entry.marks), one_line(feedback, 2000)])
-    return _table(rows)
+@table("csv-long", ".csv", staff_view)
+def criteria_csv(rows: Sequence[TableRow[View]]) -> str:
+    """One row a criterion of a submission; one without marks where the submission has no grade."""
+    header = [*_WHO, "criterion", "title", "marks", "max_marks", "message", "file", "reason"]
+    return csv_text([header, *(cells for row in rows for cells in _long(row))])
 
 
-def _row(grade: Grade, criteria: Sequence[str]) -> list[str]:
+def csv_text(rows: Iterable[Sequence[str]]) -> str:
+    """The rows as a file, harmless in a spreadsheet."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\r\n").writerows([safe_cell(value) for value in row] for row in rows)
+    return stream.getvalue()
+
+
+def safe_cell(value: str) -> str:
+    """A cell on one line that is no formula."""
+    text = one_line(value, 4000)
+    return f"'{text}" if text.startswith(_FORMULA_STARTS) else text
+
+
+def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
+    grade = None if row.grade is None else row.grade.grade
+    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 1)
+    return [*_who(row), *marked, row.source, row.reason]
+
+
+def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
     by_id = {result.id: number(result.marks) for result in grade.criteria}
     accuracy = grade.accuracy
     measured = [f"{accuracy.value:.4f}", f"{accuracy.low:.4f}", f"{accuracy.high:.4f}"] if accuracy else [""] * 3
     return [
-        grade.student,
-        grade.assignment,
         number(grade.marks),
         number(grade.max_marks),
         grade.verdict.value,
@@ -60,13 +73,14 @@ def _row(grade: Grade, criteria: Sequence[str]) -> list[str]:
     ]
 
 
-def _table(rows: Iterable[Sequence[str]]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\r\n")
-    writer.writerows([_cell(value) for value in row] for row in rows)
-    return stream.getvalue()
+def _long(row: TableRow[View]) -> Iterator[list[str]]:
+    if row.grade is None:
+        yield [*_who(row), "", "", "", "", "", row.source, row.reason]
+        return
+    for result in row.grade.grade.criteria:
+        marks = [number(result.marks), number(result.max_marks)]
+        yield [*_who(row), result.id, result.title, *marks, result.message, row.source, row.reason]
 
 
-def _cell(value: str) -> str:
-    text = one_line(value, 4000)
-    return f"'{text}" if text.startswith(_FORMULA_STARTS) else text
+def _who(row: TableRow[View]) -> list[str]:
+    return [row.student.id, row.student.name, row.student.email, row.assignment]

@@ -7,14 +7,16 @@ reads, tells nothing of hidden parts, and a test's text nothing of trials that a
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
-from service.grading.grade import CriterionResult
+from service.grading.grade import CriterionResult, Grade
 from service.reports.faults import fault_groups
-from service.reports.formats.registry import document
+from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
+from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import verdict_words
+from service.reports.words import grade_words
 
 
 def gradescope_document(view: GradebookView) -> dict[str, Any]:
@@ -42,7 +44,34 @@ def gradescope_document(view: GradebookView) -> dict[str, Any]:
 @document("gradescope", ".json", gradebook_view)
 def gradescope_text(view: GradebookView) -> str:
     """The document as indented ASCII JSON."""
-    return json.dumps(gradescope_document(view), indent=2, allow_nan=False) + "\n"
+    return _text(gradescope_document(view))
+
+
+@refusal("gradescope")
+def gradescope_refusal(row: TableRow[Grade]) -> str:
+    """No marks, and why."""
+    return _text({"score": 0, **_told(row.reason)})
+
+
+@table("gradescope", ".json", gradebook_view)
+def gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
+    """The documents of several, each with its student and file; without a score where there is no grade."""
+    return _text([_of_several(row) for row in rows])
+
+
+def _of_several(row: TableRow[GradebookView]) -> dict[str, Any]:
+    document = gradescope_document(row.grade) if row.grade is not None else _told(row.reason)
+    who = {"student": row.student.id, "name": row.student.name, "email": row.student.email, "file": row.source}
+    return {**document, "extra_data": {**who, **document.get("extra_data", {"assignment": row.assignment})}}
+
+
+def _told(reason: str) -> dict[str, Any]:
+    output = f"This submission was not graded: {readable(reason)}"
+    return {"output": output, "output_format": "text", "visibility": "visible", "stdout_visibility": "hidden"}
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, indent=2, allow_nan=False) + "\n"
 
 
 def _test(number: int, result: CriterionResult) -> dict[str, Any]:
@@ -59,7 +88,7 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 
 def _output(view: GradebookView) -> str:
     shown = view.shown
-    words = verdict_words(shown.verdict)
+    words = grade_words(shown)
     lines = [words.happened, words.whose, words.next_step]
     for group in fault_groups(shown, limit=10):
         lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]

@@ -10,11 +10,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from service.grading.grade import Accuracy
-from service.reports.formats.registry import document, table
+from service.grading.grade import Accuracy, Grade
+from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
-from service.reports.trace import storable
+from service.reports.rows import TableRow
+from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
+from sim.recording import Message, Recording
 
 SCHEMA = 1
 
@@ -45,15 +47,16 @@ def json_document(view: View) -> dict[str, Any]:
                 "seed": trial.seed,
                 "verdict": trial.verdict.value,
                 "sha256": trial.recording.sha256,
-                "spoken": [storable(line.text) for line in trial.recording.spoken],
-                "messages": [
-                    {"t": message.t, "sender": message.sender, "text": storable(message.text)}
-                    for message in trial.recording.messages
-                ],
+                **_said(trial.recording),
+                **({"partner": _said(trial.recording.partner)} if trial.recording.partner is not None else {}),
+                **agent_messages(trial.recording),
+                "notes": [storable(note) for note in trial.recording.notes],
             }
             for trial in grade.trials
         ],
         "accuracy": _accuracy(grade.accuracy),
+        "notes": [storable(note) for note in grade.notes],
+        **({"missing": grade.missing} if grade.missing else {}),
         **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
 
@@ -64,10 +67,45 @@ def json_text(view: View) -> str:
     return json.dumps(json_document(view), indent=2, allow_nan=False) + "\n"
 
 
+@refusal("json")
+def json_refusal(row: TableRow[Grade]) -> str:
+    """Who was refused, and why."""
+    return json.dumps(_of_several(row.shown(staff_view)), indent=2) + "\n"
+
+
 @table("json", ".json", staff_view)
-def json_list(views: Sequence[View]) -> str:
-    """The documents of a batch, each with its student."""
-    return json.dumps([{"student": view.grade.student, **json_document(view)} for view in views], indent=2) + "\n"
+def json_list(rows: Sequence[TableRow[View]]) -> str:
+    """The documents of several, each with its student and file; without marks where there is no grade."""
+    return json.dumps([_of_several(row) for row in rows], indent=2) + "\n"
+
+
+def _of_several(row: TableRow[View]) -> dict[str, Any]:
+    student = row.student
+    who = {"student": student.id, "name": student.name, "email": student.email, "file": row.source}
+    why = {"reason": storable(row.reason)} if row.reason else {}
+    if row.grade is None:
+        none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
+        return {**who, **why, **none}
+    return {**who, **why, **json_document(row.grade)}
+
+
+def _said(recording: Recording) -> dict[str, Any]:
+    return {
+        "spoken": [storable(line.text) for line in recording.spoken],
+        "messages": [_message(message) for message in recording.messages],
+    }
+
+
+def _message(message: Message) -> dict[str, Any]:
+    """A text with its time; where the channel lost or corrupted it, what it did and where the robot was."""
+    words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": storable(message.text)}
+    if message.lost:
+        words["lost"] = message.lost
+        if message.distance is not None:
+            words |= {"distance": message.distance, "angle": message.angle}
+    if message.arrived_as is not None:
+        words["arrived_as"] = storable(message.arrived_as)
+    return words
 
 
 def _accuracy(accuracy: Accuracy | None) -> dict[str, float | int] | None:

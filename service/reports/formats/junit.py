@@ -5,11 +5,13 @@ A criterion passes with full marks; one that could not be marked fairly is an er
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from service.grading.grade import CriterionResult, Grade
-from service.reports.formats.registry import document
+from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
+from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
 from sim.recording import Verdict
 
@@ -19,27 +21,69 @@ _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
 @document("junit", ".xml", staff_view)
 def junit_text(view: View) -> str:
     """The grade as a ``testsuites`` document with one suite; times are simulated seconds."""
-    grade = view.grade
-    unmarked = grade.verdict in _NOT_MARKED
-    missed = sum(result.marks < result.max_marks for result in grade.criteria)
+    return _document([_suite(view.grade, [("student", view.grade.student)])])
+
+
+@refusal("junit")
+def junit_refusal(row: TableRow[Grade]) -> str:
+    """One suite with an error in it."""
+    return _document([_suite_of(row.shown(staff_view))])
+
+
+@table("junit", ".xml", staff_view)
+def junit_suites(rows: Sequence[TableRow[View]]) -> str:
+    """A suite for each submission; one without a grade has one test case that says why."""
+    return _document([_suite_of(row) for row in rows])
+
+
+def _document(suites: Sequence[ElementTree.Element]) -> str:
     root = ElementTree.Element("testsuites")
-    suite = ElementTree.SubElement(
-        root,
-        "testsuite",
-        name=one_line(grade.assignment),
-        tests=str(len(grade.criteria)),
-        failures=str(0 if unmarked else missed),
-        errors=str(missed if unmarked else 0),
-        skipped="0",
-        time=f"{sum(trial.recording.end_t for trial in grade.trials):.3f}",
-    )
-    properties = ElementTree.SubElement(suite, "properties")
-    for name, value in _properties(grade):
-        ElementTree.SubElement(properties, "property", name=name, value=readable(value, 300))
-    for result in grade.criteria:
-        _add_case(suite, grade, result, "error" if unmarked else "failure")
+    root.extend(suites)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _suite_of(row: TableRow[View]) -> ElementTree.Element:
+    student = row.student
+    who = [("student", student.id), ("name", student.name), ("email", student.email), ("file", row.source)]
+    who += [("reason", row.reason)]
+    known = [(name, value) for name, value in who if value]
+    if row.grade is not None:
+        return _suite(row.grade.grade, known)
+    suite = _begun(row.assignment, 1, errors=int(row.refused), skipped=int(not row.refused))
+    _add_properties(suite, known)
+    case = ElementTree.SubElement(
+        suite, "testcase", classname=one_line(row.assignment), name=one_line(f"{row.who} is graded", 200), time="0"
+    )
+    kind = "error" if row.refused else "skipped"
+    ElementTree.SubElement(case, kind, message=readable(row.reason, 300))
+    return suite
+
+
+def _suite(grade: Grade, who: Sequence[tuple[str, str]]) -> ElementTree.Element:
+    unmarked = grade.verdict in _NOT_MARKED
+    missed = sum(result.marks < result.max_marks for result in grade.criteria)
+    seconds = sum(trial.recording.end_t for trial in grade.trials)
+    failures, errors = (0, missed) if unmarked else (missed, 0)
+    suite = _begun(grade.assignment, len(grade.criteria), failures, errors, seconds=seconds)
+    _add_properties(suite, [*who, *_properties(grade)])
+    for result in grade.criteria:
+        _add_case(suite, grade, result, "error" if unmarked else "failure")
+    return suite
+
+
+def _begun(
+    name: str, tests: int, failures: int = 0, errors: int = 0, skipped: int = 0, seconds: float = 0
+) -> ElementTree.Element:
+    counts = {"tests": tests, "failures": failures, "errors": errors, "skipped": skipped}
+    told = {"name": one_line(name), **{key: str(value) for key, value in counts.items()}, "time": f"{seconds:.3f}"}
+    return ElementTree.Element("testsuite", told)
+
+
+def _add_properties(suite: ElementTree.Element, told: Sequence[tuple[str, str]]) -> None:
+    properties = ElementTree.SubElement(suite, "properties")
+    for name, value in told:
+        ElementTree.SubElement(properties, "property", name=name, value=readable(value, 300))
 
 
 def _add_case(suite: ElementTree.Element, grade: Grade, result: CriterionResult, outcome: str) -> None:
@@ -54,7 +98,6 @@ def _add_case(suite: ElementTree.Element, grade: Grade, result: CriterionResult,
 
 def _properties(grade: Grade) -> list[tuple[str, str]]:
     return [
-        ("student", grade.student),
         ("marks", number(grade.marks)),
         ("max_marks", number(grade.max_marks)),
         ("verdict", grade.verdict.value),

@@ -5,29 +5,42 @@ A format writes a document for one grade, one table for many, or both; nothing h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from rich.console import RenderableType
 
 from service.grading.grade import Grade
+from service.reports.rows import ReportPage, TableRow
 
 _V = TypeVar("_V")
+
+
+@dataclass(frozen=True, slots=True)
+class FilledIn:
+    """Another system's table with the grades in it, and the rows that it has no place for."""
+
+    text: str
+    left_over: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
     """How grades are written: ``document`` one in a file of its own, ``table`` all of a batch in one.
 
-    ``on_terminal`` is the document for a screen, where it has another shape there.
+    ``refusal`` is the document of what was refused, ``on_terminal`` that for a screen, where it has another shape
+    there. ``filled_in`` writes into a table that it is given, ``packed`` reports into a file.
     """
 
     name: str
     suffix: str = ""
     document: Callable[[Grade], str] | None = None
-    table: Callable[[Sequence[Grade]], str] | None = None
+    refusal: Callable[[TableRow[Grade]], str] | None = None
+    table: Callable[[Sequence[TableRow[Grade]]], str] | None = None
     on_terminal: Callable[[Grade], RenderableType] | None = None
+    filled_in: Callable[[Sequence[TableRow[Grade]], str], FilledIn] | None = None
+    packed: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]] | None = None
 
 
 FORMATS: dict[str, Format] = {}
@@ -45,16 +58,61 @@ def document(
     return register
 
 
+def refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[[TableRow[Grade]], str]]:
+    """Registers a function that writes the document of a row that was refused."""
+
+    def register(render: Callable[[TableRow[Grade]], str]) -> Callable[[TableRow[Grade]], str]:
+        FORMATS[name] = replace(_begun(name), refusal=render)
+        return render
+
+    return register
+
+
 def table(
     name: str, suffix: str, view: Callable[[Grade], _V]
-) -> Callable[[Callable[[Sequence[_V]], str]], Callable[[Sequence[_V]], str]]:
-    """Registers a function that writes what ``view`` leaves of the grades of a batch."""
+) -> Callable[[Callable[[Sequence[TableRow[_V]]], str]], Callable[[Sequence[TableRow[_V]]], str]]:
+    """Registers a function that writes the rows of a batch, with what ``view`` leaves of their grades."""
 
-    def register(render: Callable[[Sequence[_V]], str]) -> Callable[[Sequence[_V]], str]:
+    def register(render: Callable[[Sequence[TableRow[_V]]], str]) -> Callable[[Sequence[TableRow[_V]]], str]:
         FORMATS[name] = replace(
-            _begun(name), suffix=suffix, table=lambda grades: render([view(grade) for grade in grades])
+            _begun(name), suffix=suffix, table=lambda rows: render([row.shown(view) for row in rows])
         )
         return render
+
+    return register
+
+
+def filled_in(
+    name: str, suffix: str, view: Callable[[Grade], _V]
+) -> Callable[[Callable[[Sequence[TableRow[_V]], str], FilledIn]], Callable[[Sequence[TableRow[_V]], str], FilledIn]]:
+    """Registers a function that writes the rows of a batch into the text of another system's table."""
+
+    def register(
+        render: Callable[[Sequence[TableRow[_V]], str], FilledIn],
+    ) -> Callable[[Sequence[TableRow[_V]], str], FilledIn]:
+        FORMATS[name] = replace(
+            _begun(name),
+            suffix=suffix,
+            filled_in=lambda rows, given: render([row.shown(view) for row in rows], given),
+        )
+        return render
+
+    return register
+
+
+def packed(
+    name: str, suffix: str
+) -> Callable[
+    [Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]],
+    Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
+]:
+    """Registers a function that packs the reports of a batch into a file, and returns whose it had to leave out."""
+
+    def register(
+        pack: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
+    ) -> Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]:
+        FORMATS[name] = replace(_begun(name), suffix=suffix, packed=pack)
+        return pack
 
     return register
 

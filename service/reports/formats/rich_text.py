@@ -16,7 +16,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.formats.registry import on_terminal
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, cost_words, grade_words
+from service.reports.words import accuracy_words, channel_words, cost_words, grade_words
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 
@@ -32,6 +32,8 @@ def rich_report(view: View) -> RenderableType:
     parts += [_fault(group) for group in fault_groups(grade)]
     if grade.accuracy is not None:
         parts.append(Text(accuracy_words(grade)))
+    channel = channel_words(grade)
+    parts += [Text(channel)] if channel else []
     parts += [Text(f"Note: {readable(note, 300)}", style="dim") for note in grade.notes[:20]]
     parts += [Text(cost_words(grade), style="dim")] if grade.cost else []
     parts.append(Text(f"sandbox: {one_line(grade.sandbox)}", style="dim"))

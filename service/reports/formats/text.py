@@ -11,7 +11,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, cost_words, grade_words
+from service.reports.words import accuracy_words, channel_words, cost_words, grade_words
 
 _WIDTH = 96
 
@@ -35,6 +35,8 @@ def plain_text(view: View) -> str:
         lines += ["", *_fault_lines(group)]
     if grade.accuracy is not None:
         lines += ["", accuracy_words(grade)]
+    channel = channel_words(grade)
+    lines += ["", *_wrapped(channel)] if channel else []
     for note in grade.notes[:20]:
         lines += _wrapped(f"Note: {readable(note, 300)}", indent=6)
     lines += ["", *_wrapped(cost_words(grade))] if grade.cost else []

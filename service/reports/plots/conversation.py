@@ -8,6 +8,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,21 +24,25 @@ from service.reports.plots.style import (
     LEFT,
     RIGHT,
     RULE,
+    SECOND_ROBOT,
     WIDTH,
     axes_at,
     drawable,
     font,
     new_figure,
 )  # fmt: skip
+from service.reports.robots import SECOND
 
 _TIMES = 0.44  # inches for the times at the left
 _FIRST = 0.28  # from there to the robot's lane
 _EDGE = 0.42  # from the last lane to the right edge
 _LANE_HEADS = 0.44
 _CHARACTERS = 14.9  # of 8 point type that fit into an inch
+_BOLD_CHARACTERS = 12.6  # of the bold words for what befell a message
 _LINE = 0.131  # inches a line of a label takes
 _ARROW = 0.15  # inches below a label that its arrow takes
 _NARROWEST = 1.5  # inches that a label may take, even if its arrow is shorter
+_ROBOTS: Mapping[str, str] = MappingProxyType({"robot": LEFT, SECOND: SECOND_ROBOT})
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +86,8 @@ def _subtitle(trial: TrialResult, told: SequenceDiagram) -> str:
 
 
 def _lanes(told: SequenceDiagram) -> Mapping[str, float]:
-    """Where each party's lane is, inches from the left; robot and responder stand further apart."""
-    weights = [0.0, 2.1, *(1.0 for _ in told.parties[2:])]
+    """Where each party's lane is, inches from the left; robots and responder stand further apart."""
+    weights = [0.0, 2.1, *(2.1 if party == SECOND else 1.0 for party in told.parties[2:])]
     room = WIDTH - _TIMES - _FIRST - _EDGE
     scale = min(1.0, room / sum(weights)) if len(told.parties) > 2 else 1.0
     if len(told.parties) == 2:
@@ -114,10 +119,10 @@ def _draw_lanes(axes: Axes, lanes: Mapping[str, float], body: float) -> None:
     for party, x in lanes.items():
         axes.plot([x, x], [_LANE_HEADS - 0.14, body], color=RULE, linewidth=1.0, zorder=0)
         axes.text(
-            x, 0.14, party, font=font(7.8, bold=True), color="white" if party == "robot" else INK,
+            x, 0.14, party, font=font(7.8, bold=True), color="white" if party in _ROBOTS else INK,
             ha="center", va="center", zorder=3,
-            bbox={"boxstyle": "round,pad=0.35", "facecolor": LEFT if party == "robot" else "#eef1f4",
-                  "edgecolor": LEFT if party == "robot" else RULE, "linewidth": 0.8},
+            bbox={"boxstyle": "round,pad=0.35", "facecolor": _ROBOTS.get(party, "#eef1f4"),
+                  "edgecolor": _ROBOTS.get(party, RULE), "linewidth": 0.8},
         )  # fmt: skip
 
 
@@ -148,11 +153,12 @@ def _draw_row(axes: Axes, row: _MessageRow, lanes: Mapping[str, float], y: float
 
 def _arrow(axes: Axes, step: Step, source: float, target: float, y: float) -> None:
     crossing = step.kind in ("message", "lost")
-    colour = FAULT if step.kind == "lost" else (LEFT if crossing and step.source == "robot" else INK)
+    colour = FAULT if step.kind == "lost" else (_ROBOTS.get(step.source, INK) if crossing else INK)
     if crossing and step.source == "responder" and step.kind == "message":
         colour = RIGHT
     if step.kind == "lost":
-        stop = source + 0.62 * (target - source)
+        room = 1 - (0.16 + len(step.note) / _BOLD_CHARACTERS) / abs(target - source)
+        stop = source + min(0.62, room) * (target - source)
         axes.plot([source, stop], [y, y], color=colour, linewidth=1.3, linestyle=(0, (1.2, 1.6)))
         axes.plot([stop], [y], "x", color=colour, markersize=6.5, markeredgewidth=1.9)
         axes.text(

@@ -5,6 +5,7 @@ The drawing is in one module a plot; nothing here is random, timed or kept betwe
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
@@ -26,6 +27,7 @@ from service.reports.plots.style import png
 from service.reports.plots.talk import block_diagram, talks
 from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
+from service.reports.robots import SECOND, messages_of
 from service.reports.view import scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.recorded import floor_of
 from sim.recording import Recording
@@ -188,7 +190,7 @@ def _trials(grade: Grade) -> Iterator[Plot]:
             "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
             f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
             f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
-            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches.",
+            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches." + _partners_way(recording.partner),
         )  # fmt: skip
         light = recording.ticks.left_rgb[:, 0]
         heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
@@ -201,22 +203,32 @@ def _trials(grade: Grade) -> Iterator[Plot]:
     yield from _conversations(grade)
 
 
+def _partners_way(partner: Recording | None) -> str:
+    if partner is None:
+        return ""
+    return (
+        f" The second robot's from ({partner.start.x:.0f}, {partner.start.y:.0f}) mm to "
+        f"({partner.end.x:.0f}, {partner.end.y:.0f}) mm."
+    )
+
+
 def _conversations(grade: Grade) -> Iterator[Plot]:
     """Of the first trial in which anything was sent, and of every scenario's worst."""
-    talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
+    talking = [index for index, trial in enumerate(grade.trials) if messages_of(trial.recording)]
     worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
     for index in dict.fromkeys([*talking[:1], *(index for index in worst if index in talking)]):
         trial = grade.trials[index]
-        messages = trial.recording.messages
-        sent = sum(message.sender == "robot" for message in messages)
-        lost = sum(message.delivered is None for message in messages)
+        messages = messages_of(trial.recording)
+        counts = Counter(sender.partition(" to ")[0] for sender, _ in messages)
+        second = f", {SECOND} {counts[SECOND]}" if trial.recording.partner is not None else ""
+        lost = sum(message.delivered is None for _, message in messages)
         name = trial_name(trial)
         yield Plot(
             f"conversation-{name}", "conversation", index, trial.scenario,
             f"{title_of(grade, trial.scenario)}: conversation",
             f"Who told whom what in trial {trial.index + 1}; time goes down.",
-            f"Sequence diagram: the robot sent {sent} messages, the responder {len(messages) - sent}; "
-            f"{lost} never arrived.",
+            f"Sequence diagram: the robot sent {counts['robot']} messages{second}, the responder "
+            f"{counts['responder']}; {lost} never arrived.",
         )  # fmt: skip
         told = talks(trial.recording)
         yield Plot(

@@ -6,7 +6,10 @@ The floor is an image that the caller gives; nothing here knows how floors are m
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -29,6 +32,7 @@ from service.reports.plots.style import (
     PEN,
     RIGHT,
     RULE,
+    SECOND_ROBOT,
     WIDTH,
     axes_at,
     drawable,
@@ -37,7 +41,7 @@ from service.reports.plots.style import (
     whole,
     write,
 )  # fmt: skip
-from sim.recorded import robot_of
+from sim.recorded import robot_of, ticks_until
 from sim.recording import Pose, Recording
 
 Pixels = NDArray[np.uint8]
@@ -50,6 +54,9 @@ _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is sh
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
 _OFF_THE_FLOOR = "#a3aab1"
 _DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
+_BEACON: Mapping[str, Any] = MappingProxyType(
+    {"marker": "*", "linestyle": "none", "markersize": 12, "color": RIGHT, "markeredgecolor": INK}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +83,10 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     """The path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
     recording = trial.recording
     points = _points(recording)
-    view = _view(recording, points)
+    partner = recording.partner
+    partners = _points(partner) if partner is not None else points[:0]
+    everywhere = np.vstack((points, partners))
+    view = _view(recording, everywhere)
     plot_width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     plot_height = plot_width * view.height / view.width
     handles = _legend(recording, view)
@@ -90,19 +100,18 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     axes.set_facecolor(_OFF_THE_FLOOR)
     draw_floor(axes, floor, view)
     _draw_obstacles(axes, recording)
-    _draw_trace(axes, recording, points)
-    _draw_robot(axes, recording.start, recording, dashed=True)
-    _draw_robot(axes, recording.end, recording, dashed=False)
+    _draw_beacon(axes, recording)
     per_inch = view.width / plot_width  # mm
-    _draw_times(axes, recording, points, per_inch)
-    _draw_marks(axes, recording, per_inch)
+    if partner is not None:
+        _draw_way(axes, partner, partners, per_inch, SECOND_ROBOT)
+    _draw_way(axes, recording, points, per_inch, LEFT)
     axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
     axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
     figure.legend(
         handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_columns(located), prop=font(8),
         frameon=False, handletextpad=0.5, columnspacing=1.4, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
-    if _goes_on(points, view):
+    if _goes_on(everywhere, view):
         axes.text(0.5, 0.03, "the path goes on outside this image", transform=axes.transAxes, ha="center",
                   font=font(7.5, bold=True), color=INK, zorder=9,
                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
@@ -129,8 +138,9 @@ def _points(recording: Recording) -> NDArray[np.float64]:
 
 def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
     reach = robot_of(recording).reach
-    low_x, low_y = (float(value) for value in points[:, :2].min(axis=0))
-    high_x, high_y = (float(value) for value in points[:, :2].max(axis=0))
+    places = points[:, :2] if recording.beacon is None else np.vstack((points[:, :2], [recording.beacon]))
+    low_x, low_y = (float(value) for value in places.min(axis=0))
+    high_x, high_y = (float(value) for value in places.max(axis=0))
     margin = max(_MARGIN, reach + 15)
     view = Viewport(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
     if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
@@ -183,16 +193,30 @@ def _draw_obstacles(axes: Axes, recording: Recording) -> None:
         )
 
 
-def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64]) -> None:
+def _draw_beacon(axes: Axes, recording: Recording) -> None:
+    if recording.beacon is not None:
+        axes.plot(*([value] for value in recording.beacon), **_BEACON, zorder=5)
+
+
+def _draw_way(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
+    """All that is told of one robot."""
+    _draw_trace(axes, recording, points, colour)
+    _draw_robot(axes, recording.start, recording, dashed=True)
+    _draw_robot(axes, recording.end, recording, dashed=False)
+    _draw_times(axes, recording, points, per_inch, colour)
+    _draw_marks(axes, recording, per_inch, colour if colour != LEFT else INK)
+
+
+def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], colour: str) -> None:
     for first, last in _pen_strokes(recording, len(points)):
         axes.plot(points[first:last, 0], points[first:last, 1], color=PEN, linewidth=5.5, solid_capstyle="round")
     axes.plot(points[:, 0], points[:, 1], color="white", linewidth=3.2, solid_capstyle="round")
-    axes.plot(points[:, 0], points[:, 1], color=LEFT, linewidth=1.5, solid_capstyle="round")
+    axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.5, solid_capstyle="round")
     for index in _evenly(points, 10):
         x, y, heading = points[index]
         axes.plot(
             [x], [y], linestyle="none", marker=MarkerStyle(_DART, transform=Affine2D().rotate_deg(heading)),
-            markersize=8, color=LEFT, markeredgecolor="white", markeredgewidth=0.7, zorder=4,
+            markersize=8, color=colour, markeredgecolor="white", markeredgewidth=0.7, zorder=4,
         )  # fmt: skip
 
 
@@ -254,25 +278,27 @@ def _placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
     return pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
 
 
-def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float) -> None:
+def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
     """Small times along the path, where the robot had moved on far enough to read them apart."""
     ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
     taken = [end for end in ends if math.isfinite(sum(end))]
     step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
     for second in range(step, math.ceil(recording.end_t), step):
-        row = second * 30
+        row = ticks_until(recording, second)
         if row >= len(points):
             break
         x, y = float(points[row, 0]), float(points[row, 1])
         if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
             continue
         taken.append((x, y))
-        angle = math.radians(float(points[row, 2]) - 90)
-        axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=LEFT, markeredgewidth=0.9, zorder=5)
-        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6)
+        # To the robot's right, and the second one's to its left: two may drive the same way.
+        angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
+        axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
+        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6,
+             colour if colour == SECOND_ROBOT else INK)  # fmt: skip
 
 
-def _draw_marks(axes: Axes, recording: Recording, per_inch: float) -> None:
+def _draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
     robot = robot_of(recording)
     for touch in recording.touches[:40]:
         axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
@@ -291,14 +317,16 @@ def _draw_marks(axes: Axes, recording: Recording, per_inch: float) -> None:
         _tag(axes, column * 8, row * 8 + 10 + 0.10 * per_inch, text, 7.8)
     start, end = recording.start, recording.end
     axes.plot(
-        [start.x], [start.y], "o", markersize=7, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=7
+        [start.x], [start.y], "o", markersize=7, color="white", markeredgecolor=colour, markeredgewidth=1.6, zorder=7
     )
-    axes.plot([end.x], [end.y], "o", markersize=5.5, color=INK, markeredgecolor="white", markeredgewidth=0.8, zorder=8)
+    axes.plot(
+        [end.x], [end.y], "o", markersize=5.5, color=colour, markeredgecolor="white", markeredgewidth=0.8, zorder=8
+    )
 
 
-def _tag(axes: Axes, x: float, y: float, text: str, size: float) -> None:
+def _tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
     axes.text(
-        x, y, drawable(text), font=font(size), color=INK, ha="center", va="center", parse_math=False, zorder=9,
+        x, y, drawable(text), font=font(size), color=colour, ha="center", va="center", parse_math=False, zorder=9,
         clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
     )  # fmt: skip
 
@@ -321,6 +349,11 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
         Line2D([], [], color=LEFT, linewidth=1.5, marker=MarkerStyle(_DART), markersize=8,
                markeredgecolor="white", label="path and heading"),
     ]  # fmt: skip
+    if recording.partner is not None:
+        handles.append(
+            Line2D([], [], color=SECOND_ROBOT, linewidth=1.5, marker=MarkerStyle(_DART), markersize=8,
+                   markeredgecolor="white", label="path of robot 2")
+        )  # fmt: skip
     if any(down for _, down in recording.pen):
         handles.append(Line2D([], [], color=PEN, linewidth=5, label="pen"))
     if recording.images:
@@ -332,6 +365,8 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
         handles.append(
             Line2D([], [], marker="x", linestyle="none", markersize=7, color=FAULT, markeredgewidth=2, label="touch")
         )
+    if recording.beacon is not None:
+        handles.append(Line2D([], [], **_BEACON, label="beacon"))
     if recording.obstacles:
         handles.append(Patch(facecolor="#c8cdd2", edgecolor=INK, hatch="////", label="obstacle"))
     if min(view.left, view.bottom) < -30 or view.right > FLOOR_WIDTH + 30 or view.top > FLOOR_HEIGHT + 30:

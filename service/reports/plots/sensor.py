@@ -24,6 +24,7 @@ from service.reports.plots.style import (
     RIGHT,
     RULE,
     SAID,
+    SECOND_ROBOT,
     WIDTH,
     axes_at,
     font,
@@ -33,7 +34,7 @@ from service.reports.plots.style import (
 )  # fmt: skip
 from sim.columns import Panel
 from sim.recorded import seconds_at
-from sim.recording import COLUMNS, Recording
+from sim.recording import COLUMNS, TICK, Recording
 
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's own title
@@ -74,7 +75,7 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
     body = sum(each.panel.height + _GAP for each in panels)
     figure = new_figure(HEAD + strip_height + body + 0.36, title, _subtitle(trial))
-    end = max(recording.end_t, seconds_at(len(recording.ticks)), 0.1)
+    end = max(recording.end_t, seconds_at(recording, len(recording.ticks)), 0.1)
     top = float(figure.get_size_inches()[1]) - HEAD
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     if strips:
@@ -111,9 +112,11 @@ def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
 def strips_of(recording: Recording) -> tuple[Strip, ...]:
     """The kinds of events that happened at all, with their times in seconds."""
     answers = [m for m in recording.messages if m.sender == "responder"]
+    heard = [m for m in recording.messages if m.sender == "partner"]
     strips = (
         Strip("sent", tuple(m.t for m in recording.messages if m.sender == "robot"), ">", LEFT),
         Strip("answer", tuple(m.delivered for m in answers if m.delivered is not None), "<", RIGHT),
+        Strip("heard", tuple(m.delivered for m in heard if m.delivered is not None), "<", SECOND_ROBOT),
         Strip("said", tuple(line.t for line in recording.spoken), "o", SAID),
         Strip("touch", tuple(touch.t for touch in recording.touches), "D", FAULT),
         Strip("fault", tuple(fault.t for fault in recording.faults), "X", FAULT),
@@ -127,7 +130,8 @@ def _subtitle(trial: TrialResult) -> str:
         noise.append(f"light noise {trial.light_noise:g}")
     if trial.motor_noise:
         noise.append(f"motor noise {trial.motor_noise:g}")
-    return f"trial {trial.index + 1}; {', '.join(noise) or 'no noise'}; one reading every 1/30 s"
+    tick = "1/30 s" if trial.recording.ticks.length == TICK else f"{1000 / trial.recording.ticks.per_second:g} ms"
+    return f"trial {trial.index + 1}; {', '.join(noise) or 'no noise'}; one reading every {tick}"
 
 
 def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:

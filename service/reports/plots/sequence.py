@@ -5,16 +5,19 @@ It decides what is told and what is left out; ``conversation.py`` draws it.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.reports.crossing import befell, out_of_reach_by
 from service.reports.readable import message_words, one_line
+from service.reports.robots import PARTNER_OF, SECOND, robots_of
 from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
-PARTIES = ("robot", "responder", "parser", "agent", "logger", "network")
+PARTIES = ("robot", "responder", SECOND, "parser", "agent", "logger", "network")
 MOST_EXCHANGES = 6
 MOST_STEPS = 40
 #: Of one message, however often it makes the responder call.
@@ -26,7 +29,7 @@ Kind = Literal["message", "call", "return", "lost", "silence"]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One arrow: ``t`` (seconds) is when it started, None inside the responder, where no time passes."""
+    """One arrow: ``t`` (seconds) is when it started, None inside a process, where no time passes."""
 
     kind: Kind
     source: str
@@ -56,10 +59,22 @@ class SequenceDiagram:
 
 @dataclass(frozen=True, slots=True)
 class _Exchange:
-    """A text of the robot's with its answers, or an answer to nothing."""
+    """A text of the robot's with its answers, or an answer to nothing; places among what was told of that robot."""
 
     sent: int | None
     answers: tuple[int, ...]
+    recording: Recording
+    robot: str
+
+    @property
+    def messages(self) -> Iterator[Message]:
+        """The text, if there is one, then the answers."""
+        yield from (self.recording.messages[i] for i in (self.sent, *self.answers) if i is not None)
+
+    @property
+    def begin(self) -> float:
+        """When the first of them was sent."""
+        return next(self.messages).t
 
 
 def conversation(
@@ -67,10 +82,13 @@ def conversation(
 ) -> SequenceDiagram:
     """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
 
-    Kept are the first exchanges and, of the later ones, those in which something was lost or wrong.
+    Kept are the first exchanges and, of the later ones, those in which what was sent again got through, or something
+    was lost or wrong.
     """
-    exchanges = _exchanges(recording.messages)
-    kept = _chosen(recording, exchanges, most_exchanges, most_steps)
+    exchanges = [exchange for robot, own in robots_of(recording) for exchange in _exchanges(own, robot)]
+    if recording.partner is not None:
+        exchanges.sort(key=lambda exchange: exchange.begin)
+    kept = _chosen(exchanges, most_exchanges, most_steps)
     timed: list[tuple[float, int, list[Step | Gap]]] = []
     skipped = 0
     for number, exchange in enumerate(exchanges):
@@ -78,84 +96,123 @@ def conversation(
             skipped += 1
             continue
         if skipped:
-            timed.append((_begin(recording, exchange), number, [Gap(skipped)]))
+            timed.append((exchange.begin, number, [Gap(skipped)]))
             skipped = 0
-        timed += [(t, number, list(steps)) for t, steps in _told(recording, exchange)]
+        timed += [(t, number, list(steps)) for t, steps in _told(exchange)]
     steps = [step for _, _, group in sorted(timed, key=lambda item: item[0]) for step in group]
     if skipped:
         steps.append(Gap(skipped))
     named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
-    parties = tuple(party for party in PARTIES if party in named or party in ("robot", "responder"))
+    always = ("robot", "responder") if recording.partner is None else ("robot", SECOND)
+    lanes = (*PARTIES, *(each.agent for each in recording.agent_outputs if each.agent not in _KNOWN))
+    parties = tuple(party for party in lanes if party in named or party in always)
     return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
 
 
 def troubled(message: Message) -> bool:
     """Whether a message was lost, never arrived, or could not be read."""
-    return message.delivered is None or bool(message.note)
+    return message.delivered is None or bool(befell(message))
 
 
-def _exchanges(messages: Sequence[Message]) -> list[_Exchange]:
+def _exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
+    """What this robot sent and was answered; what the other sent to it is told with the other's."""
+    messages = recording.messages
     answers: dict[int, list[int]] = {}
     for index, message in enumerate(messages):
         to = message.reply_to
         if message.sender == "responder" and to is not None and 0 <= to < len(messages):
             answers.setdefault(to, []).append(index)
     answered = {answer for found in answers.values() for answer in found}
-    return [
-        _Exchange(index, tuple(answers.get(index, ()))) if message.sender == "robot" else _Exchange(None, (index,))
-        for index, message in enumerate(messages)
-        if index not in answered
-    ]
+    for index, message in enumerate(messages):
+        if index in answered or message.sender == "partner":
+            continue
+        sent = message.sender == "robot"
+        own = _Exchange(index, tuple(answers.get(index, ())), recording, robot)
+        yield own if sent else _Exchange(None, (index,), recording, robot)
 
 
-def _chosen(recording: Recording, exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
-    wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(recording, exchange)]
+def _chosen(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
+    wrong = [number for number, exchange in enumerate(exchanges) if _went_wrong(exchange)]
     half = most_exchanges - most_exchanges // 2
-    order = dict.fromkeys([*range(min(half, len(exchanges))), *wrong, *range(len(exchanges))])
+    first = range(min(half, len(exchanges)))
+    order = dict.fromkeys([*first, *_got_through(exchanges, wrong), *wrong, *range(len(exchanges))])
     kept: set[int] = set()
     steps = 0
     for number in list(order)[:most_exchanges]:
-        steps += sum(len(told) for _, told in _told(recording, exchanges[number]))
+        steps += sum(len(told) for _, told in _told(exchanges[number]))
         if kept and steps > most_steps:
             break
         kept.add(number)
     return kept
 
 
-def _went_wrong(recording: Recording, exchange: _Exchange) -> bool:
-    indices = [*exchange.answers] if exchange.sent is None else [exchange.sent, *exchange.answers]
-    return not exchange.answers or any(troubled(recording.messages[index]) for index in indices)
+def _got_through(exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
+    """The exchanges in which a text that was sent before, and went astray, got through."""
+    astray: set[str] = set()
+    failed = set(wrong)
+    for number, exchange in enumerate(exchanges):
+        text = next(exchange.messages).text if exchange.sent is not None else ""
+        if number in failed:
+            astray.add(text)
+        elif text in astray:
+            astray.discard(text)
+            yield number
 
 
-def _begin(recording: Recording, exchange: _Exchange) -> float:
-    return recording.messages[exchange.answers[0] if exchange.sent is None else exchange.sent].t
+def _went_wrong(exchange: _Exchange) -> bool:
+    unanswered = not exchange.answers and not next(exchange.messages).to_partner
+    return unanswered or any(troubled(message) for message in exchange.messages)
 
 
-def _told(recording: Recording, exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
+def _told(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
     """Groups of steps with the time at which each group is told."""
+    recording, robot = exchange.recording, exchange.robot
     if exchange.sent is not None:
         message = recording.messages[exchange.sent]
-        steps: list[Step | Gap] = [_crossing(message)]
-        if message.delivered is not None:
-            made = list(_calls(call for call in recording.calls if call.message == exchange.sent))
+        steps: list[Step | Gap] = [_crossing(message, robot)]
+        if message.delivered is not None and not message.to_partner:
+            made = list(_inside(recording, exchange.sent))
             steps += made[:MOST_CALL_STEPS]
             if len(made) > MOST_CALL_STEPS:
                 steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
             if not exchange.answers:
-                steps.append(Step("silence", "responder", "robot", "– no answer –"))
+                steps.append(Step("silence", "responder", robot, "– no answer –"))
         yield message.t, steps
     for index in exchange.answers:
         answer = recording.messages[index]
-        yield (answer.t if answer.delivered is None else answer.delivered), [_crossing(answer)]
+        yield (answer.t if answer.delivered is None else answer.delivered), [_crossing(answer, robot)]
 
 
-def _crossing(message: Message) -> Step:
-    source, target = ("robot", "responder") if message.sender == "robot" else ("responder", "robot")
-    label, note = message_words(message.text, 90), one_line(message.note, 30)
+def _crossing(message: Message, robot: str) -> Step:
+    sent = message.sender == "robot"
+    other = PARTNER_OF[robot] if message.to_partner else "responder"
+    source, target = (robot, other) if sent else (other, robot)
+    label, note = message_words(message.text, 90), befell(message)
+    reach = out_of_reach_by(message)
+    label = f"{label} ({reach})" if reach else label
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
-    shown_at = message.t if message.sender == "robot" else message.delivered
-    return Step("message", source, target, label, shown_at, note)
+    return Step("message", source, target, label, message.t if sent else message.delivered, note)
+
+
+def _inside(recording: Recording, message: int) -> Iterator[Step]:
+    """What was called, and what agents were asked, until the robot's message was answered."""
+    calls = sorted((call for call in recording.calls if call.message == message), key=_before)
+    told, shown_at = 0, recording.messages[message].t
+    for place, each in enumerate(recording.agent_messages):
+        if each.message == message:
+            until = bisect_right(calls, place, told, key=_before)
+            yield from _calls(calls[told:until])
+            told = until
+            kind: Kind = "call" if each.reply_to is None else "return"
+            label, t = message_words(each.text, 60), None if each.t == shown_at else each.t
+            yield Step(kind, each.sender, each.receiver, label, t, one_line(each.note, 30))
+            shown_at = each.t
+    yield from _calls(calls[told:])
+
+
+def _before(call: Call) -> int:
+    return call.before
 
 
 def _calls(calls: Iterable[Call]) -> Iterator[Step]:

@@ -33,6 +33,7 @@ RIGHT = "#d9791a"
 PEN = "#e79b9b"
 FAULT = "#a3162a"
 SAID = "#3f7d3c"
+SECOND_ROBOT = "#7a3e9d"
 
 _FONT = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 _BOLD = _FONT.with_name("DejaVuSans-Bold.ttf")

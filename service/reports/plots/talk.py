@@ -1,4 +1,4 @@
-"""Who told whom how often in a trial: the robot, the responder, and what the responder called.
+"""Who told whom how often in a trial: the robot, the responder, its agents, and what these called.
 
 What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
 """
@@ -6,14 +6,15 @@ What was said is ``sequence.py``'s; here it is only counted, and of the calls th
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
 from service.reports.plots.sequence import PARTIES, SequenceDiagram, Step
 from service.reports.readable import one_line
-from sim.recording import Recording
+from service.reports.robots import PARTNER_OF, SECOND, robots_of
+from sim.recording import Call, Recording
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
 #: Networks that are counted by the names that they are bound to; those that are called later count as one.
@@ -49,15 +50,21 @@ def talks(recording: Recording) -> tuple[Talk, ...]:
 
 def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], bool]]:
     """Each text and each call: who told whom, and whether it arrived."""
-    for message in recording.messages:
-        other = "responder" if message.sender == "robot" else "robot"
-        yield (message.sender, other, "message"), message.delivered is not None
-    names = _callees(recording)
-    for call in recording.calls:
+    for robot, own in robots_of(recording):
+        for message in own.messages:
+            other = PARTNER_OF[robot] if message.to_partner else "responder"
+            if message.sender != "partner":  # it is told as the other robot's
+                way = (robot, other) if message.sender == "robot" else (other, robot)
+                yield (*way, "message"), message.delivered is not None
+    calls = [call for _, own in robots_of(recording) for call in own.calls]
+    names = _callees(calls, (each.agent for each in recording.agent_outputs))
+    for call in calls:
         caller, callee = names.get(call.caller, "responder"), names[call.callee]
         yield (caller, callee, "call"), True
         if call.result != "None":  # a logger gives nothing back
             yield (callee, caller, "return"), True
+    for each in recording.agent_messages:
+        yield (each.sender, each.receiver, "call" if each.reply_to is None else "return"), True
 
 
 def party_of(name: str) -> str:
@@ -78,7 +85,9 @@ def block_diagram(told: tuple[Talk, ...]) -> Diagram:
         for talk in told
         if talk.kind != "return"
     )
-    named = dict.fromkeys(("robot", "responder", *(name for talk in told for name in (talk.source, talk.target))))
+    linked = any({talk.source, talk.target} == {"robot", SECOND} for talk in told)
+    always = ("robot", SECOND) if linked else ("robot", "responder")
+    named = dict.fromkeys((*always, *(name for talk in told for name in (talk.source, talk.target))))
     return Diagram("blockdiag", tuple(DiagramActor(name, name) for name in named), arrows)
 
 
@@ -103,11 +112,11 @@ def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
             )
 
 
-def _callees(recording: Recording) -> Mapping[str, str]:
+def _callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, str]:
     """What each name that was called is shown as."""
-    networks = dict.fromkeys(call.callee for call in recording.calls if call.callee not in _NAMED)
+    networks = dict.fromkeys(call.callee for call in calls if call.callee not in _NAMED)
     shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
-    return MappingProxyType(shown | {name: name for name in _NAMED})
+    return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})
 
 
 def _count(talk: Talk) -> str:

@@ -231,8 +231,8 @@ def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: TrialRunner)
     [
         ('{"do":"sleep","units":1000000000000000}', "responder"),
         ('{"do":"call","depth":0,"caller":"a","callee":"b","argument":"' + "c" * 5000 + '","result":"d"}', "responder"),
-        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1}', "responder"),
-        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1}', "program"),
+        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1,"file":null}', "responder"),
+        ('{"do":"refused","what":"' + "x" * 5000 + '","line":1,"file":null}', "program"),
         ('{"do":"wait","units":0}', "program"),
     ],
     ids=lambda value: value[:20],

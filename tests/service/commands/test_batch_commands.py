@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
+from service.reports.written import file_stem
 from service.settings import Settings
 from service.store.engine import open_store
 from service.store.models import Job
@@ -67,7 +68,8 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert "1 of the submissions could not be taken in" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
     assert re.search(r"^reference +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
-    assert sorted(path.name for path in reports.iterdir()) == ["flawed.html", "index.html", "reference.html"]
+    odd = f"{file_stem('[red]odd.txt', 'refused')}.html"
+    assert {path.name for path in reports.iterdir()} == {"flawed.html", "index.html", "reference.html", odd}
     assert "data:image/png;base64," in (reports / "reference.html").read_text()
     assert f"report: {reports / 'index.html'}" in ended.out
     index = (reports / "index.html").read_text()
@@ -85,7 +87,10 @@ def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
     assert "[red]odd.txt" in status.out
     assert batch in robomark(home, "batch", "list").out
     rows = list(csv.DictReader(io.StringIO(robomark(home, "batch", "export", batch).out)))
-    assert {row["student"]: row["verdict"] for row in rows} == {"reference": "finished", "flawed": "finished"}
+    odd = "[red]odd.txt"
+    verdicts = {row["file"]: row["verdict"] for row in rows}
+    assert verdicts == {"reference": "finished", "flawed": "finished", odd: ""}
+    assert all(bool(row["reason"]) == (row["file"] == odd) for row in rows)
     exported = json.loads(robomark(home, "batch", "export", batch, "--format", "json").out)
     assert {row["student"]: row["marks"] for row in exported}["reference"] == 10
 

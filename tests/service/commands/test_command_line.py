@@ -8,7 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from command import robomark
 from service.cli import main
@@ -37,6 +39,11 @@ from submissions.assignment.folder import assignment_folder
             "batch submit x -a echo-responder --report /dev/null",
             "/dev/null cannot be used for reports: it is no folder",
         ),
+        ("run x.py --loss 2", "loss is 2.0, expected at most 1"),
+        ("run x.py --range 300", 'the channel has range and no link that it limits, expected link = "infrared"'),
+        ("run x.py --link infrared", "nothing at its other end, expected beacon = [x, y] beside it"),
+        ("run x.py --link radio", 'link is "radio", expected "cable" or "infrared"'),
+        ("run x.py --beacon here", "--beacon is here, expected X,Y such as 1200,600"),
         ("run \x1b[31mx", "\\x1b[31mx cannot be read"),
     ],
 )
@@ -122,3 +129,30 @@ def test_every_command_that_is_listed_can_be_loaded() -> None:
 def test_the_shell_completes_commands_of_a_group() -> None:
     ended = robomark(_ROBOMARK_COMPLETE="complete_bash", COMP_WORDS="robomark batch s", COMP_CWORD="2")
     assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status"], "")
+
+
+def test_run_takes_an_image_as_its_floor_and_modules_beside(tmp_path: Path) -> None:
+    Image.new("RGB", (2362, 1143), (90, 200, 30)).save(tmp_path / "own.png")
+    (tmp_path / "helper.py").write_text("def red(sensor):\n    return sensor.reflected_light_intensity\n")
+    program = tmp_path / "robot.py"
+    program.write_text("%%sim_magic_preloaded -b Loop\nimport helper\nprint(helper.red(colorLeft))\nhelper.red(1)\n")
+    ended = robomark("run", program, "-b", tmp_path / "own.png", "--picture", tmp_path / "path.png")
+    assert ended.returncode == 0
+    assert "0.01 s  90" in ended.stdout
+    assert "x 200.0 mm, y 800.0 mm" in ended.stdout
+    assert ended.stderr.rstrip().endswith("(line 2 of helper.py)")
+    with Image.open(tmp_path / "path.png") as drawn:
+        red, green, blue = np.asarray(drawn.convert("RGB"), int).transpose(2, 0, 1)
+        assert ((green > red + 20) & (green > blue + 20)).mean() > 0.25
+    small = tmp_path / "small.png"
+    Image.new("RGB", (10, 10)).save(small)
+    assert "it must be 2362 x 1143" in robomark("run", program, "-b", small).stderr
+
+
+def test_run_says_how_long_a_responder_may_compute(tmp_path: Path) -> None:
+    (tmp_path / "responder.py").write_text("while True:\n    pass\n")
+    program = tmp_path / "robot.py"
+    program.write_text("print('PY::0')\n")
+    arguments = ("run", program, "--responder", tmp_path / "responder.py", "--responder-cpu", "0.5")
+    ended = robomark(*arguments)
+    assert "it computed for more than 0.5 seconds of CPU time" in ended.stderr

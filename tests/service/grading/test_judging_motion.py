@@ -83,6 +83,26 @@ def test_moves_in_order(moves: Any, keys: dict[str, Any], good: bool) -> None:
     assert passes(criterion("moves", moves=RIGHT_ANGLE, **keys), driven(*moves)) is good
 
 
+@pytest.mark.parametrize(
+    ("made", "moves"),
+    [
+        ((straight(100), straight(-60)), [{"forward": [95, 105]}, {"forward": [-65, -55]}]),
+        ((spin(90), spin(-45)), [{"turn": [85, 95]}, {"turn": [-50, -40]}]),
+        (
+            (straight(100), spin(90), spin(-90), straight(-100)),
+            [{"forward": [95, 105]}, {"turn": [85, 95]}, {"turn": [-95, -85]}, {"forward": [-105, -95]}],
+        ),
+        # What lasts less than 0.3 s is part of the move round it.
+        ((straight(100), straight(-20), straight(100)), [{"forward": [175, 185]}]),
+        ((spin(60), spin(-6), spin(60)), [{"turn": [110, 118]}]),
+        # A bend is a turn, on as well as back.
+        ((straight(100), (4.0, 2.0, 20)), [{"turn": [-1, 1]}, {"turn": [38, 42]}]),
+    ],
+)
+def test_forwards_and_backwards_left_and_right_are_moves_of_their_own(made: Any, moves: list[dict[str, Any]]) -> None:
+    assert passes(criterion("moves", moves=moves, only=True), driven(*made))
+
+
 def test_a_missing_move_tells_what_came_instead_and_when() -> None:
     result = judged(criterion("moves", moves=RIGHT_ANGLE, over="mean"), driven(straight(100), rest(), spin(111)))
     assert result.marks == 2

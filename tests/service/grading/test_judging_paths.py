@@ -369,3 +369,34 @@ def test_a_run_without_a_tick_is_judged(asked: Any) -> None:
     result = judged(asked, driven())
     assert result.message
     assert len(positions(driven())) == 1
+
+
+@pytest.mark.parametrize(
+    ("keys", "good"),
+    [
+        ({"areas": [{"rectangle": [0, 700, 300, 900], "outside": True}]}, True),
+        ({"areas": [{"rectangle": [0, 700, 250, 900], "outside": True}]}, False),
+        ({"areas": [{"rectangle": [0, 700, 300, 900], "outside": True}], "clear_of": 40}, True),
+        ({"areas": [{"rectangle": [0, 700, 300, 900], "outside": True}], "clear_of": 60}, False),
+        ({"areas": [{"circle": [200, 1000, 100]}], "clear_of": 100}, True),
+        ({"areas": [{"circle": [200, 1000, 100]}], "clear_of": 101}, False),
+    ],
+)
+def test_the_outside_of_an_area_and_a_distance_are_kept(keys: dict[str, Any], good: bool) -> None:
+    """From (100, 800) to (260, 800)."""
+    assert passes(criterion("keeps_out", **keys), driven(straight(160))) is good
+
+
+def test_how_near_it_came_to_the_outside_is_told() -> None:
+    inside = {"name": "the arena", "rectangle": [0, 700, 300, 900], "outside": True}
+    result = judged(criterion("keeps_out", areas=[inside], clear_of=60), driven(straight(160)))
+    told = "keep 60 mm from the outside of the arena, but it came nearer at (245, 800), and 40 mm was the nearest"
+    assert told in result.message
+    assert measured(result, "least clearance") == pytest.approx(40)
+
+
+@pytest.mark.parametrize(("check", "good"), [("stays_inside", False), ("visits", True)])
+def test_the_outside_is_an_area_like_any_other(check: str, good: bool) -> None:
+    area = [{"circle": [100, 800, 50], "outside": True}]
+    keys = {"places": area} if check == "visits" else {"areas": area}
+    assert passes(criterion(check, **keys), driven(straight(160))) is good

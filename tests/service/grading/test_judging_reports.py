@@ -295,7 +295,7 @@ def test_only_what_was_read_counts_as_measured(instrument: str, value: float, ge
     recording = recorded(rgb=(51, 102, 153), datalog=series(value, value))
     result = judged(asked, recording)
     assert result.marks == (4 if genuine else 0), result.message
-    assert genuine or "none of 2 samples is" in result.message
+    assert genuine or "all 2 samples are made up" in result.message
     motionless = replace(recording, ticks=recorded(seconds=0).ticks)
     assert judged(asked, motionless).marks == 0
 
@@ -348,6 +348,23 @@ def test_image_log_shows_what_lies_at_the_start() -> None:
     elsewhere = judged(asked, run(image(moved), image(moved, "right")), poses=(pose,))
     assert "taken at the start pose" in elsewhere.message
     assert judged(asked, run(*pair, *pair), poses=(pose,)).marks == 0
+
+
+@pytest.mark.parametrize(
+    ("keys", "images", "marks"),
+    [
+        ({"left_at_least": 4}, 4, 4),
+        ({"left_at_least": 4}, 9, 4),
+        ({"left_at_least": 4}, 1, 1),
+        ({"left_at_least": 4}, 0, 0),
+        ({"left_at_least": 4, "right": 0}, 2, 3),
+        ({"right_at_least": 1}, 4, 0),
+    ],
+)
+def test_so_many_images_at_least(keys: dict[str, Any], images: int, marks: int) -> None:
+    log = (image(Pose(600, 750, 90)),) * images
+    result = judged(criterion("image_log", over="mean", **keys), recorded(background="MNIST_Digits", image_log=log))
+    assert result.marks == marks, result.message
 
 
 def test_image_log_without_images_has_no_marks() -> None:

@@ -12,14 +12,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image as Pixels
+from pydantic import ValidationError
 
 import report_builders as build
 from paths import ROOT
+from responders.code import Code
 from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, TrialResult
+from service.grading.grader import grade
 from service.grading.judging.judge import judge
-from service.grading.judging.label_patches import decoded
+from service.grading.judging.label_patches import CODES, decoded
 from service.grading.judging.per_class import class_scores
 from service.grading.judging.truths import NO_IMAGE
+from service.grading.trial_runner import TrialRunner
 from service.reports.recognition_table import recognition_tables
 from service.reports.view import student_view
 from sim.floors import SHAPES
@@ -28,6 +33,7 @@ from submissions.assignment.definition import Assignment, Parts, Scenario, World
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS, Criterion
+from submissions.submission import Submission
 from submissions.sweep import Sweep
 
 START = Pose(100, 800, 0)
@@ -211,17 +217,75 @@ def test_the_grey_patch_can_be_the_truth() -> None:
 
     greys = (0, 42, 85, 127, 170, 212)
     shown = [Image(0, 0, START, b"", patch(grey), 0) for grey in greys]
-    assert [decoded(image, "Simple_Shapes") for image in shown] == list(SHAPES)
+    assert [decoded(image, CODES["shapes"]) for image in shown] == list(SHAPES)
     for useless in (patch(60), patch(85, edge=5), patch(255)):
-        assert decoded(replace(shown[0], right=useless), "Simple_Shapes") is None
+        assert decoded(replace(shown[0], right=useless), CODES["shapes"]) is None
     chance = np.random.default_rng(1)
     noisy = np.frombuffer(patch(127), np.uint8).astype(int) + chance.integers(-32, 33, 1600)
     image = replace(shown[0], right=noisy.clip(0, 255).astype(np.uint8).tobytes())
-    assert decoded(image, "Simple_Shapes", light_noise=32) == "downwards facing triangle"
-    assert decoded(image, "Simple_Shapes") is None
+    assert decoded(image, CODES["shapes"], light_noise=32) == "downwards facing triangle"
+    assert decoded(image, CODES["shapes"]) is None
     recording = talk((None, "left facing triangle"), (None, "square"))
     seen = tuple(replace(image, right=patch(85)) for image in recording.images)
     assert judged(asked(truth="grey"), replace(recording, images=seen)).marks == 2
+
+
+GREY_WORLD = """
+id = "own"
+title = "Own image"
+[world]
+background = "mine.png"
+[parts]
+responder = "plain.py"
+[[scenario]]
+id = "s"
+poses = [[300, 500, 0], [600, 500, 0], [900, 500, 0]]
+seconds = 3
+[[criterion]]
+title = "Names it"
+marks = 3
+check = "classification"
+truth = "grey"
+"""
+
+
+def test_the_grey_patch_can_be_the_truth_on_an_image_of_the_instructors_own(
+    tmp_path: Path, runner: TrialRunner
+) -> None:
+    """The right sensor of a robot at (300, 500) that faces 0 degrees is at (330, 480)."""
+    pixels = np.full((1143, 2362, 3), 255, np.uint8)
+    for x, grey in ((330, 42), (630, 190), (930, 100)):
+        pixels[1143 - 480 - 30 : 1143 - 480 + 30, x - 30 : x + 30] = grey
+    Pixels.fromarray(pixels).save(tmp_path / "mine.png")
+    (tmp_path / "plain.py").write_text("def responder(text):\n    return 'a church'\n")
+    file = tmp_path / "assignment.toml"
+    file.write_text(GREY_WORLD)
+    with pytest.raises(AssignmentProblems, match=r'has no labels, expected greys = "shapes", "digits" or'):
+        read_assignment(tmp_path)
+    file.write_text(GREY_WORLD + "greys = { church = 42, mill = 190 }\n")
+    program = Submission("ada", Code("robot.py", "import time\nprint('IMG_DATA')\ntime.sleep(0.5)\n"))
+    result = grade(program, read_assignment(tmp_path), runner=runner).criteria[0]
+    # What has no label's grey shows nothing to name; a trial without an image that counts is a wrong answer.
+    assert result.message.startswith("1 of 3 images named rightly")
+    assert accuracy(result).confusion == ((NO_IMAGE, None, 1), ("church", "church", 1), ("mill", "church", 1))
+    file.write_text(GREY_WORLD + 'greys = "shapes"\n')
+    shapes = grade(program, read_assignment(tmp_path), runner=runner).criteria[0]
+    assert accuracy(shapes).confusion[0][0] == NO_IMAGE
+    assert {truth for truth, *_ in accuracy(shapes).confusion} == {NO_IMAGE, SHAPES[1]}
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"greys": "shapes"}, "has greys without truth"),
+        ({"truth": "grey", "greys": {"a": 10, "b": 14}}, "hard to tell apart"),
+        ({"truth": "grey", "greys": {"a": 256}}, "less than or equal to 255"),
+        ({"truth": "grey", "greys": "letters"}, "Input should be 'shapes' or 'digits'"),
+    ],
+)
+def test_greys_that_cannot_be_used_are_refused(keys: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValidationError, match=sentence):
+        asked(**keys)
 
 
 def test_the_instructors_places_can_be_the_truth() -> None:

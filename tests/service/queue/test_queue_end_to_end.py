@@ -121,7 +121,7 @@ def _spinning(count: int) -> list[GradingRequest]:
 
 def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
     checked = read_batch(examples("echo-responder"), "echo-responder")
-    assert checked.problems == ()
+    assert checked.refusals == ()
     batch = service.submit(list(checked.grading_requests))
     graded = service.wait(batch)
     service.assert_graded_once(batch)
@@ -139,7 +139,7 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
 
 def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service: Service) -> None:
     lacking = grading_request("lacking")
-    broken = GradingRequest(replace(lacking.submission, program=None), lacking.assignment, "lacking")
+    broken = GradingRequest(replace(lacking.submission, program=None, responder=None), lacking.assignment, "lacking")
     batch = service.submit([broken, grading_request("whole")])
     by_student = {line.student: line for line in _lines(service, batch)}
     assert by_student["whole"].state is JobState.DONE

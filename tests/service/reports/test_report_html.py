@@ -191,6 +191,10 @@ def test_timelines_are_capped_and_say_so() -> None:
 def test_messages_name_images_and_losses() -> None:
     assert "IMG_DATA::{left, right}" in Reader(report(student_view(build.shape_grade()), {})).text
     assert "never (lost)" in Reader(report(student_view(build.faulty_grade()), {})).text
+    astray = Reader(report(student_view(build.astray_grade()), {})).text
+    for words in ("lost by chance", "out of range, 1601 mm away", "facing away, 91° off", "blocked"):
+        assert f"never ({words})" in astray
+    assert "0.50 s (duplicated, corrupted to PY::7)" in astray
 
 
 @pytest.mark.parametrize("verdict", list(Verdict))
@@ -217,5 +221,5 @@ def test_batch_index_links_and_escapes() -> None:
     assert reader.tags <= TAGS
     assert "2.5 / 8" in reader.text
     assert "0 / 8" in reader.text
-    assert "not graded yet" in reader.text
+    assert "not graded" in reader.text
     assert "3 of 4 graded" in reader.text

@@ -13,30 +13,58 @@ from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobLimits, Spent
-from service.grading.grade import Cost
+from service.grading.grade import Cost, Grade
 from service.reports.formats import FORMATS
-from service.reports.formats.csv_output import marks_csv, moodle_csv
+from service.reports.formats.csv_output import marks_csv
 from service.reports.formats.gradescope import gradescope_document, gradescope_text
 from service.reports.formats.json_output import json_document, json_text
 from service.reports.formats.junit import junit_text
+from service.reports.formats.moodle import moodle_csv
 from service.reports.formats.rich_text import rich_report
 from service.reports.formats.text import plain_text
 from service.reports.html import report
+from service.reports.rows import TableRow
 from service.reports.view import View, gradebook_view, staff_view, student_view, worst_trial
 from service.reports.words import verdict_words
 from sim.recording import Verdict
+from submissions.people import Student
+
+
+def row_of(grade: Grade) -> TableRow[Grade]:
+    return TableRow(Student(grade.student), f"{grade.student}.zip", grade.assignment, grade)
 
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
     document = json.loads(json_text(staff_view(build.shape_grade())))
-    assert list(document) == ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy"]
+    top = ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy", "notes"]
+    assert list(document) == top
     assert document["schema"] == 1
     assert list(document["criteria"][0]) == ["id", "title", "marks", "max_marks", "message"]
-    assert list(document["trials"][0]) == ["scenario", "seed", "verdict", "sha256", "spoken", "messages"]
+    assert list(document["trials"][0]) == ["scenario", "seed", "verdict", "sha256", "spoken", "messages", "notes"]
     assert list(document["trials"][0]["messages"][0]) == ["t", "sender", "text"]
     assert document["accuracy"] == {"value": 5 / 6, "low": 0.4365, "high": 0.9699, "n": 6}
     assert (document["marks"], document["max_marks"], document["verdict"]) == (7, 8, "finished")
     assert document["trials"][4]["spoken"] == ["Is that a diamond"]
+
+
+LOST = (
+    "The channel lost 5 of 6 messages: 1 by chance, 1 because the robot was out of range, 2 because it faced away, "
+    "1 because a wall or an obstacle stood between. What was lost by chance is held against nobody."
+)
+
+
+def test_every_report_says_what_the_channel_lost_and_why() -> None:
+    view = staff_view(build.astray_grade())
+    assert LOST in " ".join(plain_text(view).split())
+    shown = Console(width=400, record=True, file=io.StringIO())
+    shown.print(rich_report(view))
+    assert LOST in shown.export_text()
+    assert LOST in " ".join(report(view, {}).split())
+    messages = json_document(view)["trials"][1]["messages"]
+    assert messages[0] == {"t": 0.1, "sender": "robot", "text": "PY::0", "lost": "chance"}
+    assert (messages[1]["lost"], messages[1]["distance"], messages[1]["angle"]) == ("out of range", 1600.2, 3.0)
+    assert messages[4]["arrived_as"] == "PY::7"
+    assert "The channel" not in plain_text(staff_view(build.line_follower_grade()))
 
 
 def test_json_without_classification_and_with_half_marks() -> None:
@@ -86,7 +114,8 @@ def test_junit_calls_an_unmarked_grade_an_error() -> None:
 
 def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
     evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
-    rows = list(csv.DictReader(io.StringIO(marks_csv([staff_view(build.shape_grade()), staff_view(evil)]))))
+    table = marks_csv([row_of(grade).shown(staff_view) for grade in (build.shape_grade(), evil)])
+    rows = list(csv.DictReader(io.StringIO(table)))
     assert rows[0]["student"] == "s1234567"
     assert rows[0]["accuracy"] == "0.8333"
     assert rows[0]["marks: names-the-right-shape"] == "5"
@@ -95,7 +124,7 @@ def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
 
 
 def test_moodle_feedback_says_nothing_of_hidden_criteria() -> None:
-    row = next(csv.DictReader(io.StringIO(moodle_csv([gradebook_view(build.hidden_grade())]))))
+    row = next(csv.DictReader(io.StringIO(moodle_csv([row_of(build.hidden_grade()).shown(gradebook_view)]))))
     assert row["Grade"] == "8"
     assert "SECRET" not in row["Feedback comments"]
     assert "Names the right shape: 5 of 6" in row["Feedback comments"]
@@ -189,7 +218,7 @@ def test_staff_read_what_was_used_and_students_what_may_be() -> None:
     assert all(LIMITS in page and "of 240 s" not in page for page in for_students)
     assert all(
         "of 240 s" not in text
-        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([gradebook_view(COSTLY)]))
+        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([row_of(COSTLY).shown(gradebook_view)]))
     )
     assert json_document(staff_view(COSTLY))["cost"]["spent"] == {
         "kept_bytes": 150_000,
@@ -210,10 +239,11 @@ def test_of_a_grade_that_was_given_before_this_was_measured_nothing_is_said() ->
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_writes_an_odd_grade_and_ends_its_last_line(name: str) -> None:
     form, grade = FORMATS[name], build.hostile_grade()
-    assert form.document or form.table
+    assert form.document or form.table or form.filled_in or form.packed
     assert form.suffix.startswith(".")
     written = [form.document(grade)] if form.document else []
-    written += [form.table([grade, grade])] if form.table else []
+    written += [form.table([row_of(grade), row_of(grade)])] if form.table else []
+    written += [form.refusal(replace(row_of(grade), grade=None, reason=build.HOSTILE))] if form.refusal else []
     for text in written:
         assert text.endswith("\n")
         assert "\x1b" not in text

@@ -128,6 +128,27 @@ def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
     assert all(shown.count(party) == 1 for party in told.parties)
 
 
+def test_the_diagram_says_why_each_was_lost() -> None:
+    steps = [step for step in conversation(_talk(*build.ASTRAY)).steps if isinstance(step, Step)]
+    assert [(step.kind, step.note, step.label) for step in steps] == [
+        ("lost", "lost by chance", "PY::0"),
+        ("lost", "out of range", "PY::0 (1601 mm away)"),
+        ("lost", "facing away", "PY::0 (91° off)"),
+        ("lost", "blocked", "PY::0"),
+        ("message", "duplicated, corrupted to PY::7", "PY::0"),
+        ("lost", "facing away", "saw 7 (120° off)"),
+    ]
+    shown = _texts(draw_conversation(TrialResult("a", 0, 1, 0, 0, "visible", _talk(*build.ASTRAY)), "t"))
+    assert {"lost by chance", "out of range", "facing away", "blocked"} <= set(shown)
+
+
+def test_of_many_tries_the_one_that_got_through_is_shown() -> None:
+    lost = tuple(Message(float(t), "robot", "PY::0", None, None, "lost", "chance") for t in range(30))
+    through = (Message(30.0, "robot", "PY::0", 30.0), Message(30.1, "responder", "saw 0", 30.2, 30))
+    last = [step for step in conversation(_talk(*lost, *through)).steps if isinstance(step, Step)][-2:]
+    assert [(step.kind, step.label) for step in last] == [("message", "PY::0"), ("message", "saw 0")]
+
+
 def test_lost_messages_are_told_apart() -> None:
     told = conversation(build.faulty_grade().trials[1].recording)
     kinds = [step.kind for step in told.steps if isinstance(step, Step)]

@@ -22,6 +22,7 @@ from service.store.lease_reaper import note_notices, requeue_lost, wanting_notic
 from service.store.models import Batch, CriterionResultRow, Job, SubmissionRow, TrialRow
 from service.store.scheduling import BATCH_EVERY
 from service.store.states import BatchState, JobState, Lane, PlotState
+from submissions.people import Refusal
 
 NO_WAIT = Retry(0.0)
 
@@ -195,7 +196,7 @@ def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store
 
 def _batch(store: Store, name: str, count: int) -> str:
     grading_requests = [grading_request(f"{name}-{number}") for number in range(count)]
-    return accept_batch(store, name, grading_requests, [("odd.txt", "is odd.")], max_attempts=3).id
+    return accept_batch(store, name, grading_requests, [Refusal("odd.txt", "is odd.")], max_attempts=3).id
 
 
 def _served(store: Store, count: int) -> list[str | None]:
@@ -252,7 +253,7 @@ def test_a_batch_knows_how_far_it_is(store: Store) -> None:
         lines = batches.job_lines(session, batch)
     assert (progress.jobs, progress.ended, progress.partial, progress.plots_due) == (3, 1, 0.5, 1)
     assert line.states == {JobState.DONE: 1, JobState.RUNNING: 1, JobState.QUEUED: 1}
-    assert line.problems == (("odd.txt", "is odd."),)
+    assert line.refusals == (Refusal("odd.txt", "is odd."),)
     assert [(line.student, line.ended) for line in lines].count(("batch-0", True)) <= 1
     assert sum(line.ended for line in lines) == 1
 

@@ -18,9 +18,10 @@ from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration, current_revision, newest_revision
-from service.store.models import Artifact, Base, Batch, CriterionResultRow, Job, TrialRow
+from service.store.models import Artifact, Base, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
 from service.store.states import JobState, Standing
 from sim.errors import HostError
+from submissions.people import Refusal
 
 
 def _open(settings: Settings) -> None:
@@ -73,6 +74,11 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             assert len(graded.trials[0].recording.ticks) > 10
             assert graded.cost is None
             assert bob.student == "Bob 🤖"
+            assert (bob.name, bob.email, bob.missing) == ("", "", "")
+            assert batches.batch(session, batch).refusals == (Refusal("odd.txt", "is odd."),)
+            people = session.execute(select(Enrolment.student, Enrolment.written, Person.name).join(Person)).all()
+            assert {(student, written) for student, written, _ in people} >= {("ada", "ada"), ("Bob 🤖", "Bob 🤖")}
+            assert {name for _, _, name in people} == {""}
             assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
             assert intake.load_grading_request(session, ada.id).submission.program is not None
         with store.engine.begin() as connection:

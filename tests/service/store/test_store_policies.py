@@ -18,6 +18,7 @@ from service.store.policies import PolicyLimits
 from service.store.states import JobState, Lane
 from service.store.students import Students
 from sim.recording import Verdict
+from submissions.people import Student
 
 GRADE = report_builders.faulty_grade()
 DUE = datetime(2026, 11, 30, 17, 0, tzinfo=UTC)
@@ -33,7 +34,11 @@ def _extend(store: Store, student: str, due_at: datetime | None = None, more: in
     with store.transaction() as session:
         at = now(session)
         policies.extend(
-            session, Students(session, course_of(session, "default", at)).enrol(student, at), assignment, due_at, more
+            session,
+            Students(session, course_of(session, "default", at)).enrol(Student(student), at),
+            assignment,
+            due_at,
+            more,
         )
 
 

@@ -81,6 +81,16 @@ def test_a_recording_that_is_older_than_a_column_is_read(monkeypatch: pytest.Mon
     assert ticks.left_sums.tobytes() == recording.ticks.left_sums.tobytes()
 
 
+def test_an_older_recording_lost_its_messages_by_chance(monkeypatch: pytest.MonkeyPatch) -> None:
+    lost, arrived = Message(0.1, "robot", "PY::0", None, None, "lost"), Message(0.2, "robot", "PY::0", 0.2)
+    recording = replace(report_builders.line_follower_recording(1), messages=(lost, arrived))
+    newer = ("lost", "distance", "angle", "arrived_as")
+    with monkeypatch.context() as then:
+        then.setattr("service.store.codec.fields", lambda each: [f for f in fields(each) if f.name not in newer])
+        data = to_bytes(recording)
+    assert from_bytes(data).messages == (replace(lost, lost="chance"), arrived)
+
+
 def test_a_minute_of_driving_takes_less_than_half_of_its_raw_size() -> None:
     recording = report_builders.line_follower_recording(1800)
     assert len(to_bytes(recording)) < 1800 * 13 * 8 / 2

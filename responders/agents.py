@@ -1,0 +1,243 @@
+"""The agents of a submission during one trial: a process each, and what they and the responder tell one another.
+
+Agents speak through here alone, one question at a time; which texts of the robot's start it all is the bridge's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from responders import wire
+from responders.faults import error_fault, surprise
+from responders.logger_file import read_log
+from responders.responder_process import ResponderProcess
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.trial_spec import AgentSpec, TrialSpec
+from sim.chance import Stream
+from sim.recording import SECOND, AgentMessage, AgentOutput, Fault, Recording, Verdict
+from sim.world import Chain
+
+#: How many questions a trial may have between the responder and its agents.
+_MOST_QUESTIONS = 10_000
+_MOST_NOTES = 200
+_LONGEST_TYPE = 100
+_NOT_JSON = object()
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What an asker is told: a value as JSON, or a sentence that is raised there; and how long that took."""
+
+    kind: Literal["value", "error"]
+    text: str
+    slept: int = 0
+
+
+class Agents:
+    """All agents of one trial. ``ask`` never raises for what an agent does."""
+
+    def __init__(self, spec: TrialSpec, sandboxes: Sandboxes, meter: JobMeter, stack: contextlib.ExitStack) -> None:
+        """Their processes and folders end with ``stack``."""
+        self.messages: list[AgentMessage] = []
+        self.faults: list[Fault] = []
+        self.notes: list[str] = []
+        self._meter = meter
+        self._chain = Chain()
+        self._outputs: list[AgentOutput] = []
+        self._waiting: list[str] = []  # whose answer is waited for, the first that was asked first
+        self._loaded = False
+        self._processes: dict[str, AgentProcess] = {}
+        for name, each in spec.agents.items():
+            folder = stack.enter_context(sandboxes.private_folder())
+            self._processes[name] = AgentProcess(name, each, sandboxes, folder, spec.child_seed, meter, self)
+            stack.callback(self._processes[name].close)
+
+    def others(self, asker: str) -> Sequence[str]:
+        """The names of those whom the responder, or an agent, may ask."""
+        return [name for name in self._processes if name != asker]
+
+    def load(self) -> None:
+        """Run their modules; until all have been run, none can be asked."""
+        for name, process in self._processes.items():
+            fault = process.load()
+            if fault is not None and process.given:
+                sentence = f"the given agent {name} cannot be used: {fault.message}"
+                fault = replace(fault, verdict=Verdict.ASSIGNMENT_ERROR, message=sentence)
+            if fault is not None:
+                self.faults.append(fault)
+        self._loaded = True
+
+    def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> Told:
+        """What the agent says that ``question`` names, asked at ``t`` while the robot's ``message`` is answered.
+
+        Raises ChildStopped for what no honest asker sends.
+        """
+        name = question["agent"]
+        process = self._processes.get(name)
+        if process is None:
+            raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it asked an agent that this assignment does not have")
+        if len(self.messages) >= 2 * _MOST_QUESTIONS:
+            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"it and the agents asked more than {_MOST_QUESTIONS} questions")
+        arguments, named = _content(question["arguments"], list), _content(question["named"], dict)
+        values = [*arguments, *named.values()]
+        index = len(self.messages)
+        self._note(asker, name, values[0] if len(values) == 1 else values, t, message)
+        told = self._refusal(asker, name)
+        if told is None:
+            self._waiting.append(name)
+            try:
+                told = process.answer_question(question, t, message)
+            finally:
+                self._waiting.pop()
+        if told.kind == "error":
+            self.messages[index] = replace(self.messages[index], note="no answer")
+        else:
+            self._note(name, asker, _content(told.text, object), t + told.slept, message, index)
+        return told
+
+    def finish(self, chain: Chain, now: int) -> None:
+        """End their processes, read back what they have written, and add what was said to the trial's chain."""
+        for name, process in self._processes.items():
+            process.close()
+            log, unread = read_log(process.folder, self._meter, name)
+            if unread is not None:
+                self.faults.append(unread)
+            self._outputs.append(AgentOutput(name, "\n".join(process.output), log))
+            self.notes += process.notes
+        chain.add("agents", now, self._chain.hexdigest().encode())
+
+    def told(self, recording: Recording) -> Recording:
+        """The recording with what the agents said, called and wrote."""
+        calls = [call for process in self._processes.values() for call in process.calls]
+        return replace(
+            recording,
+            calls=tuple(sorted((*recording.calls, *calls), key=lambda call: (call.message, call.before))),
+            agent_messages=tuple(self.messages),
+            agent_outputs=tuple(self._outputs),
+        )
+
+    def failed(self, name: str, fault: Fault, slept: int) -> Told:
+        """What an asker is told of an agent's fault, which is kept unless an asker may have brought it about."""
+        process = self._processes[name]
+        why = fault.message.removeprefix(f"the {name} was stopped: ").removeprefix("RuntimeError: ")
+        sentence = f"{name} gave no answer: {why}"
+        if not process.given or not process.alive:
+            self.faults.append(fault)
+        elif len(self.notes) < _MOST_NOTES and f"the given agent {sentence}" not in self.notes:
+            self.notes.append(f"the given agent {sentence}")
+        return Told("error", sentence, slept)
+
+    def _refusal(self, asker: str, name: str) -> Told | None:
+        if not self._loaded:
+            return Told("error", f"{name} cannot be asked while the agents are being loaded, only in a function")
+        if name in self._waiting or name == asker:
+            way = " → ".join(["responder", *self._waiting, name])
+            return Told("error", f"{name} cannot be asked now, as it waits for an answer itself: {way}")
+        return None
+
+    def _note(self, sender: str, receiver: str, value: Any, t: int, message: int, reply_to: int | None = None) -> None:
+        text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        text = text.encode("utf-8", "replace").decode("utf-8")  # no halves of characters, which nobody can store
+        self._meter.keep(len(text))
+        self.messages.append(
+            AgentMessage(t / SECOND, sender, receiver, text, message, reply_to, is_text=isinstance(value, str))
+        )
+        kind = "text" if isinstance(value, str) else "value"
+        self._chain.add(f"{sender}>{receiver} {kind}", t, text.encode())
+
+
+@contextlib.contextmanager
+def agents_beside(spec: TrialSpec, sandboxes: Sandboxes, meter: JobMeter) -> Iterator[Agents | None]:
+    """The agents of a trial in fresh processes, loaded; None, and no cost, where the assignment has none."""
+    with contextlib.ExitStack() as stack:
+        if not spec.agents:
+            yield None
+            return
+        agents = Agents(spec, sandboxes, meter, stack)
+        agents.load()
+        yield agents
+
+
+class AgentProcess(ResponderProcess):
+    """The process of one agent, which is asked for values instead of texts."""
+
+    def __init__(
+        self,
+        name: str,
+        spec: AgentSpec,
+        sandboxes: Sandboxes,
+        folder: Path,
+        seed: int,
+        meter: JobMeter,
+        agents: Agents,
+    ) -> None:
+        super().__init__(spec, sandboxes, folder, seed, meter, agents)
+        self._schema = wire.AGENT
+        self._who = name
+        self._all = agents
+        self._ended: Told | None = None
+        self.given = spec.given
+        self.folder = folder
+
+    def answer_question(self, question: wire.Frame, t: int, message: int) -> Told:
+        """What it makes of a question. Never raises for what the student's code does."""
+        if self._child is None:
+            return self._ended or Told("error", f"{self._who} gave no answer: it could not be loaded")
+        self._message, self._asked_at, self._slept = message, t, 0
+        try:
+            self._child.send({"do": "asked", "t": t, "arguments": question["arguments"], "named": question["named"]})
+            return self._read(self._until("returned"))
+        except ChildStopped as stop:
+            fault = self._stopped(stop, t + self._slept)
+        except Exception as error:
+            fault = self._stopped(surprise(error), t + self._slept)
+        told = self._all.failed(self._who, fault, self._slept)
+        self._ended = replace(told, slept=0)
+        return told
+
+    def _beginning(self) -> dict[str, Any]:
+        seed = Stream(self._seed, f"agent {self._who}").integer(0)
+        return {
+            **super()._beginning(),
+            "agent": self._who,
+            "agents": self._all.others(self._who),
+            "seed": seed,
+        }
+
+    def _read(self, frame: wire.Frame) -> Told:
+        match frame:
+            case {"kind": "value", "text": text}:
+                _content(text, object)
+                return Told("value", text, self._slept)
+            case {"kind": "error", "error": error}:
+                fault = error_fault(error, self._asked_at + self._slept, self._who)
+            case {"kind": "other", "type": kind}:
+                sentence = f"the {self._who} returned {kind[:_LONGEST_TYPE]}, which no message can hold"
+                fault = self._protocol_fault(self._asked_at, sentence)
+            case {"kind": "long", "length": length}:
+                sentence = f"the {self._who} returned {length} characters of JSON; the most is about 60000"
+                fault = self._protocol_fault(self._asked_at, sentence)
+            case _:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it sent an answer without its content")
+        return self._all.failed(self._who, fault, self._slept)
+
+
+def _content(text: str, kind: type) -> Any:
+    """What a message holds. Raises ChildStopped where that is not JSON, or not of this kind."""
+    try:
+        value = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        value = _NOT_JSON
+    if value is _NOT_JSON or not isinstance(value, kind):
+        raise ChildStopped(Verdict.PROTOCOL_ERROR, "it sent a message that is no JSON or is nested too deeply")
+    return value
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is not JSON")

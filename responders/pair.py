@@ -1,0 +1,89 @@
+"""Runs one trial of two robots: fresh children for both programs and the responder, and a recording for each robot.
+
+How the two share time is ``lockstep.py``'s; a trial of one robot is ``trial.py``'s.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from contextlib import ExitStack
+from dataclasses import replace
+
+from responders.lockstep import PairedBridge, serve_both
+from responders.logger_file import read_log
+from responders.responder_process import ResponderProcess
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.meter import JobMeter
+from responders.trial import MOST_NOTES, recording_of
+from responders.trial_spec import PartnerSpec, TrialSpec
+from sim.camera import LightCamera
+from sim.recording import Fault, Recording, Verdict
+from sim.shared_arena import SharedArena
+
+
+def run_pair(
+    spec: TrialSpec,
+    partner: PartnerSpec,
+    arenas: tuple[SharedArena, SharedArena],
+    camera: LightCamera,
+    sandboxes: Sandboxes,
+    meter: JobMeter,
+) -> Recording:
+    """One run of both programs from start to end: the first robot's recording, with its partner's.
+
+    ``meter`` counts what their job costs. Raises HostError when the machine, not the student, fails.
+    """
+    specs = spec, spec.of_partner(partner)
+    for arena, other in zip(arenas, reversed(specs), strict=True):
+        arena.place_partner(other.pose.x, other.pose.y, math.radians(other.pose.heading))
+    with sandboxes.private_folder() as folder:
+        with ExitStack() as children:
+            responder = None
+            if spec.responder is not None:
+                responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter)
+                children.callback(responder.close)
+            bridges, layers = [], []
+            for each, arena in zip(specs, arenas, strict=True):
+                program = sandboxes.spawn("robot", each.program.limits, meter=meter)
+                children.callback(program.close)
+                bridges.append(PairedBridge(each, arena, camera, program, meter))
+                layers.append(program.sandbox)
+            unloadable = responder.load() if responder is not None else None
+            first, second = bridges
+            cut, partner_cut = serve_both(first, second, responder)
+        log, unread = read_log(folder, meter) if responder is not None else ("", None)
+    for bridge in bridges:
+        bridge.conversation.finish()
+    for bridge in bridges:
+        bridge.settle()
+    own = _in_order((unloadable, *first.conversation.faults, cut, unread))
+    others = (_of_second(fault, partner) for fault in _in_order((*second.conversation.faults, partner_cut)))
+    partners = recording_of(specs[1], second, tuple(fault for fault in others if fault is not None), layers[1])
+    first.chain.add("partner", second.now, partners.sha256.encode())
+    recording = replace(
+        recording_of(spec, first, own, layers[0]),
+        calls=tuple(first.calls),
+        partner=replace(partners, calls=tuple(second.calls)),
+    )
+    if responder is None:
+        return recording
+    return replace(
+        recording,
+        responder_output="\n".join(responder.output),
+        responder_log=log,
+        notes=(*recording.notes, *responder.notes)[:MOST_NOTES],
+    )
+
+
+def _in_order(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
+    return tuple(sorted((fault for fault in faults if fault is not None), key=lambda fault: fault.t))
+
+
+def _of_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
+    """A fault of the second program by that name; None for one that is none of a given program."""
+    if fault.who != "program":
+        return fault
+    if partner.given and fault.verdict is Verdict.TIME_LIMIT:
+        return None
+    return replace(fault, who="second program")

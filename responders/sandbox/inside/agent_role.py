@@ -1,0 +1,55 @@
+"""An agent at work: its module is run once, then its function is called with one message after the other.
+
+Who asks it, and whether it may, is decided on the other side of the wire.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import types
+from collections.abc import Callable
+from typing import Any
+
+from . import function_calls
+from .frames import Frame, Wire
+from .lockdown import Grants
+from .responder_role import ResponderRole
+
+
+class AgentRole(ResponderRole):
+    """A module of the student's that answers the responder and the other agents."""
+
+    def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
+        super().__init__(wire, grants, spec)
+        self._own_name = spec["agent"]
+
+    def _serve(self) -> None:
+        while True:
+            asked = self._wire.receive()
+            self._units = max(self._units, asked["t"])
+            self._note_calls()
+            self._stack, self._calls = [self._own_name], 0
+            self._wire.send(function_calls.value_frame(functools.partial(self._called, asked), self._files))
+
+    def _called(self, asked: Frame) -> Any:
+        return self._find()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
+
+    def _find(self) -> Callable[..., Any]:
+        """What the agent's name is bound to; else the only function named ``*_parser``; else the only function."""
+        name = self._own_name
+        own = self._namespace.get(name)
+        if callable(own):
+            return own  # type: ignore[no-any-return]
+        defined = [
+            (each, value)
+            for each, value in self._namespace.items()
+            if isinstance(value, types.FunctionType) and value.__module__ == "__main__"
+        ]
+        found = [value for each, value in defined if each.endswith(f"_{name}")] or [value for _, value in defined]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            names = ", ".join(each for each, _ in defined)
+            raise LookupError(f"which of {names} is the {name}? call one of them {name}")
+        raise LookupError(f"there is no {name}: define a function called {name}")

@@ -1,0 +1,42 @@
+"""The other agents of a submission as functions: what one is called with goes to its process, as JSON, and back.
+
+It decides nothing: whether an agent can be asked now, and what its answer costs, is the worker's to say.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from .frames import Wire, fits
+from .function_calls import as_json
+
+
+def functions(names: Iterable[str], wire: Wire, waited: Callable[[int], None]) -> dict[str, Callable[..., Any]]:
+    """A function for each of the agents; ``waited`` is told what the time is when an answer has come."""
+    return {name: _asking(name, wire, waited) for name in names}
+
+
+def _asking(name: str, wire: Wire, waited: Callable[[int], None]) -> Callable[..., Any]:
+    def ask(*arguments: Any, **named: Any) -> Any:
+        listed, keyed = as_json(list(arguments)), as_json(named)
+        if listed is None or keyed is None:
+            kinds = [type(each).__name__ for each in (*arguments, *named.values()) if as_json(each) is None]
+            raise TypeError(
+                f"{name} cannot be sent {' and '.join(kinds) or 'that'}: "
+                "a message holds what JSON has, which are texts, numbers, lists and dictionaries"
+            )
+        if not fits(listed + keyed):
+            length = len(listed) + len(keyed)
+            raise ValueError(f"{name} cannot be sent {length} characters of JSON at once; the most is about 60000")
+        wire.send({"do": "ask", "agent": name, "arguments": listed, "named": keyed})
+        told = wire.receive()
+        waited(told["t"])
+        if told["kind"] == "error":
+            raise RuntimeError(told["text"])
+        return json.loads(told["text"])
+
+    ask.__name__ = ask.__qualname__ = name
+    ask._robomark_noted = True  # type: ignore[attr-defined]  # the worker notes it
+    return ask

@@ -1,0 +1,86 @@
+"""Lets student code import the Python files beside it, each as a module of its own name.
+
+They come after everything else that can be imported, so that none stands in for a module of Python's, the brick's or a
+library's. There are no packages: what is submitted is flat.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+from .student_code import StudentFiles, compile_source, is_module_file
+
+Source = Callable[[str], str | None]
+
+
+def install(source: Source, names: Iterable[str], files: StudentFiles, tell: Callable[[str], None]) -> None:
+    """Import from ``source``, which gives a module's text by its name, what nothing else has.
+
+    ``tell(sentence)`` for each of ``names`` that can never be imported, as another module is called so.
+    """
+    for name in sorted(names):
+        if _is_taken(name):
+            tell(f"{name}.py is never imported: there is another module of that name, which comes first")
+    sys.meta_path.append(_OwnModules(source, files))
+
+
+def given(modules: Mapping[str, str]) -> Source:
+    """The texts that were handed over."""
+    return modules.get
+
+
+def in_folder(name: str) -> str | None:
+    """The text of the file in the working folder, as it is now: cells write modules too."""
+    try:
+        with open(f"{name}.py", "rb") as file:
+            return importlib.util.decode_source(file.read())
+    except OSError:
+        return None
+
+
+def names_in_folder() -> list[str]:
+    """The modules that lie in the working folder."""
+    return [file.removesuffix(".py") for file in os.listdir() if is_module_file(file)]
+
+
+def _is_taken(name: str) -> bool:
+    if name in sys.modules:
+        return True
+    with contextlib.suppress(ImportError, ValueError):
+        return importlib.util.find_spec(name) is not None
+    return False
+
+
+class _OwnModules(MetaPathFinder, Loader):
+    def __init__(self, source: Source, files: StudentFiles) -> None:
+        self._source = source
+        self._files = files
+
+    def find_spec(self, fullname: str, path: Any, target: ModuleType | None = None) -> ModuleSpec | None:
+        if not fullname.isidentifier():
+            return None
+        text = self._source(fullname)
+        if text is None:
+            return None
+        file = f"{fullname}.py"
+        found = ModuleSpec(fullname, self, origin=file, loader_state=text)
+        found.has_location = True
+        return found
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """An ordinary module will do."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        found = module.__spec__
+        assert found is not None
+        assert found.origin is not None
+        self._files.imported.add(found.origin)
+        exec(compile_source(found.loader_state, found.origin), module.__dict__)

@@ -1,0 +1,58 @@
+"""The rows of a batch as tables have them: the grade of each submission, or why it has none.
+
+What a table makes of a row is ``service.reports``'; the database is only read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from service.grading.grade import Grade
+from service.reports.rows import TableRow, missing_words
+from service.store import results
+from service.store.batches import JobLine
+from service.store.engine import Store
+from service.store.states import JobState
+from submissions.people import Refusal, Student
+
+
+def rows_of(
+    store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal] = (), *, published: bool = False
+) -> list[TableRow[Grade]]:
+    """A row for each submission and each refusal; with ``published``, no other grade is shown."""
+    rows = [refused_row(refusal) for refusal in refusals]
+    for line in lines:
+        reason = why_not_shown(line, published=published)
+        grade = None
+        if not reason:
+            with store.reading() as session:
+                grade = results.load(session, line.id)
+        rows.append(row_of(line, grade, reason))
+    return sorted(rows, key=lambda row: (row.who, row.assignment))
+
+
+def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Grade]:
+    """The row of one job."""
+    student = Student(line.student, line.name, line.email)
+    return TableRow(student, line.source, line.assignment, grade, reason or missing_words(line.missing))
+
+
+def refused_row(refusal: Refusal) -> TableRow[Grade]:
+    """The row of what was not taken in."""
+    return TableRow(refusal.student, refusal.source, refusal.assignment, reason=refusal.reason, refused=True)
+
+
+def why_not_shown(line: JobLine, *, published: bool = False) -> str:
+    """Why a job has no grade to be shown; empty if it has one."""
+    match line.state:
+        case JobState.QUEUED:
+            return "waits to be graded"
+        case JobState.RUNNING:
+            return "is being graded"
+        case JobState.DEAD | JobState.CANCELLED:
+            return f"{line.state.value}: {line.error}" if line.error else line.state.value
+    if line.suspect is not None:
+        return "is graded again: the machine that graded it was found to grade wrongly"
+    if line.staff_only is not None:
+        return f"for staff only: {line.staff_only}"
+    return "not published" if published and line.published_at is None else ""

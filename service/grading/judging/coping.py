@@ -1,0 +1,293 @@
+"""Judging how a program copes with a channel that loses: what it sends again and from where, which answers it believes.
+
+What chance lost is never held against it; what it sent from out of reach is.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
+from service.grading.judging.judges import judges
+from service.grading.judging.losses import by_chance, loss_words, out_of_reach
+from service.grading.judging.outcome import Outcome, cut, failed, passed
+from service.grading.judging.texts import conditions, meets
+from service.grading.judging.words import quoted, words_of
+from sim.recorded import pose_at
+from sim.recording import Line, Message, Recording, Verdict
+from submissions.criteria.coping import FreshAnswers, InReach, Resends
+from submissions.criteria.texts import TextConditions
+
+#: A program that looks, waits or prints does so to 10 ms.
+_ROUNDING = 0.011
+_MOST_WORDS = 50  # of an answer, to know it again
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """A text of the robot's: when it was sent, all that was answered, and what of that arrived whole."""
+
+    text: str
+    tries: tuple[Message, ...]
+    replies: tuple[Message, ...]
+    answers: tuple[Message, ...]
+
+    @property
+    def answered(self) -> float | None:
+        """When its first answer arrived, seconds."""
+        return min((message.delivered or 0.0 for message in self.answers), default=None)
+
+    @property
+    def excused(self) -> bool:
+        """Whether chance alone kept it from being answered."""
+        heard = sum(message.delivered is not None and message.arrived_as is None for message in self.tries)
+        lost = all(map(by_chance, self.replies)) and len(self.replies) >= heard
+        return not self.answers and lost and not any(map(out_of_reach, self.tries))
+
+
+@judges(Resends)
+def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
+    """Each different text, and what was wrong with how it was sent again."""
+    recording = trial.recording
+    questions = [each for each in _questions(recording) if meets(criterion, each.text)]
+    what = _what(criterion)
+    if len(questions) < criterion.at_least:
+        return failed(f"Expected the robot to send at least {criterion.at_least} of {what}, but it {_few(questions)}.")
+    mistakes = [(each, found) for each in questions if (found := _mistake(criterion, each, recording))]
+    tries = sum(len(each.tries) for each in questions)
+    measures = (Measure("different messages", len(questions)), Measure("tries", tries))
+    count = len(questions)
+    if not mistakes:
+        again = f", {tries - count} of them again" if tries > count else ""
+        last = max(message.t for each in questions for message in each.tries)
+        return passed(
+            f"The robot sent {tries} messages{again}, until each of {count} was answered or given up.",
+            last,
+            pose_at(recording, last),
+            measures,
+        )
+    question, (t, mistake) = mistakes[0]
+    right = count - len(mistakes)
+    return failed(
+        f"Expected the robot to send {quoted(question.text)} again until its answer comes{_bounds(criterion)}, "
+        f"but {mistake} ({right} of {count} messages right).",
+        t,
+        pose_at(recording, t),
+        Fraction(right, count),
+        measures,
+    )
+
+
+@judges(InReach)
+def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
+    """Each message, and where the robot stood when it sent it."""
+    recording = trial.recording
+    sent = [each for each in recording.messages if each.sender == "robot" and meets(criterion, each.text)]
+    astray = [message for message in sent if out_of_reach(message)]
+    near = len(sent) - len(astray)
+    measures = (Measure("sent in reach", near), Measure("sent out of reach", len(astray)))
+    told = f"{near} of {len(sent)} sent in reach"
+    if len(astray) > criterion.misses:
+        first = astray[0]
+        leeway = f" but {criterion.misses}" if criterion.misses else ""
+        return failed(
+            f"Expected the robot to send all{leeway} of {_what(criterion)} in reach of the receiver, "
+            f"but the channel lost {quoted(first.text)}: {loss_words(first)} ({told}).",
+            first.t,
+            pose_at(recording, first.t),
+            Fraction(near, len(sent)),
+            measures,
+        )
+    if near < criterion.at_least:
+        return failed(
+            f"Expected the robot to send at least {criterion.at_least} of {_what(criterion)} in reach of the receiver, "
+            f"but it sent {near or 'none'}.",
+            score=Fraction(near, criterion.at_least),
+            measures=measures,
+        )
+    last = sent[-1]
+    return passed(f"The robot was in reach: {told}.", last.t, pose_at(recording, last.t), measures)
+
+
+@judges(FreshAnswers)
+def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
+    """Each report, held against the answers that had come to the text sent last before it, and to all others."""
+    recording = trial.recording
+    questions = _questions(recording)
+    expected = "Expected the robot to report each answer as that to what it sent last"
+    if len(questions) < criterion.at_least:
+        return failed(f"{expected}, but it {_few(questions)}.")
+    answers = _Answered(criterion, questions)
+    fresh: set[str] = set()
+    stale: dict[str, tuple[Line, str]] = {}
+    for line in _reports(criterion, recording):
+        asked = answers.sent_last(line.t)
+        for text in answers.named_in(line, asked):
+            if text == asked:
+                fresh.add(text)
+            else:
+                stale.setdefault(asked, (line, text))
+    wanted = {each.text: each for each in questions if not each.excused}
+    right = len(fresh - stale.keys())
+    judged = len(wanted.keys() | fresh | stale.keys())
+    told = f"({right} of {judged} answers right)"
+    if stale:
+        asked, (line, earlier) = next(iter(stale.items()))
+        return failed(
+            f"{expected}, but after {quoted(asked)} it reported {quoted(line.text)}, which is the answer to "
+            f"{quoted(earlier)} {told}.",
+            line.t,
+            pose_at(recording, line.t),
+            Fraction(right, judged),
+        )
+    missing = next((each for text, each in wanted.items() if text not in fresh), None)
+    if missing is not None:
+        at = missing.tries[-1].t if missing.answered is None else missing.answered
+        what = (
+            _unanswered(missing)
+            if missing.answered is None
+            else (
+                f"the answer to {quoted(missing.text)} came at {at:.2f} s and no line that begins with "
+                f"{quoted(criterion.after)} has it"
+            )
+        )
+        return failed(f"{expected}, but {what} {told}.", at, pose_at(recording, at), Fraction(right, judged))
+    if not judged:
+        return passed("The channel lost every message or its answer by chance, and the robot believed none.")
+    return passed(f"{right} of {judged} answers were reported, each as that to what was sent last.")
+
+
+def _unanswered(question: _Question) -> str:
+    """That no answer came, and why, where it was not chance."""
+    astray = next(filter(out_of_reach, (*question.tries, *question.replies)), None)
+    why = f": the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
+    return f"no answer to {quoted(question.text)} came{why}"
+
+
+class _Answered:
+    """Which answers had come when, looked up by their words: a run may have thousands of each."""
+
+    def __init__(self, criterion: FreshAnswers, questions: Sequence[_Question]) -> None:
+        sent = sorted((message.t, each.text) for each in questions for message in each.tries)
+        self._times, self._texts = [t for t, _ in sent], [text for _, text in sent]
+        #: For the words of an answer: the texts that were answered so, and when first, the earliest first.
+        self._by_words: dict[tuple[str, ...], dict[str, float]] = {}
+        came = ((message.delivered or 0.0, each.text, message) for each in questions for message in each.answers)
+        for t, text, message in sorted(came, key=lambda each: each[0]):
+            words = tuple(words_of(_value(criterion, message))[:_MOST_WORDS])
+            if words:
+                self._by_words.setdefault(words, {}).setdefault(text, t)
+        self._lengths = sorted({len(words) for words in self._by_words})
+
+    def sent_last(self, t: float) -> str:
+        """The text that was sent last before that moment; empty if none was."""
+        place = bisect_left(self._times, t - 1e-9)
+        return self._texts[place - 1] if place else ""
+
+    def named_in(self, line: Line, asked: str) -> Iterator[str]:
+        """Of each answer in the line that had come by then, what it answers: ``asked`` if it is one to that."""
+        words = words_of(line.text)
+        for length in self._lengths:
+            for place in range(len(words) - length + 1):
+                answers = self._by_words.get(tuple(words[place : place + length]), {})
+                if answers.get(asked, math.inf) <= line.t:
+                    yield asked
+                elif answers and next(iter(answers.values())) <= line.t:
+                    yield next(iter(answers))
+
+
+def _questions(recording: Recording) -> list[_Question]:
+    """The different texts that the robot sent, in the order in which each was sent first."""
+    tries: dict[str, list[Message]] = {}
+    replies: dict[str, list[Message]] = {}
+    for message in recording.messages:
+        if message.sender == "robot":
+            tries.setdefault(message.text, []).append(message)
+        elif message.reply_to is not None:
+            asked = recording.messages[message.reply_to]
+            # What answers another text than was sent answers nothing.
+            if asked.arrived_as is None:
+                replies.setdefault(asked.text, []).append(message)
+    return [
+        _Question(
+            text,
+            tuple(sent),
+            tuple(replies.get(text, ())),
+            tuple(reply for reply in replies.get(text, ()) if _arrived_whole(reply)),
+        )
+        for text, sent in tries.items()
+    ]
+
+
+def _arrived_whole(reply: Message) -> bool:
+    return reply.delivered is not None and reply.arrived_as is None and reply.note != "malformed"
+
+
+def _mistake(criterion: Resends, question: _Question, recording: Recording) -> tuple[float, str] | None:
+    """When the robot first did not send a text as it should have, and what was wrong; None where nothing is."""
+    least, most = criterion.every
+    answered = question.answered
+    until = recording.end_t if answered is None else answered
+    times = [message.t for message in question.tries]
+    for number, (t, following) in enumerate(zip(times, [*times[1:], None], strict=True), 1):
+        if answered is not None and t > answered + 1e-9:
+            return t, f"it sent it again at {t:.2f} s, after its answer had come at {answered:.2f} s"
+        if criterion.at_most is not None and number > criterion.at_most:
+            return t, f"it sent it {len(times)} times"
+        if following is not None and following - t < least - _ROUNDING:
+            return following, f"it did not wait for it: it sent it at {t:.2f} s and again at {following:.2f} s"
+        if following is not None and following - t > most + _ROUNDING:
+            return t, f"it sent it at {t:.2f} s and again only at {following:.2f} s"
+        gave_up = following is None and (criterion.at_most is None or number < criterion.at_most)
+        if gave_up and answered is None and _stopped_trying(t, most, recording):
+            return t, f"it sent it {_times(number)}, last at {t:.2f} s, and no answer came"
+        if gave_up and answered is not None and until - t > most + _ROUNDING:
+            return t, f"it sent it {_times(number)}, and its answer came only at {until:.2f} s"
+    return None
+
+
+def _stopped_trying(last: float, most: float, recording: Recording) -> bool:
+    """Whether the program ended, or went on for longer than it may wait, after its last try."""
+    fault = cut(recording)
+    timed_out = fault is not None and fault.verdict is Verdict.TIME_LIMIT
+    return not timed_out or recording.end_t - last > most + _ROUNDING
+
+
+def _reports(criterion: FreshAnswers, recording: Recording) -> Iterator[Line]:
+    """What follows ``after`` in the lines that begin with it, by time."""
+    printed = recording.printed if criterion.source != "speech" else ()
+    spoken = recording.spoken if criterion.source != "print" else ()
+    begin = criterion.after.strip()
+    for line in sorted((*printed, *spoken), key=lambda each: each.t):
+        if line.text.strip().startswith(begin):
+            yield Line(line.t, line.text.strip().removeprefix(begin))
+
+
+def _value(criterion: FreshAnswers, answer: Message) -> str:
+    """What of an answer is looked for in a report; empty where it is not there."""
+    if criterion.path is None:
+        return answer.text
+    found = at_path(parsed(answer.text), criterion.path)
+    return "" if found is NOTHING else as_text(found)
+
+
+def _what(criterion: TextConditions) -> str:
+    asked = conditions(criterion)
+    return f"the messages: {asked}" if asked else "its messages"
+
+
+def _few(questions: Sequence[_Question]) -> str:
+    return f"sent only {len(questions)} different" if questions else "sent nothing"
+
+
+def _bounds(criterion: Resends) -> str:
+    return f", at most {criterion.at_most} times in all" if criterion.at_most is not None else ""
+
+
+def _times(number: int) -> str:
+    return "once" if number == 1 else f"{number} times"

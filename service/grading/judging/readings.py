@@ -1,0 +1,62 @@
+"""Which numbers that a program put out a sensor had read shortly before, whatever the unit.
+
+A number that was read says nothing of what it was read for; that is judged in the modules of the families.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.recorded import ticks_until
+from sim.recording import Floats, Recording
+from submissions.criteria.logged import Instrument
+
+#: How old a reading may be when it is printed, seconds.
+_AGE = 0.5
+#: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
+_ROUNDED = 1.0
+INSTRUMENTS: tuple[Instrument, ...] = get_args(Instrument)
+
+
+def were_read(
+    values: Sequence[float], at: Sequence[float], instruments: Sequence[Instrument], recording: Recording
+) -> NDArray[np.bool_]:
+    """Whether one of the instruments read each value in the half second before its time, shape (len(values),).
+
+    Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
+    of turning degrees. Nothing has been read before the first tick.
+    """
+    found = np.zeros(len(values), dtype=bool)
+    if not len(recording.ticks) or not len(values):
+        return found
+    numbers = np.asarray(values, dtype=np.float64)
+    last = np.clip([ticks_until(recording, t) for t in at], 1, len(recording.ticks))
+    first = np.clip([int((t - _AGE) * recording.ticks.per_second) for t in at], 1, last)
+    columns = np.column_stack([column for each in instruments for column in _columns(each, recording)])
+    for back in range(int(np.max(last - first)) + 1):
+        rows = np.maximum(last - back, first) - 1
+        for column in columns.T:
+            found |= np.abs(column[rows] - numbers) <= _ROUNDED
+    return found
+
+
+def _columns(instrument: Instrument, recording: Recording) -> list[Floats]:
+    """What it read after each tick, in each unit in which it may be printed."""
+    ticks = recording.ticks
+    match instrument:
+        case "left light" | "right light":
+            rgb = ticks.left_rgb if instrument == "left light" else ticks.right_rgb
+            together = rgb.sum(axis=1)
+            return [*rgb.T, *(rgb / 2.55).T, together / 3, together / 7.65]
+        case "ultrasonic":
+            return [ticks.ultrasonic, ticks.ultrasonic / 10, ticks.ultrasonic / 25.4]
+        case "gyro":
+            return [ticks.gyro]
+        case "left wheel":
+            return [ticks.left_position, ticks.left_position / 360]
+        case "right wheel":
+            return [ticks.right_position, ticks.right_position / 360]

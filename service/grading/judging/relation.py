@@ -1,0 +1,96 @@
+"""Judging whether one series of a recording goes with another, moment by moment.
+
+All values are the simulator's own; what the program made of them is judged elsewhere.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import headings, standing, times, travel
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, failed, passed
+from sim.recording import Floats, Recording
+from submissions.criteria.relation import Relation, Series
+
+#: Moments that are compared, each with every other.
+_MOMENTS = 600
+#: Less than this share of a series' range is no difference.
+_ALIKE = 0.05
+
+
+@judges(Relation)
+def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
+    """The share of pairs of moments that are as asked; the score is that share beside the one that is asked for."""
+    recording = trial.recording
+    moving = np.flatnonzero(~standing(recording))
+    rows = moving[np.unique(np.linspace(0, len(moving) - 1, _MOMENTS).astype(int))] if len(moving) else moving
+    t, end = recording.end_t, recording.end
+    lower = "lower" if criterion.goes == "with" else "higher"
+    asked = f"Expected {criterion.of} to be {lower} where {criterion.to} is lower"
+    if len(rows) < 2:
+        return failed(f"{asked}, but the robot hardly moved.", t, end)
+    of, to = _series(criterion.of, recording)[rows], _series(criterion.to, recording)[rows]
+    alike, differing = _pairs(of, to if criterion.goes == "with" else -to)
+    share = Fraction(alike, differing) if differing else Fraction(0)
+    measures = (
+        Measure("share of pairs", float(share)),
+        Measure("least", float(of.min())),
+        Measure("most", float(of.max())),
+    )
+    span = f"it was from {of.min():.3g} to {of.max():.3g} while the robot moved"
+    if np.ptp(of) < criterion.changes or not differing:
+        by = f" by {criterion.changes:g} or more" if criterion.changes else ""
+        return failed(
+            f"Expected {criterion.of} to change with {criterion.to}{by}, but {span}.", t, end, measures=measures
+        )
+    told = f"of two moments in {float(share):.0%}"
+    if share >= Fraction(str(criterion.at_least)):
+        return passed(f"As expected, {criterion.of} was {lower} where {criterion.to} was: {told}.", t, end, measures)
+    return failed(
+        f"{asked}, of two moments in {criterion.at_least:.0%} or more, but it was so in {float(share):.0%}; {span}.",
+        t,
+        end,
+        share / Fraction(str(criterion.at_least)),
+        measures,
+    )
+
+
+def _pairs(of: Floats, to: Floats) -> tuple[int, int]:
+    """In how many pairs of moments both series differ in the same direction, and in how many both differ."""
+    one, other = np.triu_indices(len(of), 1)
+    by_of, by_to = of[one] - of[other], to[one] - to[other]
+    both = (np.abs(by_of) > _ALIKE * np.ptp(of)) & (np.abs(by_to) > _ALIKE * np.ptp(to))
+    return int((both & (by_of * by_to > 0)).sum()), int(both.sum())
+
+
+def _series(name: Series, recording: Recording) -> Floats:
+    """A value for each tick, shape (n,)."""
+    ticks = recording.ticks
+    ahead, turned = travel(recording)
+    match name:
+        case "time":
+            return times(recording)[1:]
+        case "x":
+            return ticks.x
+        case "y":
+            return ticks.y
+        case "heading":
+            return headings(recording)[1:]
+        case "speed":
+            return np.abs(ahead) * ticks.per_second
+        case "turning":
+            return np.abs(turned) * ticks.per_second
+        case "left wheel speed" | "right wheel speed":
+            wheel = ticks.left_position if name == "left wheel speed" else ticks.right_position
+            return np.abs(np.diff(wheel, prepend=0.0)) * ticks.per_second
+        case "left light" | "right light":
+            rgb = ticks.left_rgb if name == "left light" else ticks.right_rgb
+            return np.asarray(rgb[:, 0] / 2.55)
+        case "ultrasonic":
+            return ticks.ultrasonic
+        case "gyro":
+            return ticks.gyro

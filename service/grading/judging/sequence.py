@@ -1,0 +1,110 @@
+"""Judging words that have to come one after the other in what is said or printed, a count or a spelling.
+
+Single texts are judged in ``texts.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.precision import Strays, tempered
+from service.grading.judging.words import listed, quoted, spoken_until, words_of
+from sim.recorded import pose_at
+from sim.recording import Line, Recording
+from submissions.criteria.sequence import WordSequence
+
+_SPEECH_ROUNDING = 0.011  # a waiting program looks every 10 ms
+
+
+@judges(WordSequence)
+def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
+    """Words one after the other in what was said or printed; of several beginnings the best counts."""
+    recording = trial.recording
+    lines = recording.spoken if criterion.source == "speech" else recording.printed
+    verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
+    wanted = [[words_of(text) for text in texts] for texts in criterion.words]
+    heard = [(word, line) for line in lines for word in words_of(line.text)]
+    if not heard:
+        return failed(f"Expected the robot to {verb} {_shown(criterion)}, but it {past} nothing.")
+    words = [word for word, _ in heard]
+    starts = range(len(words)) if criterion.lead_in else range(1)
+    runs = [(start, *_run(wanted, words, start)) for start in starts]
+    begin, found, end = max(runs, key=lambda run: run[1])
+    outcome = _in_sequence(criterion, recording, heard, found, end)
+    asked = {word for alternatives in wanted for each in alternatives for word in each}
+    again = sum(word in asked for word in (*words[:begin], *words[end:]))
+    return tempered(outcome, criterion, len(wanted), Strays(f"it {past} these words {again} more times", again))
+
+
+def _in_sequence(
+    criterion: WordSequence, recording: Recording, heard: Sequence[tuple[str, Line]], found: int, end: int
+) -> Outcome:
+    """What the best run is worth: ``found`` of the words came, and ``end`` is where the next word is."""
+    lines = recording.spoken if criterion.source == "speech" else recording.printed
+    verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
+    count, shown = len(criterion.words), _shown(criterion)
+    first = heard[end - 1][1] if found else heard[0][1]
+    if found < count:
+        instead = f"came {quoted(heard[end][0])}" if end < len(heard) else "came nothing"
+        after = (
+            f"after {_alternatives(criterion.words[found - 1])} {instead}"
+            if found
+            else f"it began with {quoted(heard[0][0])}"
+        )
+        return failed(
+            f"Expected the robot to {verb} {shown}, but {after} instead of {_alternatives(criterion.words[found])} "
+            f"({found} of {count} in order).",
+            first.t,
+            pose_at(recording, first.t),
+            Fraction(found, count),
+        )
+    if end < len(heard) and not criterion.more:
+        word, line = heard[end]
+        return failed(
+            f"Expected the robot to {verb} {shown} and nothing after it, but it {past} {quoted(word)} as well.",
+            line.t,
+            pose_at(recording, line.t),
+            Fraction(count, count + len(heard) - end),
+        )
+    hurried = _hurried(lines) if criterion.waits else None
+    if hurried is not None:
+        return failed(
+            f"Expected the robot to wait until each word is spoken, but it said {quoted(hurried.text)} while it was "
+            "still speaking.",
+            hurried.t,
+            pose_at(recording, hurried.t),
+            Fraction(1, 2),
+        )
+    measures = (Measure("words", float(count)), Measure("last at", first.t, "s"))
+    return passed(f"The robot {past} {shown}.", first.t, pose_at(recording, first.t), measures)
+
+
+def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, int]:
+    """How many of the wanted words come without a gap from ``start`` on, and where the next word is."""
+    place = start
+    for count, alternatives in enumerate(wanted):
+        length = next((len(each) for each in alternatives if words[place : place + len(each)] == each), None)
+        if length is None:
+            return count, place
+        place += length
+    return len(wanted), place
+
+
+def _hurried(lines: Sequence[Line]) -> Line | None:
+    """The first text that was said before the one before it had been spoken to its end."""
+    for until, after in zip(spoken_until(lines), lines[1:], strict=False):
+        if after.t < until - _SPEECH_ROUNDING:
+            return after
+    return None
+
+
+def _shown(criterion: WordSequence) -> str:
+    return quoted(" ".join(texts[0] for texts in criterion.words))
+
+
+def _alternatives(texts: tuple[str, ...]) -> str:
+    return listed(texts, "or")

@@ -1,0 +1,96 @@
+"""Judging how far two robots were apart.
+
+Where each of them went by itself is judged in the other modules.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.judges import judges
+from service.grading.judging.outcome import Outcome, failed, passed
+from sim.recorded import pose_after, seconds_at, ticks_until
+from sim.recording import Floats, Recording
+from submissions.criteria.together import Apart
+
+
+@judges(Apart)
+def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
+    """The distance after each tick until the last program has ended; a robot whose program has ended stands."""
+    recording = trial.recording
+    distances = _distances(recording)
+    if distances is None:
+        return failed("Expected two robots, but there was one.")
+    last = len(distances) - 1
+    first = last if criterion.when == "end" else min(ticks_until(recording, criterion.after), last)
+    looked_at = distances[first:]
+    good = (looked_at >= criterion.at_least) & (looked_at <= (criterion.at_most or np.inf))
+    share = Fraction(int(good.sum()), len(good))
+    measures = (
+        Measure("apart at the end", float(distances[last]), "mm"),
+        Measure("least apart", float(looked_at.min()), "mm"),
+        Measure("most apart", float(looked_at.max()), "mm"),
+        Measure("share of the time", float(share) * 100, "%"),
+    )
+    expected = f"Expected the robots to be {_asked(criterion)}"
+    if criterion.when == "always":
+        needed = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
+        told = f"they were so for {float(share) * 100:.0f}% of the time after {seconds_at(recording, first):.2f} s"
+        at = first + int(np.argmin(good))
+        if share >= Fraction(str(criterion.share)):
+            return passed(
+                f"The robots were {_asked(criterion)}: {told}.", seconds_at(recording, last), recording.end, measures
+            )
+        return failed(
+            f"{expected} for {needed} of the time, but {told}; at {seconds_at(recording, at):.2f} s they were "
+            f"{distances[at]:.0f} mm apart.",
+            seconds_at(recording, at),
+            pose_after(recording, at),
+            share,
+            measures,
+        )
+    at = first + int(np.argmax(good))
+    if good.any():
+        told = f"at {seconds_at(recording, at):.2f} s the robots were {distances[at]:.0f} mm apart"
+        return passed(f"{told.capitalize()}.", seconds_at(recording, at), pose_after(recording, at), measures)
+    began = seconds_at(recording, first)
+    ends = "at the end" if criterion.when == "end" else f"at some time after {began:.2f} s"
+    nearest = f"{distances[last]:.0f} mm" if criterion.when == "end" else _span(looked_at)
+    return failed(
+        f"{expected} {ends}, but they were {nearest} apart.",
+        seconds_at(recording, last),
+        recording.end,
+        measures=measures,
+    )
+
+
+def _distances(recording: Recording) -> Floats | None:
+    """How far apart at the start and after each tick, mm."""
+    if recording.partner is None:
+        return None
+    ways = [_way(recording), _way(recording.partner)]
+    rows = max(len(way) for way in ways)
+    first, second = (np.vstack((way, np.repeat(way[-1:], rows - len(way), axis=0))) for way in ways)
+    distances: Floats = np.hypot(*(first - second).T)
+    return distances
+
+
+def _way(recording: Recording) -> Floats:
+    ticks = recording.ticks
+    start = [[recording.start.x, recording.start.y]]
+    return np.vstack((start, np.column_stack((ticks.x, ticks.y)))) if len(ticks) else np.array(start)
+
+
+def _asked(criterion: Apart) -> str:
+    if criterion.at_most is None:
+        return f"at least {criterion.at_least:g} mm apart"
+    if criterion.at_least == 0:
+        return f"within {criterion.at_most:g} mm of each other"
+    return f"{criterion.at_least:g} to {criterion.at_most:g} mm apart"
+
+
+def _span(distances: Floats) -> str:
+    return f"{distances.min():.0f} to {distances.max():.0f} mm"

@@ -1,0 +1,141 @@
+"""What Moodle takes back: its grade import, its offline grading worksheet filled in, and a zip of feedback files.
+
+Moodle knows a submission again by the number in its download's names and in the worksheet's column Identifier.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import zipfile
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal, InvalidOperation
+from typing import BinaryIO
+
+from service.reports.formats.csv_output import csv_text, safe_cell
+from service.reports.formats.registry import FilledIn, filled_in, packed, table
+from service.reports.readable import number, one_line
+from service.reports.rows import ReportPage, TableRow
+from service.reports.view import GradebookView, gradebook_view
+from sim.errors import UsageError
+from submissions.downloads import moodle_number
+
+_IDENTIFIER, _GRADE, _FEEDBACK, _MAXIMUM = "Identifier", "Grade", "Feedback comments", "Maximum Grade"
+#: By what a row is found whose submission did not come from Moodle, in this order.
+_NAMES = ("ID number", "Email address", "Full name")
+_LONGEST = 2000
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
+
+
+@table("moodle", ".csv", gradebook_view)
+def moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
+    """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
+    # One that nobody is known by would end the whole import.
+    cells = [[row.student.id, _marks(row), _feedback(row)] for row in rows if row.student.id]
+    return csv_text([["ID number", "Grade", "Feedback comments"], *cells])
+
+
+@filled_in("moodle-worksheet", ".csv", gradebook_view)
+def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> FilledIn:
+    """The worksheet with Grade and Feedback comments filled in; every other row and cell stays as it is.
+
+    Raises UsageError for what is no worksheet, or one of an assignment with another maximum.
+    """
+    mark = "\ufeff" if given.startswith("\ufeff") else ""
+    text = given.removeprefix("\ufeff")
+    first = text.partition("\n")[0]
+    separator = max(",;\t", key=first.count)
+    lines = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
+    places = {heading: place for place, heading in enumerate(lines[0])} if lines else {}
+    missing = [heading for heading in (_IDENTIFIER, _GRADE) if heading not in places]
+    if missing:
+        raise UsageError(
+            f"the worksheet has no column {' and no column '.join(missing)}, expected the grading worksheet as Moodle "
+            "lets it be downloaded, in English"
+        )
+    found = _places_of(lines, places)
+    left_over = []
+    for row in rows:
+        place = _place_of(row, found)
+        if place is None:
+            left_over.append(row.who)
+            continue
+        line = lines[place]
+        line += [""] * (len(lines[0]) - len(line))
+        if row.grade is not None:
+            _check_maximum(row.grade.entry.max_marks, line, places)
+            line[places[_GRADE]] = _marks(row)
+        feedback = places.get(_FEEDBACK)
+        # What waits leaves standing what somebody wrote.
+        if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
+            line[feedback] = safe_cell(_feedback(row))
+    stream = io.StringIO()
+    ending = "\r\n" if first.endswith("\r") else "\n"
+    csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(lines)
+    return FilledIn(mark + stream.getvalue(), tuple(left_over))
+
+
+@packed("moodle-feedback", ".zip")
+def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, ...]:
+    """A report for each submission that came from Moodle, where its import of feedback files looks for it."""
+    left_over = []
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+        for page in pages:
+            number_of = moodle_number(page.row.source)
+            if not number_of:
+                left_over.append(page.row.who)
+                continue
+            name = re.sub(r"[_/\\\s]+", " ", page.row.source.partition(f"_{number_of}_")[0])
+            path = f"{name}_{number_of}_assignfeedback_file_/feedback.html"
+            archive.writestr(zipfile.ZipInfo(path, _EPOCH), page.html, zipfile.ZIP_DEFLATED)
+    return tuple(left_over)
+
+
+def _marks(row: TableRow[GradebookView]) -> str:
+    return "" if row.grade is None else number(row.grade.entry.marks)
+
+
+def _feedback(row: TableRow[GradebookView]) -> str:
+    told = [] if row.grade is None else row.grade.shown.criteria
+    lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
+    if row.reason:
+        lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
+    return one_line("; ".join(lines), _LONGEST)
+
+
+def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
+    """The line of each that is called something, by what that is; not by a name that several have."""
+    called: list[tuple[tuple[str, str], int]] = []
+    for place, line in enumerate(lines[1:], start=1):
+        for heading in (_IDENTIFIER, *_NAMES):
+            cell = line[places[heading]].strip() if heading in places and places[heading] < len(line) else ""
+            if heading == _IDENTIFIER:
+                cell = (re.findall(r"\d+$", cell) or [""])[0]
+            if cell:
+                called.append(((heading, cell.casefold()), place))
+    times = Counter(key for key, _ in called)
+    return {key: place for key, place in called if times[key] == 1}
+
+
+def _place_of(row: TableRow[GradebookView], found: Mapping[tuple[str, str], int]) -> int | None:
+    number_of = moodle_number(row.source)
+    if number_of:
+        return found.get((_IDENTIFIER, number_of))
+    student = row.student
+    names = ((_NAMES[0], student.id), (_NAMES[1], student.email), (_NAMES[2], student.name or student.id))
+    places = (found.get((heading, name.casefold())) for heading, name in names if name)
+    return next((place for place in places if place is not None), None)
+
+
+def _check_maximum(most: Decimal, line: Sequence[str], places: Mapping[str, int]) -> None:
+    try:
+        asked = Decimal(line[places[_MAXIMUM]].replace(",", "."))
+    except (KeyError, InvalidOperation):
+        return
+    if asked != most:
+        raise UsageError(
+            f"the worksheet's Maximum Grade is {number(asked)} and the assignment gives {number(most)} marks; expected "
+            "the same: set the maximum in Moodle and download the worksheet again"
+        )

@@ -1,0 +1,2 @@
+def agent(text):
+    return f"Py saw: {parser(text)}"

@@ -1,0 +1,3 @@
+def agent(text):
+    """Called with the robot's text; parser(...) asks the parser."""
+    return parser(text)

@@ -1,0 +1,3 @@
+def logger(text, response):
+    """Called with the robot's text and the responder's answer."""
+    return 0

@@ -1,0 +1,48 @@
+"""The part that criteria about messages and replies share: they can look at a pair of agents instead of the robot.
+
+No kind of criterion is here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Self
+
+from pydantic import field_validator, model_validator
+
+from submissions.criteria.common import Criterion, Misfit, SomeTexts, Surroundings
+
+_OF_THE_ROBOT = ("is_json", "path", "value", "json_queue", "queue_grows")
+_RESPONDER = "responder"
+
+
+class BetweenAgents(Criterion):
+    """With ``agents = ["agent", "parser"]`` what the first tells the second stands for what the robot sends.
+
+    What the second answers stands for the responder's answers. Either may be the responder.
+    """
+
+    agents: SomeTexts = ()
+
+    @field_validator("agents")
+    @classmethod
+    def _a_pair(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        if len(value) not in (0, 2) or len(set(value)) < len(value):
+            raise ValueError("is no pair, expected [who tells, who is told]")
+        return value
+
+    @model_validator(mode="after")
+    def _of_texts_alone(self) -> Self:
+        other = next((name for name in _OF_THE_ROBOT if self.agents and getattr(self, name, None)), None)
+        if other is not None:
+            shown = "json" if other == "json_queue" else other
+            raise ValueError(f"has {shown} beside agents, expected conditions of the text (a list is its JSON)")
+        return self
+
+    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+        """Both must be there."""
+        yield from super().misfits(around)
+        there = {_RESPONDER, *around.agents}
+        for name in set(self.agents) - there:
+            known = ", ".join(sorted(there)) if around.agents else "an [agents] table with it"
+            yield Misfit("agents", f'agents names "{name[:60]}", expected {known}')

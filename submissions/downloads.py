@@ -1,0 +1,165 @@
+"""Finds whose files are whose in what Moodle, Gradescope and nbgrader let download, and in plain folders.
+
+Opens none of the files but Gradescope's list of them; reading submissions is ``bundle.py``'s.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from submissions.bundle import named_by
+from submissions.people import NAMELESS, NOBODY, Student, told_apart
+from submissions.raw_files import shown
+
+IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
+#: Moodle makes blanks of the underscores in a name, so that the first number between underscores is its own.
+_MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_(?P<plugin>[a-z]+)(?:_(?P<file>.*))?", re.DOTALL)
+#: What can only be a group; any other hyphen may be the student's own.
+_GROUP = re.compile(r"^(?:[^-]*\bgroup\b[^-]*|[^-]*\d)-(?=\D)", re.IGNORECASE)
+_SUFFIX = "assignsubmission_file_"
+_GRADESCOPE_LIST = "submission_metadata.yml"
+_NBGRADER, _NBGRADER_TIME = "submitted", "timestamp.txt"
+
+
+@dataclass(frozen=True, slots=True)
+class StudentFiles:
+    """What lies there of one student, and who that is as it is written there; with a ``problem`` it cannot be used.
+
+    ``files`` is a file or folder, or files by the names that the student gave them.
+    """
+
+    source: str
+    student: Student
+    files: Path | Mapping[str, Path]
+    number: str = ""  # Moodle's, of this person in this assignment
+    assignment: str = ""  # where the platform has several
+    submitted_at: datetime | None = None
+    problem: str = ""
+
+
+def student_files(folder: Path) -> list[StudentFiles]:
+    """What lies in a folder, a row for each student.
+
+    Raises UsageError where the platform's own list of it cannot be read.
+    """
+    entries = _visible(folder)
+    if (folder / _GRADESCOPE_LIST).is_file():
+        return list(_gradescope(folder, entries))
+    if _is_nbgrader(folder, entries):
+        return list(_nbgrader(entries))
+    moodle = {entry: found for entry in entries if (found := _MOODLE.fullmatch(entry.name))}
+    plain = [
+        StudentFiles(shown(entry.name), Student(named_by(entry)), entry) for entry in entries if entry not in moodle
+    ]
+    return [*_moodle(moodle), *plain]
+
+
+def is_one_students(folder: Path) -> bool:
+    """Whether the folder is called as Moodle calls that of one student."""
+    return _MOODLE.fullmatch(folder.name) is not None
+
+
+def moodle_number(source: str) -> str:
+    """The number that Moodle knows a submission by that came under this name; empty if it came from elsewhere."""
+    found = _MOODLE.fullmatch(source)
+    return found["number"] if found else ""
+
+
+def _visible(folder: Path) -> list[Path]:
+    return sorted(entry for entry in folder.iterdir() if not entry.name.startswith(".") and entry.name not in IGNORED)
+
+
+def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[StudentFiles]:
+    """A row for each number: its folder, or the files that begin with it."""
+    by_number: dict[str, list[Path]] = {}
+    for path, match in found.items():
+        by_number.setdefault(match["number"], []).append(path)
+    names = {number: found[paths[0]]["name"] for number, paths in by_number.items()}
+    people = {number: _GROUP.sub("", name, count=1).strip() for number, name in names.items()}
+    ids = told_apart((name, number) for number, name in people.items())
+    for (number, paths), own in zip(by_number.items(), ids, strict=True):
+        name = people[number]
+        hidden = name == NAMELESS
+        student = Student(f"{NAMELESS} {number}") if hidden else Student(own, name)
+        files = {(found[path]["file"] or path.name): path for path in paths if found[path]["plugin"] == "file"}
+        folders = [path for path in files.values() if path.is_dir()]
+        problem = "" if files else "was typed into Moodle's text box, expected files."
+        # Its own name, so that sentences speak of that; shortened, it would lose the number.
+        own_name = folders[0].name if len(folders) == 1 else ""
+        source = own_name if own_name == shown(own_name) != "" else f"{shown(names[number])}_{number}_{_SUFFIX}"
+        yield StudentFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
+
+
+def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]:
+    """A row for each of those who submitted something together."""
+    # Only for who has such a list.
+    from submissions.gradescope_list import read_list
+
+    listed = read_list(folder / _GRADESCOPE_LIST)
+    there = [entry.name for entry in entries if _is_folder(entry)]
+    for name in dict.fromkeys([*listed, *there]):
+        own = listed.get(name)
+        submitters = list(_submitters(own))
+        problem = "" if submitters else f"is nobody's in {_GRADESCOPE_LIST}, expected its submitters there."
+        if name not in there:
+            problem = f"is in {_GRADESCOPE_LIST} and not beside it, expected a folder of that name."
+        when = own.get(":created_at") if isinstance(own, dict) else None
+        for student in submitters or [NOBODY]:
+            yield StudentFiles(shown(name), student, folder / name, submitted_at=_moment(when), problem=problem)
+
+
+def _submitters(own: object) -> Iterator[Student]:
+    listed = own.get(":submitters") if isinstance(own, dict) else None
+    for each in listed if isinstance(listed, list) else []:
+        sid, name, email = (_text(each, key) for key in (":sid", ":name", ":email"))
+        if sid or name or email:
+            yield Student(sid or email or name, name, email)
+
+
+def _text(table: object, key: str) -> str:
+    value = table.get(key) if isinstance(table, dict) else None
+    return value.strip() if isinstance(value, str) and value.strip() not in ("~", "null") else ""
+
+
+def _moment(written: object) -> datetime | None:
+    """When, as Ruby writes it, in a table of its own if it knows its zone; None where it cannot be read."""
+    text = _text(written, "utc") if isinstance(written, dict) else written
+    found = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
+    if found is None:
+        return None
+    zone = found[4] if found[4] and found[4][0] in "+-" else "+00:00"
+    try:
+        return datetime.fromisoformat(f"{found[1]}T{found[2]}{zone}").astimezone(UTC)
+    except ValueError:
+        return None
+
+
+def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
+    """Whether there are folders of students, and in each of those nothing but folders of assignments."""
+    inside = [entry for student in entries if _is_folder(student) for entry in _visible(student)]
+    folders_alone = all(_is_folder(entry) for entry in (*entries, *inside))
+    timed = any((entry / _NBGRADER_TIME).is_file() for entry in inside)
+    return bool(inside) and folders_alone and (timed or folder.name == _NBGRADER)
+
+
+def _nbgrader(entries: Sequence[Path]) -> Iterator[StudentFiles]:
+    for student in entries:
+        for own in _visible(student):
+            files = {path.name: path for path in _visible(own) if path.name != _NBGRADER_TIME and not path.is_dir()}
+            stamp = own / _NBGRADER_TIME
+            when = _beginning(stamp) if stamp.is_file() else ""
+            source = shown(f"{student.name}/{own.name}")
+            yield StudentFiles(source, Student(student.name), files, assignment=own.name, submitted_at=_moment(when))
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
+def _beginning(path: Path) -> str:
+    with path.open("rb") as stream:
+        return stream.read(100).decode("utf-8", "replace").strip()

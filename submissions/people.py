@@ -1,0 +1,157 @@
+"""Who students are: an id, a name, an e-mail address; the table in which a course has them; and who was refused.
+
+Knows no files of theirs; which names can be told apart is ``names.py``'s.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from sim.errors import UsageError
+from submissions.assignment.schema import did_you_mean
+from submissions.csv_table import CsvRow, read_csv
+from submissions.names import shown_name
+from submissions.raw_files import shown
+
+#: What the columns of a table of people are called, here and in Moodle and Gradescope.
+PERSON_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
+    {
+        "id": ("id", "student", "id number", "student id", "sid"),
+        "name": ("name", "full name"),
+        "email": ("email", "email address"),
+    }
+)
+_COLUMNS = {
+    **PERSON_COLUMNS,
+    "first": ("first name",),
+    "last": ("last name", "surname"),
+    "identifier": ("identifier",),
+}
+#: What Moodle calls everybody where names are hidden from who marks.
+NAMELESS = "Participant"
+
+
+@dataclass(frozen=True, slots=True)
+class Student:
+    """Somebody in a course: what the course knows them by, and what else is known of them; empty where nobody said."""
+
+    id: str = ""
+    name: str = ""
+    email: str = ""
+
+
+NOBODY = Student()
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """What was not taken in of a batch: the name it came under, why, and whose it is, as far as that is known."""
+
+    source: str
+    reason: str
+    student: Student = NOBODY
+    assignment: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What came in and why it was refused, for where the student stands beside it."""
+        return f"{self.source}: {self.reason}" if self.source != self.student.id else self.reason
+
+
+@dataclass(frozen=True, slots=True)
+class People:
+    """The people of a course by what other systems call them by; where several are called alike, all of them."""
+
+    file: str
+    numbers: Mapping[str, Student]  # Moodle's, of a person in one assignment
+    called: Mapping[str, tuple[Student, ...]]
+
+    def find(self, written: Student, number: str = "") -> Student:
+        """Who is written so, in a system that may have given them a number.
+
+        Raises UsageError where nobody is, or nobody can say which of several.
+        """
+        whole = {_key(each): each for each in (written.id, written.email, written.name) if each}
+        known = self.numbers.get(number)
+        if known is not None:
+            if written.name in ("", NAMELESS) or _key(written.name).endswith(_key(known.name)):
+                return known
+            raise UsageError(
+                f"{self.file} has {shown(known.name)} as Participant {number}, not {shown(written.name)}; "
+                "expected the table of this very assignment."
+            )
+        # Where students work in groups, Moodle puts the group before the name: Group 1-Ada.
+        for key in (*whole, *(key.partition("-")[2] for key in whole)):
+            found = self.called.get(key, ())
+            if len(found) == 1:
+                return found[0]
+            if found:
+                raise UsageError(
+                    f"{len(found)} people in {self.file} are called {shown(whole.get(key, key))}, expected a table "
+                    "that tells them apart by the Identifier of Moodle's worksheet, or by id."
+                )
+        name = written.name or written.id
+        hint = did_you_mean(name, {each.name or each.id for several in self.called.values() for each in several})
+        raise UsageError(f"{shown(name)} is not in {self.file}, expected one of its people{hint or '.'}")
+
+
+def read_people(path: Path) -> People:
+    """The people of a CSV, Moodle's offline grading worksheet among them. Raises UsageError when it is none."""
+    table = read_csv(path, _COLUMNS, "id, name, email")
+    if not table.columns & {"id", "name", "email", "first", "last"}:
+        raise UsageError(f"{path.name}: has no column id, name or email in its first line, expected one of them.")
+    numbers: dict[str, Student] = {}
+    called: dict[str, list[Student]] = {}
+    for row, student in _students(table.rows, path.name):
+        if number := re.search(r"\d+$", row.cells.get("identifier", "")):
+            numbers[number[0]] = student
+        for key in {_key(each) for each in (student.id, student.email, student.name) if each}:
+            called.setdefault(key, []).append(student)
+    return People(path.name, numbers, {key: tuple(several) for key, several in called.items()})
+
+
+def students_of(people: People) -> list[Student]:
+    """Everybody, once, in the order of the table."""
+    return list(dict.fromkeys(each for several in people.called.values() for each in several))
+
+
+def told_apart(names: Iterable[tuple[str, str]]) -> list[str]:
+    """An id for each (name, number): the name itself, with the number where others have the name too."""
+    names = list(names)
+    times = Counter(name for name, _ in dict.fromkeys(names))
+    return [f"{name} ({number})" if name and times[name] > 1 else name for name, number in names]
+
+
+def _students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Student]]:
+    """Everybody with an id: their own, else their name, with address or number where others have that name."""
+    for row in rows:
+        if row.problem:
+            raise UsageError(f"{file}: line {row.line} {row.problem}")
+    names = [shown_name(row.cells.get("name", "")) or _joined(row) for row in rows]
+    emails = [row.cells.get("email", "") for row in rows]
+    others = [
+        emails[place] or re.sub(r"\D", "", row.cells.get("identifier", "")) or f"line {row.line}"
+        for place, row in enumerate(rows)
+    ]
+    usual = told_apart(zip(names, others, strict=True))
+    ids = [row.cells.get("id") or usual[place] or emails[place] for place, row in enumerate(rows)]
+    times = Counter(map(_key, ids))
+    for row, own, name, email in zip(rows, ids, names, emails, strict=True):
+        if not own:
+            raise UsageError(f"{file}: line {row.line} names nobody, expected an id, a name or an e-mail address.")
+        if times[_key(own)] > 1:
+            raise UsageError(f"{file}: line {row.line}: {shown(own)} is the id of several, expected one for each.")
+        yield row, Student(own, name, email)
+
+
+def _joined(row: CsvRow) -> str:
+    return shown_name(f"{row.cells.get('first', '')} {row.cells.get('last', '')}")
+
+
+def _key(text: str) -> str:
+    return shown_name(text).casefold()

@@ -1,0 +1,1 @@
+OPENERS = ["I am a robot", "my wheels turn"]

@@ -1,0 +1,42 @@
+"""A group has room for all children that live in it at once, and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import cast
+
+from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.manager import Sandboxes
+from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.zygote import FULL
+
+
+class Noted:
+    """Stands for a group, and notes what it was asked for."""
+
+    joining: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self.rooms: list[int] = []
+
+    def make_room(self, limits_bytes: int) -> None:
+        self.rooms.append(limits_bytes >> 20)
+
+    def watch(self) -> Callable[[], bool]:
+        return lambda: False
+
+    def close(self) -> None:
+        """It holds nothing."""
+
+
+def test_there_is_room_for_those_that_live_at_once() -> None:
+    group = Noted()
+    with Sandboxes(FULL, cast(ControlGroup, group)) as sandboxes:
+        first = sandboxes.spawn("robot", ChildLimits(1, 100 << 20))
+        second = sandboxes.spawn("robot", ChildLimits(1, 70 << 20))
+        first.close()
+        third = sandboxes.spawn("robot", ChildLimits(1, 64 << 20))
+        second.close()
+        third.close()
+        sandboxes.spawn("robot", ChildLimits(1, 80 << 20)).close()
+    assert group.rooms == [100, 170, 134, 80]

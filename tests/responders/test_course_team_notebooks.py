@@ -1,0 +1,79 @@
+"""Notebooks as a course team writes them, each from top to bottom: what they print, say, and could not do.
+
+Each is a folder in ``data/notebooks/course_team`` with what lies beside it and what is expected of it.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from models import weights_bytes
+from notebook_builder import NOTEBOOKS
+from responders.notebook_executor import ExecutedNotebook
+from responders.sandbox.running_child import ChildLimits
+from service.commands.run_notebook import LastRun, RunLimits, run_notebook
+from service.grading.trial_runner import TrialRunner
+from submissions.magics import Flags
+from submissions.notebook import read_notebook
+
+FOLDERS = sorted(path.parent for path in (NOTEBOOKS / "course_team").glob("*/expected.toml"))
+_NETWORK = "mlp_shapes_14x14.joblib"
+
+
+def expected_of(folder: Path) -> dict[str, Any]:
+    return tomllib.loads((folder / "expected.toml").read_text())
+
+
+def executed(folder: Path, seconds: float, runner: TrialRunner) -> ExecutedNotebook:
+    read = read_notebook((folder / f"{folder.name}.ipynb").read_bytes(), f"{folder.name}.ipynb")
+    files = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".py"}
+    limits = RunLimits(ChildLimits(10.0, 512 << 20), ChildLimits(5.0, 128 << 20), 1_000_000, seconds)
+    last = LastRun(Flags(), 0, 0)
+    return run_notebook(read.notebook, {_NETWORK: weights_bytes("shapes"), **files}, limits, last, runner)
+
+
+def in_order(wanted: list[str], text: str) -> list[str]:
+    """Those that do not come after the ones before them."""
+    missing, at = [], 0
+    for each in wanted:
+        found = text.find(each, at)
+        if found < 0:
+            missing.append(each)
+        else:
+            at = found + len(each)
+    return missing
+
+
+@pytest.mark.parametrize(
+    "folder",
+    [
+        pytest.param(each, id=each.name, marks=pytest.mark.long if expected_of(each).get("long") else ())
+        for each in FOLDERS
+    ],
+)
+def test_it_runs_from_top_to_bottom(folder: Path, runner: TrialRunner) -> None:
+    expected = expected_of(folder)
+    notebook = executed(folder, expected.get("seconds", 60), runner)
+    assert notebook.stopped is None
+    assert in_order(expected["output"], notebook.output) == []
+    assert len(notebook.runs) == expected["runs"]
+    recordings = [run.recording for run in notebook.runs]
+    assert [line.text for each in recordings for line in each.spoken] == expected.get("spoken", [])
+    answers = [message for each in recordings for message in each.messages if message.sender == "responder"]
+    assert len(answers) == expected.get("answers", len(answers))
+    assert [str(each.verdict) for each in recordings] == expected.get("verdicts", ["finished"] * len(recordings))
+    notes = expected.get("notes", [])
+    assert [note for note in notebook.notes if not note.startswith(tuple(notes))] == []
+    assert [note for note in notes if not any(told.startswith(note) for told in notebook.notes)] == []
+    # Nothing leads to where this machine keeps its modules.
+    told = "\n".join([notebook.output, *notebook.notes, *(fault.message for fault in notebook.raised)])
+    assert re.findall(r"\S*(?:site-packages|/responders/|/lib/python)\S*", told) == []
+
+
+def test_there_are_twelve() -> None:
+    assert len(FOLDERS) == 12

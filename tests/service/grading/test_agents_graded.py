@@ -1,0 +1,198 @@
+"""Grading with agents: whose fault it is, and what criteria and reports make of what they say to each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+
+from responders.code import Code
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.judging.judge import judge
+from service.grading.run_plan import plan_run
+from service.grading.static_analysis import plain_trial
+from service.grading.trial_runner import TrialRunner
+from service.reports.faults import fault_groups
+from service.reports.formats.json_output import json_document
+from service.reports.page import page_of
+from service.reports.plots.sequence import Step, conversation
+from service.reports.view import staff_view
+from service.store.recordings import from_bytes, keep, to_bytes
+from sim.errors import UsageError
+from sim.recording import AgentMessage, AgentOutput, Verdict
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
+from submissions.criteria import SCHEMAS
+from submissions.submission import Cell, Notebook, Submission
+
+ASSIGNMENT = find_assignment("parser-agent-and-logger")
+REFERENCE = read_submission(examples(ASSIGNMENT.id) / "reference", asked=ASSIGNMENT.parts)
+
+
+@pytest.fixture(scope="module")
+def full(runner: TrialRunner) -> Grade:
+    return grade(REFERENCE, ASSIGNMENT, runner=runner)
+
+
+def with_given_parser(text: str) -> Assignment:
+    parts = replace(ASSIGNMENT.parts, agents=MappingProxyType({**ASSIGNMENT.parts.agents, "parser": "given.py"}))
+    return replace(ASSIGNMENT, parts=parts, given_parts={**ASSIGNMENT.given_parts, "given.py": text})
+
+
+@pytest.mark.parametrize(
+    ("parser", "verdict", "told"),
+    [
+        (
+            "def parser(text) return text",
+            Verdict.ASSIGNMENT_ERROR,
+            "the given agent parser cannot be used: SyntaxError",
+        ),
+        ("def parser(text): return text", Verdict.FINISHED, ""),
+        # A student's own message may have brought it about.
+        ("def parser(text): return text / 1", Verdict.RESPONDER_ERROR, "gave no answer: TypeError: unsupported"),
+    ],
+)
+def test_a_given_agents_mistake_is_the_instructors(
+    parser: str, verdict: Verdict, told: str, runner: TrialRunner
+) -> None:
+    result = grade(REFERENCE, with_given_parser(parser), runner=runner)
+    recording = result.trials[0].recording
+    assert result.verdict is verdict
+    assert told in "".join([*recording.notes, *(fault.message for fault in recording.faults)])
+    assert [fault.agent for fault in recording.faults if fault.verdict is Verdict.RESPONDER_ERROR][:1] in (
+        [],
+        ["agent"],
+    )
+
+
+def test_a_given_agent_sees_given_files_alone_and_no_process_sees_anothers_text() -> None:
+    given = replace(with_given_parser("x = 1"), given=MappingProxyType({"table.csv": b"1"}))
+    submission = replace(REFERENCE, files=MappingProxyType({**REFERENCE.files, "own.csv": b"2"}))
+    plan = plan_run(submission, given)
+    assert sorted(plan.agents["parser"].files) == ["table.csv"]
+    assert sorted(plan.agents["agent"].files) == ["own.csv", "table.csv"]
+    assert plan.answers is not None
+    assert sorted(plan.answers.files) == ["own.csv", "table.csv"]
+
+
+def test_a_notebook_is_refused_where_agents_are_asked_for() -> None:
+    notebook = Submission("ada", notebook=Notebook("n.ipynb", (Cell(1, "x = 1"),)))
+    with pytest.raises(UsageError, match=r"n\.ipynb: is a notebook, expected robot\.py and responder\.py beside agent"):
+        plan_run(notebook, ASSIGNMENT)
+
+
+def judged(full: Grade, check: str, **keys: Any) -> tuple[bool, str]:
+    table = {"id": "c", "title": "C", "marks": "1", "check": check, **keys}
+    asked = replace(ASSIGNMENT, criteria=(SCHEMAS[check].model_validate(table),))
+    (result,) = judge(asked, full.trials)
+    return result.marks == 1, result.message
+
+
+@pytest.mark.parametrize(
+    ("check", "keys", "passes", "words"),
+    [
+        ("messages", {"agents": ["responder", "agent"], "exactly": 4}, True, "The responder told the agent"),
+        (
+            "messages",
+            {"agents": ["agent", "responder"], "last": True, "contains": "my"},
+            True,
+            "The last thing that the",
+        ),
+        ("messages", {"agents": ["parser", "logger"], "at_least": 1}, False, "it told the logger nothing"),
+        ("messages", {"equals": "PY::0", "exactly": 1}, True, "The robot sent"),
+        (
+            "replies",
+            {"agents": ["responder", "logger"], "at_least": 4, "matches": "^[1-4]$"},
+            True,
+            "The logger answered",
+        ),
+        ("replies", {"agents": ["responder", "logger"], "equals": "1"}, False, "(1 of 4 answered as expected)"),
+        ("replies", {"agents": ["agent", "parser"], "expect": {"PY::0": 0}}, True, "The parser answered 1 of 1"),
+        ("replies", {"agents": ["agent", "parser"], "expect": {"PY::0": "0"}}, False, 'but it answered "0"'),
+        ("replies", {"agents": ["agent", "parser"], "expect": {"PY::5": 5}}, False, "but it never was"),
+        ("replies", {"agents": ["logger", "parser"]}, False, "of the logger's messages, but none reached it"),
+    ],
+)
+def test_criteria_look_at_a_pair_of_agents(
+    check: str, keys: dict[str, Any], passes: bool, words: str, full: Grade
+) -> None:
+    passed, message = judged(full, check, **keys)
+    assert passed is passes, message
+    assert words in message
+
+
+def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
+    recording = full.trials[0].recording
+    page = page_of(staff_view(full), REFERENCE)
+    scene = page.scenes[0]
+    assert [line.sender for line in scene.messages[:4]] == [
+        "robot",
+        "responder → agent",
+        "agent → parser",
+        "parser → agent",
+    ]
+    assert [each.agent for each in scene.agents] == ["agent", "logger", "parser"]
+    assert "Received message: PY::0" in scene.agents[1].log
+    (trial,) = json_document(staff_view(full))["trials"]
+    assert trial["agent_messages"][2]["text"] == "0"
+    assert len(plain_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24
+    told = conversation(recording)
+    assert told.parties == ("robot", "responder", "parser", "agent", "logger")
+    first = [(step.source, step.target, step.kind) for step in told.steps[:4] if isinstance(step, Step)]
+    assert first == [
+        ("robot", "responder", "message"),
+        ("responder", "agent", "call"),
+        ("agent", "parser", "call"),
+        ("parser", "agent", "return"),
+    ]
+
+
+def test_an_agent_of_any_name_has_a_lane(full: Grade) -> None:
+    recording = full.trials[0].recording
+    asked = AgentMessage(0.0, "responder", "translator", "PY::0", 0)
+    other = replace(recording, agent_messages=(asked,), agent_outputs=(AgentOutput("translator", "", ""),))
+    assert conversation(other).parties == ("robot", "responder", "translator")
+
+
+def test_a_fault_is_told_with_the_agents_own_line(runner: TrialRunner) -> None:
+    files = {**REFERENCE.files, "parser.py": b"def parser(text):\n    return 1 / 0\n"}
+    submission = replace(REFERENCE, files=MappingProxyType(files))
+    result = grade(submission, ASSIGNMENT, runner=runner)
+    group = fault_groups(result, submission)[0]
+    assert group.where == "Agent parser (parser.py), line 2"
+    assert [line.text for line in group.excerpt if line.marked] == ["    return 1 / 0"]
+    assert "An agent of yours raised an error" in page_of(staff_view(result), submission).words.happened
+
+
+def test_recordings_with_agents_are_kept_and_cut_like_others(full: Grade) -> None:
+    recording = full.trials[0].recording
+    again = from_bytes(to_bytes(recording))
+    assert again.agent_messages == recording.agent_messages
+    assert again.agent_outputs == recording.agent_outputs
+    flood = tuple(replace(recording.agent_messages[0], text=f"{n:x}" * 40) for n in range(20_000))
+    outputs = tuple(replace(each, log="".join(map(str, range(200_000)))) for each in recording.agent_outputs)
+    cut = keep(replace(recording, agent_messages=flood, agent_outputs=outputs), 60_000).recording
+    assert len(cut.agent_messages) < 20_000
+    assert all(len(each.log) <= 2000 for each in cut.agent_outputs)
+    assert cut.sha256 == recording.sha256
+
+
+def test_avoided_modules_are_avoided_by_agents_too() -> None:
+    avoids = SCHEMAS["source"].model_validate(
+        {"id": "s", "title": "S", "marks": "1", "check": "source", "part": "responder", "avoids": ["import sklearn"]}
+    )
+    plan = plan_run(REFERENCE, replace(ASSIGNMENT, criteria=(*ASSIGNMENT.criteria, avoids)))
+    assert {name: each.limits.without for name, each in plan.agents.items()} == dict.fromkeys(plan.agents, ("sklearn",))
+
+
+def test_a_submission_without_an_agent_is_refused(tmp_path: Path) -> None:
+    files = {name: data for name, data in REFERENCE.files.items() if name != "logger.py"}
+    lacking = Submission("ada", responder=Code("responder.py", "x = 1"), files=MappingProxyType(files))
+    with pytest.raises(UsageError, match=r"no agent logger; parser-agent-and-logger asks for logger\.py"):
+        plan_run(lacking, ASSIGNMENT)

@@ -1,0 +1,67 @@
+"""A judge measures nothing but what its criterion says, so that what can be ranked is a closed list."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from driving import along, driven, judged, rest, spin, straight
+from paths import ROOT
+from sim.floors.centrelines import centrelines
+from sim.recording import Datum, Line, Message, Recording
+from submissions.criteria import SCHEMAS
+
+DOCUMENT = (ROOT / "docs" / "criteria.md").read_text()
+TABLES = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)]
+#: Judged by more than their trials.
+APART = {"ranking", "python", "source", "functions"}
+SQUARE = [each for _ in range(4) for each in (straight(100), rest(), spin(90), rest())]
+#: Words that the examples of the documents look for.
+TOLD = tuple(Line(t / 10, text) for t, text in enumerate(["3", "2", "1", "0", "OK", "medium", "2", "all", "done"]))
+
+
+def runs() -> list[Recording]:
+    log = tuple(Datum(t / 10, "Colour", 100.0, None) for t in range(1, 50))
+    sent = tuple(Message(float(t), "robot", f"PY::{t}", float(t)) for t in range(3))
+    square = driven(*SQUARE, spoken=TOLD, printed=TOLD, datalog=log, messages=sent)
+    there = driven(straight(100), rest(), straight(-100), straight(200, 2), straight(-200), rest())
+    corners = np.array(centrelines()["Thruxton_Circuit"] * 2)
+    circuit = along(corners, np.zeros(len(corners)))
+    return [driven(), square, there, replace(there, background="Simple_Shapes"), circuit]
+
+
+@pytest.mark.parametrize(
+    "table", [pytest.param(each, id=each["title"]) for each in TABLES if each["check"] not in APART]
+)
+def test_what_is_measured_is_listed(table: dict[str, object]) -> None:
+    keys = {"id": "c"} | table
+    asked = SCHEMAS[str(table["check"])].model_validate_json(json.dumps(keys))
+    measured = {measure.name for run in runs() for each in judged(asked, run).evidence for measure in each.measures}
+    # What was done in the place of a move is told of trials that failed alone, and they are never ranked.
+    assert [name for name in measured if not (asked.measures_a(name) or name.startswith("this move "))] == []
+    assert bool(measured) or not asked.measures or table["check"] in ("reports", "events", "sequence")
+
+
+@pytest.mark.parametrize(
+    ("check", "name", "known"),
+    [
+        ("laps", "lap time", True),
+        ("laps", "lap times", False),
+        ("moves", "move 12 turn", True),
+        ("moves", "move 0 turn", False),
+        ("moves", "move # turn", False),
+        ("collects", "different: right facing triangle", True),
+        ("collects", "different: ", False),
+        ("python", "anything", True),
+        ("finishes", "", False),
+        ("classification", "accuracy", False),
+    ],
+)
+def test_names_with_numbers_and_words(check: str, name: str, known: bool) -> None:
+    table = next(each for each in TABLES if each["check"] == check)
+    assert SCHEMAS[check].model_validate(table | {"marks": str(table["marks"])}).measures_a(name) is known

@@ -1,0 +1,69 @@
+"""One part of two that was not submitted: what needs it has no marks for that alone, the rest is judged as ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+from service.reports.formats.json_output import json_document
+from service.reports.formats.text import plain_text
+from service.reports.html import report
+from service.reports.view import staff_view, student_view
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
+from submissions.criteria import SCHEMAS
+
+#: Assignment, the part that is submitted, the marks of the reference for that alone, by criterion.
+CASES = [
+    ("echo-responder", "robot.py", {"finishes": 1, "counts": 2, "messages": 2, "replies": 0, "says": 1}),
+    ("echo-responder", "responder.py", {"finishes": 0, "counts": 0, "messages": 0, "replies": 4, "says": 0}),
+]
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[TrialRunner]:
+    with TrialRunner() as made:
+        yield made
+
+
+@pytest.mark.parametrize(("assignment", "part", "marks"), CASES)
+def test_what_is_there_is_graded(
+    assignment: str, part: str, marks: dict[str, int], runner: TrialRunner, tmp_path: Path
+) -> None:
+    own = tmp_path / "ada"
+    own.mkdir()
+    (own / part).write_bytes((examples(assignment) / "reference" / part).read_bytes())
+    asked = find_assignment(assignment)
+    graded = grade(read_submission(own, asked=asked.parts), asked, runner=runner)
+    assert {result.id: result.marks for result in graded.criteria} == marks
+    (lacking,) = {"robot.py", "responder.py"} - {part}
+    assert graded.missing == lacking
+    lost = [result.message for result in graded.criteria if not result.marks]
+    assert set(lost) == {f"There is no {lacking}."}
+    for told in (plain_text(staff_view(graded)), report(student_view(graded), {})):
+        assert f"There is no {lacking}, so" in told
+        assert f"Submit {lacking} beside {part}" in told
+    assert json_document(staff_view(graded))["missing"] == lacking
+
+
+def test_a_responder_is_asked_alike_whenever_it_is_graded(runner: TrialRunner, tmp_path: Path) -> None:
+    asked = find_assignment("echo-responder")
+    (tmp_path / "responder.py").write_text("def responder(msg):\n    raise ValueError(msg)\n")
+    submission = read_submission(tmp_path, asked=asked.parts)
+    first, second = (grade(submission, asked, runner=runner) for _ in range(2))
+    assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
+    assert "error in the responder; no robot.py" in plain_text(staff_view(first))
+
+
+def test_each_criterion_needs_some_part() -> None:
+    defaults = {name: schema.model_construct(check=name) for name, schema in SCHEMAS.items()}
+    needed = {name: criterion.parts_needed for name, criterion in defaults.items() if name not in ("replies", "source")}
+    assert needed["functions"] == {"responder"}
+    assert needed["classification"] == {"program", "responder"}
+    assert needed["pose"] == {"program"}
+    assert all(parts for parts in needed.values())

@@ -1,0 +1,186 @@
+"""Naming everything is not finding it: each kind that looks for something among much, honest and sprayed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Any
+
+import pytest
+
+from driving import criterion, driven, judged, straight
+from service.grading.judging.outcome import failed, passed
+from service.grading.judging.precision import Strays, tempered
+from sim.recording import Datum, Line, Message, Recording
+from submissions.criteria import SCHEMAS
+from submissions.criteria.common import AmongMany
+
+ZONES = [{"text": "1", "zone": [120, 0, 140, 1143]}, {"text": "2", "zone": [160, 0, 180, 1143]}]
+BEGINNINGS, ENDS = (
+    ("all", "it is", "now", "I am", "we are", "you are"),
+    ("done", "over", "there", "up", "ready", "finished", "in"),
+)
+ENDS += tuple(f"{word} now" for word in ENDS)
+GUESSES = tuple(map(str, range(100)))
+
+
+def drove(**parts: Any) -> Recording:
+    """At 30 mm a second along x from x = 100, with the left sensor 30 mm ahead, over white."""
+    return driven(straight(90, per_tick=1), **parts)
+
+
+def told(*texts: str, every: float = 0.02) -> tuple[Line, ...]:
+    return tuple(Line(number * every, text) for number, text in enumerate(texts))
+
+
+def sent(*texts: str) -> tuple[Message, ...]:
+    return tuple(Message(number * 0.02, "robot", text, number * 0.02) for number, text in enumerate(texts))
+
+
+def logged(*values: float, every: float = 0.02) -> tuple[Datum, ...]:
+    return tuple(Datum(0.5 + number * every, "Light", value, None) for number, value in enumerate(values))
+
+
+#: The kind, what it asks, what an honest program puts out (all marks), and what one does that names everything.
+CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
+    (
+        "events",
+        {"events": ZONES, "source": "speech"},
+        {"spoken": (Line(0.1, "1"), Line(0.2, "now 1"), Line(0.7, "looking for 2"), Line(1.2, "2"))},
+        {"spoken": (*(Line(t / 30, "1") for t in range(20)), *(Line(t / 30, "2") for t in range(31, 89)))},
+    ),
+    (
+        "prints",
+        {"in_order": ["3", "2", "1"], "compare": "contains", "starts_with": "Count"},
+        {"printed": told("Light 86.2", "Count 3", "Count 2", "Light 12", "Count 1", *["Light 100"] * 300)},
+        {"printed": told(*[f"Count {number % 10}" for number in range(40)])},
+    ),
+    (
+        "prints",
+        {"in_order": ["3", "2", "1"], "compare": "contains"},
+        {"printed": told("3 to go", "2 to go", "1 to go", *[f"Light {value}" for value in range(40, 60)])},
+        {"printed": told(*["1 2 3"] * 10)},
+    ),
+    (
+        "prints",
+        {"starts_with": "I predict", "among": ["left", "right"], "contains": "right"},
+        {"printed": told("I predict: it turns right")},
+        {"printed": told("I predict: left or right")},
+    ),
+    (
+        "prints",
+        {"equals": "The answer is 42"},
+        {"printed": told(*[f"Light: {value}" for value in range(100)], "The answer is 42")},
+        {"printed": told(*[f"The answer is {guess}" for guess in GUESSES])},
+    ),
+    (
+        "says",
+        {"equals": "all done"},
+        {"spoken": told("I begin", "there it is", "one more", "all done")},
+        {"spoken": told(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])},
+    ),
+    (
+        "messages",
+        {"in_order": ["PY::0", "PY::2"]},
+        {"messages": sent("PY::0", "PY::1", "PY::2", "IMG_DATA::{}")},
+        {"messages": sent(*["PY::2", "PY::0"] * 8)},
+    ),
+    (
+        "messages",
+        {"in_order": ["PY::1", "PY::2"]},
+        {"messages": sent("PY::1", "PY::1", "PY::1", "PY::2", "PY::2", "PY::2", "PY::bye")},
+        {"messages": sent(*[f"PY::{guess}" for guess in GUESSES])},
+    ),
+    (
+        "messages",
+        {"equals": "PY::17"},
+        {"messages": sent("PY::hello", "PY::17")},
+        {"messages": sent(*[f"PY::{guess}" for guess in GUESSES])},
+    ),
+    (
+        "sequence",
+        {"words": ["1", "2", "3"], "lead_in": True, "more": True},
+        {"spoken": told("In 1 minute I count", "1", "2", "3", "and that was it")},
+        {"spoken": told(*["1 3", "2 1", "3 2", "1 2 3"] * 5)},
+    ),
+    (
+        "reports",
+        {"expected": [[17]]},
+        # What was read, and the count of the readings, may be told all the way.
+        {"printed": tuple(Line(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + told("17")},
+        {"printed": told(*GUESSES, every=0)},
+    ),
+    (
+        "reports",
+        {"expected": [["rows", 7], ["rows", 9], ["rows", 11]], "source": "reply"},
+        {"messages": (Message(0, "responder", '{"rows": 7, "columns": 9, "black": 49, "box": [3, 4, 9, 12]}', 0.1),)},
+        {"messages": (Message(0, "responder", '{"rows": [7, 8, 9, 10, 11]}', 0.1),)},
+    ),
+    (
+        "datalog",
+        {"series": "Light", "measured": "left light", "at_least": 20},
+        {"datalog": logged(*[100] * 25, 37, 38, 39)},
+        {"datalog": logged(*[float(guess) for guess in range(0, 101, 5)] * 20, every=0.005)},
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("check", "keys", "honest", "sprayed"), CASES)
+def test_naming_everything_earns_less_than_a_third_and_honest_work_all(
+    check: str, keys: dict[str, Any], honest: dict[str, Any], sprayed: dict[str, Any]
+) -> None:
+    asked = criterion(check, over="mean", **keys)
+    fair, unfair = judged(asked, drove(**honest)), judged(asked, drove(**sprayed))
+    assert fair.marks == fair.max_marks, fair.message
+    assert 3 * unfair.marks < unfair.max_marks, unfair.message
+
+
+def test_every_kind_that_looks_among_much_has_its_case() -> None:
+    looking = {check for check, schema in SCHEMAS.items() if issubclass(schema, AmongMany)}
+    assert looking == {check for check, *_ in CASES}
+
+
+@pytest.mark.parametrize(
+    ("forgiven", "wanted", "misplaced", "others", "score"),
+    [
+        (None, 4, 4, 0, 1),
+        (None, 4, 8, 0, "0.5"),
+        (None, 1, 0, 20, 1),
+        (None, 1, 0, 80, "0.25"),
+        (None, 1, 1, 20, "0.5"),
+        (0, 4, 0, 0, 1),
+        (0, 4, 4, 0, "0.5"),
+        (100, 1, 50, 0, 1),
+    ],
+)
+def test_strays_that_are_not_forgiven_count_like_more_that_did_not_come(
+    forgiven: int | None, wanted: int, misplaced: int, others: int, score: str | int
+) -> None:
+    asked = criterion("says", at_least=1, strays=forgiven)
+    assert isinstance(asked, AmongMany)
+    strays = Strays("more came", misplaced, others)
+    outcome = tempered(passed("All came."), asked, wanted, strays)
+    assert (outcome.score, outcome.passed) == (Decimal(score), score == 1)
+    assert ("more came" in outcome.message) == (score != 1)
+    half = tempered(failed("Half came.", score=outcome.score / 2), asked, wanted, strays)
+    assert half.score == outcome.score**2 / 2
+
+
+def test_what_may_not_come_too_often_is_not_looked_for() -> None:
+    many = told(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])
+    asked = criterion("prints", contains="done", at_most=20)
+    assert judged(asked, drove(printed=many)).marks == 4
+
+
+def test_a_loop_that_is_stuck_on_one_text_names_nothing_else() -> None:
+    asked = criterion("prints", in_order=["0", "1", "2"], compare="contains", over="mean", starts_with="Robot")
+    result = judged(asked, drove(printed=told("Robot 0", *["Robot 1"] * 50)))
+    assert result.marks == Decimal("2.67")
+
+
+def test_a_log_is_called_made_up_where_most_of_it_is() -> None:
+    """140 samples, of which two are what the sensor read."""
+    asked = criterion("datalog", series="Light", measured="left light", at_least=40)
+    result = judged(asked, drove(datalog=logged(100, 100, *[17.0] * 138)))
+    assert "at least 40 samples of Light, but there are 2; 138 of 140 are made up" in result.message
+    assert "not what the left light sensor read" in result.message

@@ -1,0 +1,100 @@
+"""Grades of two robots in the store, in traces, in reports: what each did is told once, and of whom."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+from service.reports.faults import fault_groups
+from service.reports.formats.json_output import json_document
+from service.reports.page import page_of
+from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.plots.sequence import Step, conversation
+from service.reports.trace import trace
+from service.reports.view import staff_view
+from service.store.recordings import from_bytes, keep, to_bytes
+from sim.recording import Recording, Verdict
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
+
+
+def graded(assignment: str, example: str, runner: TrialRunner) -> Grade:
+    asked = find_assignment(assignment)
+    return grade(read_submission(examples(assignment) / example, asked=asked.parts), asked, runner=runner)
+
+
+@pytest.fixture(scope="module")
+def relayed(runner: TrialRunner) -> Grade:
+    return graded("relay-a-message", "reference", runner)
+
+
+@pytest.fixture(scope="module")
+def crashed(runner: TrialRunner) -> Grade:
+    return graded("meet-at-the-shape", "looks-too-soon", runner)
+
+
+def partner_of(recording: Recording) -> Recording:
+    assert recording.partner is not None
+    return recording.partner
+
+
+def test_a_stored_recording_has_its_partner(relayed: Grade) -> None:
+    recording = relayed.trials[0].recording
+    back = from_bytes(to_bytes(recording))
+    assert to_bytes(back) == to_bytes(recording)
+    assert partner_of(back).ticks.x.tolist() == partner_of(recording).ticks.x.tolist()
+    assert partner_of(back).messages == partner_of(recording).messages
+    assert from_bytes(to_bytes(replace(recording, partner=None))).partner is None
+
+
+def test_what_is_too_large_of_either_is_cut(relayed: Grade) -> None:
+    kept = keep(relayed.trials[0].recording, 2500)
+    assert len(kept.data) <= 2500
+    assert all("too large" in each.notes[-1] for each in (kept.recording, partner_of(kept.recording)))
+
+
+def test_traces_and_json_have_both(relayed: Grade) -> None:
+    recording = relayed.trials[0].recording
+    told = trace(recording)
+    assert told["partner"]["spoken"] == [[line.t, line.text] for line in partner_of(recording).spoken]
+    document = json.loads(json.dumps(json_document(staff_view(relayed))))
+    assert document["trials"][0]["partner"]["spoken"] == ["I see grey"]
+    assert document["trials"][0]["spoken"] == []
+
+
+def test_the_diagram_has_a_lane_for_each_and_every_text_once(relayed: Grade, crashed: Grade) -> None:
+    told = conversation(relayed.trials[0].recording, most_exchanges=50)
+    assert told.parties == ("robot", "responder", "robot 2")
+    arrows = [(step.source, step.target) for step in told.steps if isinstance(step, Step)]
+    assert arrows.count(("robot", "responder")) == arrows.count(("responder", "robot")) == 1
+    assert arrows.count(("robot 2", "responder")) == arrows.count(("responder", "robot 2")) == 4
+    linked = conversation(crashed.trials[0].recording)
+    assert linked.parties == ("robot", "robot 2")
+    assert [(step.kind, step.source, step.target) for step in linked.steps if isinstance(step, Step)] == [
+        ("lost", "robot", "robot 2")
+    ]
+
+
+def test_a_fault_of_the_second_program_is_called_so(crashed: Grade) -> None:
+    assert crashed.verdict is Verdict.PROGRAM_ERROR
+    (group,) = fault_groups(crashed)
+    assert group.where == "Program of the second robot, line 10"
+    (scene,) = page_of(staff_view(crashed)).scenes
+    assert [entry.text for entry in scene.timeline if entry.kind == "fault"] == [
+        "robot 2: IndexError: list index out of range"
+    ]
+    assert [message.sender for message in scene.messages] == ["robot"]
+
+
+def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
+    drawn = draw_all(relayed)
+    assert len(drawn) == 4
+    told = {plot.kind: plot.alt for plot in plots_of(relayed)}
+    assert "The second robot's from (2000, 200) mm to (2000, 200) mm." in told["path"]
+    assert "the robot sent 1 messages, robot 2 4, the responder 5" in told["conversation"]

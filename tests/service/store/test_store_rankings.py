@@ -1,0 +1,61 @@
+"""What an assignment ranks, read across a batch that is graded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+
+import report_builders
+from builders import echo, grading_request
+from service.grading.grade import CriterionResult, Evidence, Measure
+from service.store import batches, jobs, rankings, results
+from service.store.engine import Store
+from service.store.intake import accept_batch
+from submissions.assignment.reader import find_assignment
+from submissions.grading_request import GradingRequest
+
+
+def graded(store: Store, requests: list[GradingRequest], laps: dict[str, tuple[float | None, ...]]) -> str:
+    """A batch in which these lap times were measured, trial by trial; None where a lap did not count."""
+    batch = accept_batch(store, "class", requests, [], max_attempts=2).id
+    for _ in requests:
+        claim = jobs.claim(store, "worker", 60)
+        assert claim is not None
+        with store.reading() as session:
+            student = batches.job_line(session, claim.job_id).student
+        evidence = tuple(
+            Evidence(0, lap is not None, "", measures=() if lap is None else (Measure("lap time", lap, "s"),))
+            for lap in laps[student]
+        )
+        fast = CriterionResult("fast", "Drives it fast", Decimal(1), Decimal(5), "", evidence=evidence)
+        grade = replace(report_builders.line_follower_grade(3), criteria=(fast,))
+        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    return batch
+
+
+def test_a_batch_has_a_table_for_each_ranking(store: Store) -> None:
+    circuit = find_assignment("fastest-lap-of-thruxton")
+    laps: dict[str, tuple[float | None, ...]] = {
+        "ada": (40.0, 42.0),
+        "bob": (41.0, None),
+        "cyd": (None,),
+        "dan": (60.0,),
+    }
+    requests = [replace(grading_request(student), assignment=circuit) for student in laps]
+    batch = graded(store, requests, laps)
+    with store.reading() as session:
+        (table,) = rankings.rank_tables(session, batches.job_lines(session, batch))
+    assert (table.assignment, table.measure, table.unit) == ("fastest-lap-of-thruxton", "lap time", "s")
+    assert table.texts == [
+        ("1=", "ada", "41.00", "28.29 to 53.71", "2 of 2"),
+        ("1=", "bob", "41.00", "", "1 of 2"),
+        ("3", "dan", "60.00", "", "1 of 1"),
+        ("", "cyd", "none", "", "0 of 1"),
+    ]
+
+
+def test_what_ranks_nothing_has_no_table(store: Store) -> None:
+    batch = graded(store, [replace(grading_request("ada"), assignment=echo())], {"ada": (40.0,)})
+    with store.reading() as session:
+        assert rankings.rank_tables(session, batches.job_lines(session, batch)) == []
