@@ -66,12 +66,12 @@ CONTAINERS := $(shell which docker podman 2>/dev/null | head -n 1)
 image: wheel
 	$(CONTAINERS) build -f deploy/Dockerfile -t robomark .
 
-# Needs uv; the lock files name no package index. The second is for images: what grading needs, and nothing for tests.
+# Needs uv; the lock files name no package index. The second is for images: what grading needs or may use, and nothing for tests.
 LOCK := uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11 pyproject.toml
 
 lock:
 	$(LOCK) --extra test -o requirements.lock
-	$(LOCK) --no-annotate -c requirements.lock -o deploy/requirements.lock
+	$(LOCK) --extra tflite --no-annotate -c requirements.lock -o deploy/requirements.lock
 
 clean:
 	rm -rf $(VENV) dist .mypy_cache .ruff_cache .pytest_cache robomark-demo

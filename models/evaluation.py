@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from models import networks
 from models.cards import Card, CardCurve, Measured, Tally, card, weights_bytes
 from models.images import LabelledPose, Photographer, Shift
+from models.networks import Network, read
 from models.preprocessing import Grey, features
 from models.tasks import Task, tasks
 
@@ -23,14 +22,6 @@ Axis = Literal["x", "y", "heading", "noise"]
 _LIGHT_NOISES: tuple[float, ...] = (0, 10, 32, 64, 96, 128)
 _MILLIMETRES: tuple[float, ...] = (-6, -4, -3, -2, -1, 0, 1, 2, 3, 4, 6)
 _DEGREES: tuple[float, ...] = (-8, -5, -3, -2, -1, -0.5, 0, 0.5, 1, 2, 3, 5, 8)
-
-
-class Network(Protocol):
-    """What can be measured."""
-
-    def predict(self, images: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The class number of each row."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +51,7 @@ class Evaluation:
 def evaluate(name: str) -> Evaluation:
     """Run the packaged classifier over its whole test. Raises UsageError for an unknown name."""
     about = card(name)
-    measured, answered = measure(tasks()[name], networks.read(weights_bytes(name)))
+    measured, answered = measure(tasks()[name], read(about.file, weights_bytes(name)))
     return Evaluation(about, measured, answered)
 
 
@@ -97,6 +88,9 @@ def _curves(task: Task, network: Network, photographer: Photographer) -> Iterato
         for noise in task.test().noises_beside:
             words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
             yield _curve(task, network, photographer, words, values, Shift(noise=noise), axis)
+    for altered in task.test().altered:
+        tallies = tuple(_tally(task, network, list(altered.seen(value))) for value in altered.values)
+        yield CardCurve(altered.varied, altered.unit, altered.under, altered.values, tallies)
 
 
 def _curve(
@@ -111,8 +105,12 @@ def _curve(
     test = task.test()
     tallies = []
     for value in values:
-        found = list(photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws))
-        answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
-        right = sum(place.label == answer for (place, _), answer in zip(found, answers, strict=True))
-        tallies.append(Tally(int(right), len(found)))
+        found = photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws)
+        tallies.append(_tally(task, network, [(place.label, grey) for place, grey in found]))
     return CardCurve(*words, tuple(float(value) for value in values), tuple(tallies))
+
+
+def _tally(task: Task, network: Network, seen: Sequence[tuple[int, Grey]]) -> Tally:
+    answers = network.predict(np.array([features(grey, task.side) for _, grey in seen]))
+    right = sum(label == answer for (label, _), answer in zip(seen, answers, strict=True))
+    return Tally(int(right), len(seen))

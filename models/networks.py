@@ -1,63 +1,45 @@
-"""Fitting a multi-layer perceptron and writing it down, so that training again gives the same bytes.
+"""A network from the file that its card describes, whichever library its family is written for.
 
-What it is trained on is the business of ``families/``; the process is set up by ``training.py``.
+Fitting one is the business of ``perceptrons.py`` and ``convolutions.py``.
 """
 
 from __future__ import annotations
 
-import io
-import warnings
+from typing import Any, Protocol
 
-import joblib
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.neural_network import MLPClassifier
 
 from models.preprocessing import Vector
-from models.tasks import Plan
-
-_DECIMALS = 4
 
 
-def fit(plan: Plan, images: Vector, labels: NDArray[np.int64]) -> MLPClassifier:
-    """A network for ``images`` of shape (n, inputs) and their class numbers, its weights rounded."""
-    network = MLPClassifier(
-        hidden_layer_sizes=(plan.hidden,), alpha=plan.decay, tol=0, n_iter_no_change=10_000, batch_size=200,
-        warm_start=True, random_state=plan.seed,
-    )  # fmt: skip
-    with warnings.catch_warnings():
-        # The passes are counted out; that the loss might fall further is no news.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        for step, passes in plan.stages:
-            network.set_params(learning_rate_init=step, max_iter=passes)
-            network.fit(images, labels)
-    _settle(network)
+class Network(Protocol):
+    """What can be measured."""
+
+    def predict(self, images: Vector) -> NDArray[np.int64]:
+        """The class number of each row."""
+        ...
+
+
+def read(file: str, data: bytes) -> Network:
+    """The network in the bytes of ``file``, whose hash stands on a card; never for anybody else's."""
+    if file.endswith(".onnx"):
+        return _OnnxSession(data)
+    from models import perceptrons
+
+    network: Network = perceptrons.read(data)
     return network
 
 
-def _settle(network: MLPClassifier) -> None:
-    """Round the weights, so that last bits do not show, and drop what only the fitting needs."""
-    network.coefs_ = [np.ascontiguousarray(np.round(weights, _DECIMALS), np.float32) for weights in network.coefs_]
-    network.intercepts_ = [np.round(weights, _DECIMALS).astype(np.float32) for weights in network.intercepts_]
-    network.loss_ = network.best_loss_ = round(float(network.loss_), 2)
-    network.loss_curve_ = []
-    for left_over in ("_optimizer", "_random_state", "_best_coefs", "_best_intercepts"):
-        delattr(network, left_over)
+class _OnnxSession:
+    def __init__(self, data: bytes) -> None:
+        import onnxruntime
 
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        self._session: Any = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
 
-def written(network: MLPClassifier) -> bytes:
-    """The network as joblib writes it."""
-    file = io.BytesIO()
-    joblib.dump(network, file)
-    return file.getvalue()
-
-
-def read(data: bytes) -> MLPClassifier:
-    """A network from bytes whose hash stands on a card; never for anybody else's."""
-    return joblib.load(io.BytesIO(data))
-
-
-def architecture(plan: Plan, inputs: int, classes: int) -> str:
-    """The layers in words."""
-    return f"multi-layer perceptron {inputs}-{plan.hidden}-{classes}, ReLU, Adam"
+    def predict(self, images: Vector) -> NDArray[np.int64]:
+        (asked,) = self._session.get_inputs()
+        (shares,) = self._session.run(None, {asked.name: images.astype(np.float32).reshape(-1, *asked.shape[1:])})
+        return np.asarray(shares.argmax(axis=1), np.int64)

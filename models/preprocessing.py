@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from sim.chance import Stream
 from sim.recording import SENSOR_SIDE
 
 Grey = NDArray[np.uint8]
@@ -31,6 +32,12 @@ def focus(rgba: bytes) -> Grey:
 def luma(rgb: NDArray[np.integer]) -> Grey:
     """Grey of RGB values 0 to 255, shape (..., 3), rounded as Pillow does."""
     return np.asarray((rgb.astype(np.int64) @ _LUMA + 0x8000) >> 16, np.uint8)
+
+
+def noisy(grey: Grey, noise: int, chance: Stream, draw: int) -> Grey:
+    """With the light sensor's noise in each of the three colours, as ``sim/sensors.py`` has it."""
+    offsets = chance.uniforms(draw, grey.size * 3).reshape(*grey.shape, 3) * (2 * noise) - noise
+    return luma(np.clip(np.floor(grey[..., None] + offsets + 0.5), 0, 255).astype(np.uint8))
 
 
 def features(grey: Grey, side: int = SIDE) -> Vector:

@@ -7,27 +7,46 @@ All are trained and measured by the same code.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.images import LabelledPose
-from models.preprocessing import Vector
+from models.preprocessing import Grey, Vector
 
 Examples = tuple[Vector, NDArray[np.int64]]
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How a network is fitted: one hidden layer, and stages of (step size of Adam, passes over all images)."""
+class Plan(Protocol):
+    """How a network is fitted, and what its file is."""
 
-    hidden: int
-    stages: tuple[tuple[float, int], ...]
-    decay: float  # the weight of the squared weights in what is minimised
-    seed: int
+    @property
+    def seed(self) -> int:
+        """What its chance comes from."""
+        ...
+
+    def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
+        """The file of a network for ``images`` of shape (n, inputs) and their class numbers; again the same bytes."""
+        ...
+
+    def architecture(self, inputs: int, classes: int) -> str:
+        """The layers in words."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Altered:
+    """A test of images that no packaged floor shows: what is varied over which values, and what is seen at each."""
+
+    varied: str
+    unit: str
+    under: str
+    values: tuple[float, ...]  # ascending
+    seen: Callable[[float], Iterable[tuple[int, Grey]]]  # the number of the class, and the focus
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +54,8 @@ class Test:
     """Where a classifier is tested: ``places`` for its accuracy, some of them for its curves.
 
     ``noises`` are those at which its accuracy is counted, each (grey levels, draws at a place); ``noises_beside`` those
-    at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise.
+    at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise;
+    ``altered`` are curves beyond those.
     """
 
     places: tuple[LabelledPose, ...]
@@ -44,6 +64,7 @@ class Test:
     noises_beside: tuple[float, ...]
     draws: int
     words: str
+    altered: tuple[Altered, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,20 +58,19 @@ def train(name: str, folder: Path) -> Card:
 
 
 def _main(name: str, folder: Path) -> None:
-    from models import networks
     from models.evaluation import measure
+    from models.networks import read
 
     task = tasks()[name]
     images, labels = task.examples()
-    network = networks.fit(task.plan, images, labels)
-    data = networks.written(network)
-    measured, _ = measure(task, network)
+    data = task.plan.fit(images, labels)
+    measured, _ = measure(task, read(task.file, data))
     resized = "" if task.side == 14 else f", resized to {task.side} x {task.side} by LANCZOS"
     card = Card(
         name=name,
         file=task.file,
         task=task.words,
-        architecture=networks.architecture(task.plan, task.side**2, len(task.classes)),
+        architecture=task.plan.architecture(task.side**2, len(task.classes)),
         preprocessing=f"crop (3, 3, 17, 17) of 20 x 20 pixels, greyscale{resized}, divided by the maximum, flattened",
         training_data=task.training_words,
         training_images=len(labels),

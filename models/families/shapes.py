@@ -1,17 +1,24 @@
 """The shape classifier: six shapes of Simple_Shapes as the robot's left light sensor sees them, on the spot and beside.
 
-Labels are the course's codes 0 to 5.
+Labels are the course's codes 0 to 5. It also knows the shapes as an instructor's own image may have them: turned,
+larger or smaller, paler, and partly covered.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from PIL import Image
 
 from models.images import LabelledPose, Photographer, Shift
-from models.preprocessing import features
-from models.tasks import Examples, Plan, Task, Test, register
+from models.perceptrons import Perceptron
+from models.preprocessing import SIDE, Grey, features, noisy
+from models.tasks import Altered, Examples, Task, Test, register
 from sim.chance import Stream
 from sim.floors import SHAPES
 from sim.recording import Pose
@@ -20,6 +27,17 @@ _SEED = 20201107
 _OFFSETS = range(-4, 5)  # mm, each way
 _NOISES = (0, 0, 16, 32, 64, 96, 128, 128)
 _NOISES_ON_THE_SPOT = (32, 64, 96, *[128] * 37)
+_ROUNDS = 2
+#: Images of an instructor's own: how many of each shape, and how they come about.
+_OWN_EACH = 8000
+_OWN_NOISES = (0, 0, 0, 32, 64, 128)
+_BLACK, _WHITE, _PALEST = 0, 255, 90
+_MARGIN = 18  # pixels of paper round a shape, for what is turned into view
+_RESAMPLINGS = (Image.Resampling.NEAREST, Image.Resampling.BILINEAR, Image.Resampling.BICUBIC)
+#: What is tested of them.
+_TURNS = tuple(float(degrees) for degrees in range(-30, 31, 5))
+_SIZES = tuple(float(percent) for percent in range(50, 141, 10))
+_COVERS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
 def places() -> tuple[LabelledPose, ...]:
@@ -27,7 +45,58 @@ def places() -> tuple[LabelledPose, ...]:
     return tuple(LabelledPose("Simple_Shapes", 0, Pose(200 + 80 * code, 900, 0), code) for code in range(len(SHAPES)))
 
 
+@dataclass(frozen=True, slots=True)
+class Alteration:
+    """How a shape of an instructor's own image differs: turned anticlockwise and scaled about the window's middle."""
+
+    turned: float = 0.0  # degrees
+    scale: float = 1.0
+    x: float = 0.0  # mm to the right
+    y: float = 0.0  # mm upwards
+    ink: int = _BLACK
+    resampling: Image.Resampling = Image.Resampling.NEAREST
+    cover: tuple[int, int, int, int, int] | None = None  # left, top, width and height in pixels, and its grey
+
+
+def altered(code: int, alteration: Alteration) -> Grey:
+    """The grey focus over a shape that is printed so, shape (14, 14)."""
+    shape = np.full((SIDE + 2 * _MARGIN, SIDE + 2 * _MARGIN), _WHITE, np.uint8)
+    shape[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = _printed()[code]
+    angle = math.radians(alteration.turned)
+    cosine, sine = math.cos(angle) / alteration.scale, math.sin(angle) / alteration.scale
+    x, y = SIDE / 2 + alteration.x, SIDE / 2 - alteration.y
+    middle = _MARGIN + SIDE / 2
+    # Where each pixel comes from: the middle stays the middle, but for the move.
+    inverse = (cosine, -sine, middle - cosine * x + sine * y, sine, cosine, middle - sine * x - cosine * y)
+    turned = Image.fromarray(shape).transform(
+        (SIDE, SIDE), Image.Transform.AFFINE, inverse, alteration.resampling, fillcolor=_WHITE
+    )
+    grey = alteration.ink + np.asarray(turned, np.int64) * (_WHITE - alteration.ink) // _WHITE
+    if alteration.cover is not None:
+        left, top, width, height, colour = alteration.cover
+        grey[top : top + height, left : left + width] = colour
+    return grey.astype(np.uint8)
+
+
+@functools.cache
+def _printed() -> tuple[Grey, ...]:
+    """The focus over each shape of Simple_Shapes where the course stands the robot."""
+    with Photographer() as photographer:
+        return tuple(photographer.image(place, Shift()) for place in places())
+
+
 def _examples() -> Examples:
+    """Shapes of the course's floor ``_ROUNDS`` times over, then shapes as an instructor's own image may have them."""
+    images, labels = _on_the_floor()
+    own = [(code, _own(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)]
+    rows = np.array([features(grey) for _, grey in own])
+    return (
+        np.concatenate([images] * _ROUNDS + [rows]),
+        np.concatenate([labels] * _ROUNDS + [np.array([code for code, _ in own], np.int64)]),
+    )
+
+
+def _on_the_floor() -> Examples:
     """Every shape at every offset, without noise and with several noises; on the spot with more."""
     images, labels = [], []
     with Photographer() as photographer:
@@ -41,11 +110,77 @@ def _examples() -> Examples:
     return np.array(images), np.array(labels, np.int64)
 
 
+def _own(code: int, number: int) -> Grey:
+    """Turned most where it is moved least: but for its place, a triangle turned by 30 degrees is another one."""
+    chance = Stream(_SEED, f"own image {code}")
+    kind = chance.uniform(number, 0)
+    if kind < 0.35:
+        turn, smallest, largest, reach = 22.0, 0.75, 1.15, 0.5
+    elif kind < 0.75:
+        turn, smallest, largest, reach = 13.0, 0.55, 1.3, 2.0
+    else:
+        turn, smallest, largest, reach = 0.0, 1.0, 1.0, 3.0
+    covered = kind >= 0.75 or chance.uniform(number, 1) < 0.35
+    grey = altered(
+        code,
+        Alteration(
+            turned=chance.between(-turn, turn, number, 2),
+            scale=chance.between(smallest, largest, number, 3),
+            x=chance.between(-reach, reach, number, 4),
+            y=chance.between(-reach, reach, number, 5),
+            ink=chance.integer(number, 6) % _PALEST if chance.uniform(number, 7) < 0.3 else _BLACK,
+            resampling=_RESAMPLINGS[chance.integer(number, 8) % len(_RESAMPLINGS)],
+            cover=_cover(chance, number) if covered else None,
+        ),
+    )
+    noise = _OWN_NOISES[chance.integer(number, 9) % len(_OWN_NOISES)]
+    return noisy(grey, noise, Stream(_SEED, f"own noise {code}"), number) if noise else grey
+
+
+def _cover(chance: Stream, number: int) -> tuple[int, int, int, int, int]:
+    width, height = (2 + chance.integer(number, index) % 6 for index in (10, 11))
+    left, top = (chance.integer(number, index) % (SIDE - side + 1) for index, side in ((12, width), (13, height)))
+    colour = (_BLACK, _WHITE, chance.integer(number, 14) % (_WHITE + 1))[chance.integer(number, 15) % 3]
+    return left, top, width, height, colour
+
+
+def _turned(degrees: float) -> Iterator[tuple[int, Grey]]:
+    yield from _printed_so(lambda resampling: [Alteration(turned=degrees, resampling=resampling)])
+
+
+def _scaled(percent: float) -> Iterator[tuple[int, Grey]]:
+    moves = tuple(itertools.product((-1, 0, 1), repeat=2))
+    yield from _printed_so(
+        lambda resampling: [Alteration(scale=percent / 100, x=x, y=y, resampling=resampling) for x, y in moves]
+    )
+
+
+def _covered(side: float) -> Iterator[tuple[int, Grey]]:
+    """A black, a grey and a white square at every place inside the 10 x 10 pixels that the shape fills."""
+    width = int(side)
+    corners = range(2, 2 + 10 - width + 1)
+    for code in range(len(SHAPES)):
+        for left, top, colour in itertools.product(corners, corners, (_BLACK, 128, _WHITE)):
+            yield code, altered(code, Alteration(cover=(left, top, width, width, colour)))
+
+
+def _printed_so(ways: Callable[[Image.Resampling], Sequence[Alteration]]) -> Iterator[tuple[int, Grey]]:
+    for code in range(len(SHAPES)):
+        for resampling in (Image.Resampling.NEAREST, Image.Resampling.BILINEAR):
+            for alteration in ways(resampling):
+                yield code, altered(code, alteration)
+
+
 def _test() -> Test:
     noises = ((0, 1), (10, 20), (32, 20), (64, 20), (128, 20))
     words = "the six shapes where the course stands the robot, without noise once, with light noise 10, 32, 64 and 128 "
     words += "twenty times each"
-    return Test(places(), noises, places(), (0, 32), 20, words)
+    curves = (
+        Altered("turned image", "degrees", "about the window's middle", _TURNS, _turned),
+        Altered("size of the image", "%", "on the spot and 1 mm beside", _SIZES, _scaled),
+        Altered("covered square", "mm each way", "black, grey or white, wherever it is", _COVERS, _covered),
+    )
+    return Test(places(), noises, places(), (0, 32), 20, words, curves)
 
 
 TASK = register(
@@ -55,10 +190,11 @@ TASK = register(
         words="Names the shape under the robot's left light sensor.",
         classes=SHAPES,
         side=14,
-        plan=Plan(hidden=40, stages=((1e-3, 60), (2e-4, 20)), decay=1e-3, seed=_SEED),
+        plan=Perceptron(hidden=150, stages=((1e-3, 30), (2e-4, 10)), decay=1e-3, seed=_SEED),
         examples=_examples,
         training_words=f"Simple_Shapes as the simulated left sensor sees it: every whole mm up to {max(_OFFSETS)} off "
-        "each way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128",
+        "each way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128; and as an image of one's "
+        "own may have them: turned up to 22 degrees, of 55 to 130 %, paler, covered up to 7 x 7 mm, beside the spot",
         test=_test,
     )
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from models import card, names
-from models.cards import CardCurve, Confusion, Tally
+from models.cards import Card, CardCurve, Confusion, Tally
 from models.training import train as train_model
 from service.home import for_the_user
 from service.reports.written import prepare_folder
@@ -78,6 +79,58 @@ def evaluate(name: Name, report: Report = None) -> None:
         _write(result, report)
 
 
+@models_app.command()
+def compare(
+    chosen: Annotated[
+        list[str], typer.Argument(metavar="NAME NAME...", help="Models of the same things, two or more.")
+    ],
+    report: Report = None,
+) -> None:
+    """What the cards of classifiers say, side by side: how often each is right, with the 95 % intervals."""
+    with for_the_user():
+        about = [card(name) for name in chosen]
+        if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:
+            raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same things")
+    if report is not None:
+        prepare_folder(report)
+    console = Console()
+    console.print(_beside("", [("accuracy", [each.measured.accuracy for each in about])], chosen))
+    for curves in _in_common(about):
+        first = curves[0]
+        rows = [(f"{value:g}", [curve.tallies[at] for curve in curves]) for at, value in enumerate(first.values)]
+        console.print()
+        console.print(_beside(f"{first.varied} ({first.unit}): {first.under}", rows, chosen))
+    if report is not None:
+        from service.reports.plots.models import comparison_plot
+
+        _keep(report / f"{'-and-'.join(chosen)}.png", comparison_plot(chosen, _in_common(about)))
+
+
+def _in_common(about: Sequence[Card]) -> list[list[CardCurve]]:
+    """The curves that every card has, for each what the cards have of it."""
+    found = []
+    for first in about[0].measured.curves:
+        same = [
+            curve
+            for each in about
+            for curve in each.measured.curves
+            if (curve.varied, curve.under, curve.values) == (first.varied, first.under, first.values)
+        ]
+        if len(same) == len(about):
+            found.append(same)
+    return found
+
+
+def _beside(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], chosen: Sequence[str]) -> Table:
+    table = Table("", *chosen, "of", box=None, pad_edge=False, title=title or None, title_justify="left")
+    for column in table.columns:
+        column.justify = "right"
+    for head, tallies in rows:
+        shares = (f"{tally.share:.3f} ({_interval(tally)})" for tally in tallies)
+        table.add_row(head, *shares, "/".join(dict.fromkeys(str(tally.n) for tally in tallies)))
+    return table
+
+
 def _head(result: Evaluation) -> Table:
     about, accuracy = result.card, result.measured.accuracy
     table = Table.grid(padding=(0, 2))
@@ -138,10 +191,13 @@ def _write(result: Evaluation, folder: Path) -> None:
     numbers = json.dumps({"name": result.card.name} | asdict(result.measured), indent=1) + "\n"
     files = {f"{result.card.name}.json": numbers.encode()} | evaluation_plots(result)
     for name, data in files.items():
-        path = folder / name
-        try:
-            with for_the_user():
-                path.write_bytes(data)
-        except OSError as error:
-            raise UsageError(f"{path} cannot be written: {error.strerror}") from error
-        typer.echo(str(path))
+        _keep(folder / name, data)
+
+
+def _keep(path: Path, data: bytes) -> None:
+    try:
+        with for_the_user():
+            path.write_bytes(data)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}") from error
+    typer.echo(str(path))

@@ -22,7 +22,7 @@ from sklearn.neural_network import MLPClassifier, MLPRegressor
 
 from models import weights_bytes
 from models.families.shapes import TASK
-from models.networks import read
+from models.perceptrons import read
 from paths import DATA
 
 FOLDER = DATA / "model_submissions"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from models.images import Photographer, Shift
 from service.commands.models import models_app
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+from sim.errors import UsageError
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +74,9 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
         "offset in x, mm",
         "offset in y, mm",
         "heading, degrees",
+        "turned image, degrees",
+        "size of the image, %",
+        "covered square, mm each way",
     ]
     assert texts(figure).count("n = 6 to 120 images a point") == 4
     line = figure.axes[1].lines[2]
@@ -102,3 +107,21 @@ def test_the_list_has_every_model_with_its_interval() -> None:
     (line,) = [line for line in done.output.splitlines() if line.startswith("digits ")]
     for part in (f"{accuracy.share:.3f}", f"{low:.3f} to {high:.3f}", str(accuracy.n)):
         assert part in line
+
+
+def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
+    done = CliRunner().invoke(models_app, ["compare", "digits", "digits-cnn", "--report", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    (line,) = [line for line in done.output.splitlines() if line.strip().startswith("accuracy")]
+    for name in ("digits", "digits-cnn"):
+        accuracy = card(name).measured.accuracy
+        low, high = accuracy.interval
+        assert f"{accuracy.share:.3f} ({low:.3f} to {high:.3f})" in line
+    assert line.split()[-1] == str(accuracy.n)
+    assert (tmp_path / "digits-and-digits-cnn.png").exists()
+
+
+def test_classifiers_of_different_things_are_not_compared() -> None:
+    done = CliRunner().invoke(models_app, ["compare", "digits", "shapes"])
+    assert isinstance(done.exception, UsageError)
+    assert str(done.exception) == "digits, shapes cannot be compared; expected two or more models of the same things"

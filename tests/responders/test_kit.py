@@ -18,10 +18,11 @@ from PIL import Image
 from sklearn.neural_network import MLPClassifier
 
 from models import weights_bytes
-from paths import ROOT
+from paths import DATA, ROOT
 from sim import floors
 
 KIT = ROOT / "responders" / "kit"
+LITE = DATA / "tensorflow_lite"
 KIT_MODULES = ("nbev3devsim.load_nbev3devwidget", "nn_tools.sensor_data", "nn_tools.network_views")
 
 #: Black pixels in the 14 x 14 focus of each shape, and the rows and columns that they fill.
@@ -351,9 +352,55 @@ def test_what_only_shows_does_nothing(kit: Kit, name: str) -> None:
     assert kit.data.zoom_img(Image.new("L", (2, 2)), size=(3, 3), grid=False) is None
 
 
-def test_convolutional_networks_are_refused_in_a_sentence(kit: Kit) -> None:
-    with pytest.raises(NotImplementedError, match="TensorFlow Lite"):
-        kit.views.cnn_load("mnist.tflite", "labels.txt")
+@pytest.fixture
+def cnn(kit: Kit) -> Any:
+    """A small network of digits in TensorFlow Lite's format."""
+    return kit.views.cnn_load(LITE / "digits.tflite", LITE / "labels.txt")
+
+
+def test_a_tensorflow_lite_network_comes_with_its_details_and_labels(
+    kit: Kit, cnn: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cnn[1] == list("0123456789")
+    inputs, outputs, is_float, height, width = kit.views.cnn_get_details(cnn)
+    assert (inputs[0]["shape"].tolist(), outputs[0]["shape"].tolist()) == ([1, 28, 28, 1], [1, 10])
+    assert (is_float, height, width) == (True, 28, 28)
+    assert kit.views.cnn_get_details(cnn, report=True) is None
+    assert capsys.readouterr().out.startswith("\nInput: [{'name': ")
+
+
+@pytest.mark.parametrize(("file", "least"), [("digits.tflite", 50), ("digits-quantized.tflite", 49)])
+def test_tensorflow_lite_networks_read_digits_that_the_sensor_sees(kit: Kit, file: str, least: int) -> None:
+    network = kit.views.cnn_load(LITE / file, LITE / "labels.txt")
+    sheet = floors.floor("MNIST_Digits", seed=101)
+    right = 0
+    for number, label in enumerate(sheet.labels[:55]):
+        row, column = divmod(number, 20)
+        # The focus of the left light sensor where the course stands the robot, in the floor's image.
+        top, left = 56 + 100 * row, 73 + 100 * column
+        image = Image.fromarray(sheet.pixels[top : top + 14, left : left + 14]).convert("L")
+        results = kit.views.cnn_test_with_image(network, image, retval=True)
+        right += network[1][int(results.argmax())] == label.label
+    assert right >= least
+
+
+def test_the_likeliest_classes_are_printed_as_in_the_course(
+    kit: Kit, cnn: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = np.array([0.5, 0.125, 0.25, 0.125, 0, 0, 0, 0, 0, 0], np.float32)
+    kit.views.cnn_rank_results(results, cnn[1], rank=2)
+    kit.views.cnn_rank_results(results, rank=1)
+    assert capsys.readouterr().out == "0.500000: 0\n0.250000: 2\n0.001961: \n"
+    assert kit.views.cnn_test_with_image(cnn, Image.new("L", (14, 14), 9), rank=3) is None
+    lines = capsys.readouterr().out.splitlines()
+    assert [len(line.split(": ")) for line in lines] == [2, 2, 2]
+    assert sorted(lines, reverse=True) == lines
+
+
+def test_without_litert_the_sentence_says_what_to_use_instead(kit: Kit, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
+    with pytest.raises(ImportError, match=r"mnist.tflite cannot be loaded: .*robomark\[tflite\].*load_onnx"):
+        kit.views.cnn_load()
 
 
 def test_the_kit_needs_nothing_of_ours_and_nothing_that_draws() -> None:

@@ -5,11 +5,14 @@ Predicting divides an image by its brightest pixel, training by its length, as t
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from PIL import Image
 from sklearn.metrics import classification_report, confusion_matrix
 from sklearn.neural_network import MLPClassifier
@@ -26,9 +29,13 @@ from nn_tools.sensor_data import (
 )
 from nn_tools.weights import check_classifier
 
-_NO_CNN = (
-    "convolutional networks in TensorFlow Lite's format cannot be loaded here; "
-    "use a scikit-learn network, or ONNX's format with nn_tools.load_onnx"
+#: An interpreter of LiteRT, which has no types, and labels.
+CNN = tuple[Any, list[str]]
+Details = tuple[Any, Any, bool, int, int]
+
+_NO_LITERT = (
+    "this Robomark has no ai-edge-litert (pip install robomark[tflite]); use a scikit-learn network, plain weights "
+    "(.npz), or ONNX's format with nn_tools.load_onnx"
 )
 
 
@@ -280,8 +287,69 @@ show_loss = preview_weights = multiply_image_by_weights = _shows_nothing
 prediction_class_chart = displayImageLabelPairFromArray = test_display = _shows_nothing
 
 
-def _no_cnn(*_args: Any, **_kwargs: Any) -> NoReturn:
-    raise NotImplementedError(_NO_CNN)
+def cnn_load(
+    fpath: str | os.PathLike[str] = "./mnist.tflite",
+    fpath_labels: str | os.PathLike[str] | None = "./mnist_tflite_labels.txt",
+) -> CNN:
+    """The network in a file of TensorFlow Lite's format, and its labels, one on each line of a file.
+
+    Raises ValueError with a sentence when the file is no such network, ImportError when ai-edge-litert is missing.
+    """
+    name = Path(fpath).name
+    try:
+        from ai_edge_litert.interpreter import Interpreter
+    except ImportError:
+        raise ImportError(f"{name} cannot be loaded: {_NO_LITERT}") from None
+    data = Path(fpath).read_bytes()
+    try:
+        interpreter = Interpreter(model_content=data, num_threads=1)
+        interpreter.allocate_tensors()
+    except Exception as error:
+        raise ValueError(
+            f"{name} cannot be read as a network in TensorFlow Lite's format: {str(error)[:200]}"
+        ) from None
+    labels = [line.strip() for line in Path(fpath_labels).read_text().splitlines()] if fpath_labels else []
+    return interpreter, labels
 
 
-cnn_load = cnn_get_details = cnn_rank_results = cnn_test_with_image = _no_cnn
+def cnn_get_details(cnn: CNN, report: bool = False) -> Details | None:
+    """What goes in and comes out, whether that is floats, and height and width; only printed with ``report``."""
+    details = _details(cnn)
+    if not report:
+        return details
+    print(f"\nInput: {details[0]}\n\nOutput: {details[1]}\n")
+    return None
+
+
+def _details(cnn: CNN) -> Details:
+    inputs, outputs = cnn[0].get_input_details(), cnn[0].get_output_details()
+    _, height, width = inputs[0]["shape"][:3]
+    return inputs, outputs, inputs[0]["dtype"] == np.float32, height, width
+
+
+def cnn_rank_results(results: NDArray[Any], tf_labels: Sequence[str] | None = None, rank: Any = 5) -> None:
+    """Print the likeliest classes, the best first; the original divides by 255 where their numbers add up to 0 or 1."""
+    best = results.argsort()[::-1][: rank if isinstance(rank, int) else 5]
+    whole = 1 if best.sum() > 1 else 255
+    for number in best:
+        print(f"{results[number] / whole:08.6f}: {tf_labels[number] if tf_labels else ''}")
+
+
+def cnn_test_with_image(
+    cnn: CNN, img: Image.Image, tf_labels: Sequence[str] = "", retval: bool = False, rank: int | None = None
+) -> NDArray[Any] | None:
+    """What the network makes of the image in its own size, with ``retval``; prints the ``rank`` likeliest classes."""
+    interpreter, labels = cnn
+    inputs, outputs, is_float, height, width = _details(cnn)
+    shape, kind = inputs[0]["shape"], inputs[0]["dtype"]
+    values = np.asarray(img.resize((width, height)))
+    if values.size != np.prod(shape):
+        raise ValueError(f"this network is for images of shape {shape.tolist()}, but was shown one of {values.shape}")
+    if is_float:
+        values = (values.astype(np.float32) - 127.5) / 127.5
+    interpreter.set_tensor(inputs[0]["index"], values.reshape(shape).astype(kind))
+    interpreter.invoke()
+    results = np.squeeze(interpreter.get_tensor(outputs[0]["index"]))
+    if rank:
+        cnn_rank_results(results, tf_labels or labels, rank)
+    return results if retval else None

@@ -1,4 +1,4 @@
-"""Networks of one's own from files that are no pickles: plain weights (``.npz``) and, where it is installed, ONNX.
+"""Networks of one's own from files that are no pickles: plain weights (``.npz``) and ONNX.
 
 Both answer to ``predict`` and ``predict_proba`` as scikit-learn's do. Nothing here trains a network.
 """
@@ -124,16 +124,11 @@ def save_weights(network: Any, file: str | os.PathLike[str]) -> None:
 def load_onnx(file: str | os.PathLike[str], classes: Any = None) -> OnnxNetwork:
     """The network in an ``.onnx`` file; ``classes`` are the names of its outputs, numbers from 0 if not given.
 
-    Raises ValueError with a sentence when the file is no such network, ImportError when onnxruntime is missing.
+    Raises ValueError with a sentence when the file is no such network.
     """
     name = Path(file).name
-    try:
-        import onnxruntime
-    except ImportError:
-        raise ImportError(
-            f"{name} cannot be loaded: this Robomark has no onnxruntime (pip install robomark[onnx]); "
-            "use a scikit-learn network or plain weights (.npz)"
-        ) from None
+    import onnxruntime
+
     data = Path(file).read_bytes()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1

@@ -26,6 +26,7 @@ _PACKAGES = frozenset(
         "dateutil",
         "six.py",
         "narwhals",
+        "ai_edge_litert",
         "onnxruntime",
         "tzdata",
         "pytz",

@@ -1,10 +1,11 @@
-"""What loading students' models needs inside the sandbox: onnxruntime on one thread, and sentences for what goes wrong.
+"""What loading students' models needs inside the sandbox: runtimes with one thread, and sentences for what goes wrong.
 
 The files themselves are read by the libraries that wrote them; nothing here trusts one.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import os
@@ -14,12 +15,15 @@ from collections.abc import Callable
 from typing import Any
 
 
-def preload_onnx() -> None:
-    """Import onnxruntime, where it is installed, and let every session of it do with one thread: there are no more."""
-    try:
-        runtime: Any = importlib.import_module("onnxruntime")
-    except ImportError:
-        return
+def preload_runtimes() -> None:
+    """Import onnxruntime and ai-edge-litert, where they may be had; each does with one thread: there are no more."""
+    for preload in (_preload_onnxruntime, _preload_litert):
+        with contextlib.suppress(ImportError):
+            preload()
+
+
+def _preload_onnxruntime() -> None:
+    runtime: Any = importlib.import_module("onnxruntime")
 
     class InferenceSession(runtime.InferenceSession):  # type: ignore[misc]
         def __init__(self, path_or_bytes: Any, sess_options: Any = None, *args: Any, **more: Any) -> None:
@@ -28,6 +32,16 @@ def preload_onnx() -> None:
             super().__init__(path_or_bytes, options, *args, **more)
 
     runtime.InferenceSession = InferenceSession
+
+
+def _preload_litert() -> None:
+    litert: Any = importlib.import_module("ai_edge_litert.interpreter")
+
+    class Interpreter(litert.Interpreter):  # type: ignore[misc]
+        def __init__(self, *args: Any, **more: Any) -> None:
+            super().__init__(*args, **more | {"num_threads": 1})
+
+    litert.Interpreter = Interpreter
 
 
 def explain_joblib() -> None:

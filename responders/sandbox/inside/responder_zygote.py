@@ -49,7 +49,7 @@ def preload(without: list[str]) -> None:
     for name in _PRELOADED:
         with contextlib.suppress(*missing):
             importlib.import_module(name)
-    model_files.preload_onnx()
+    model_files.preload_runtimes()
     with contextlib.suppress(*missing):
         model_files.explain_joblib()
         _ask_the_machine()

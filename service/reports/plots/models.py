@@ -72,15 +72,33 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
             for varied, curves in panels.items()
         ],
         f"{evaluation.card.name}: how robust it is",
-        "what the left sensor sees when the robot stands beside the spot, or is noisy",
+        "what the left sensor sees, as one condition after another gets harder",
     )
 
 
-def _curve(counted: CardCurve) -> Curve:
+def comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) -> bytes:
+    """A PNG file with a panel for each condition, in it a curve for each of the classifiers called ``names``."""
+    figure = draw_curves(
+        [
+            AccuracyPanel(
+                f"{curves[0].varied}, {curves[0].under}",
+                curves[0].unit,
+                tuple(_curve(curve, name) for name, curve in zip(names, curves, strict=True)),
+            )
+            for curves in found
+        ],
+        f"{', '.join(names[:-1])} and {names[-1]}: how robust they are",
+        "the same places and the same noise for each",
+    )
+    return png(figure)
+
+
+def _curve(counted: CardCurve, label: str | None = None) -> Curve:
     intervals = [tally.interval for tally in counted.tallies]
     counts = {tally.n for tally in counted.tallies}
+    words = label or counted.under
     return Curve(
-        label=f"{counted.under}, n = {counts.pop()}" if len(counts) == 1 else counted.under,
+        label=f"{words}, n = {counts.pop()}" if len(counts) == 1 else words,
         x=counted.values,
         share=tuple(tally.share for tally in counted.tallies),
         low=tuple(low for low, _ in intervals),

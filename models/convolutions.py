@@ -1,0 +1,119 @@
+"""Fitting a small convolutional network and writing it down, so that training again gives the same bytes.
+
+What it is trained on is the business of ``families/``; the process is set up by ``training.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from models.layers import Dense, Filters, Flat, Floats, Forgetting, Halving, Layer, Positive
+from models.onnx_format import onnx_file
+from models.preprocessing import Vector
+
+_DECIMALS = 4
+_BATCH = 100
+_WARM_UP = 200  # steps until the whole step size is used
+#: Of Adam: how much of the mean slope and of the mean square of the slopes stays from step to step.
+_MEAN, _SQUARE = 0.9, 0.999
+
+
+@dataclass(frozen=True, slots=True)
+class Convolution:
+    """Three layers of filters (5 x 5 and halved, 3 x 3, 3 x 3), a hidden layer and one of the classes; an ONNX file."""
+
+    filters: tuple[int, int, int]
+    hidden: int
+    passes: int
+    step: float  # the largest of Adam; it falls with a cosine to 0
+    decay: float  # the part of a weight that goes, at that step, with each unit of step
+    forget: float  # the share of numbers before the hidden layer that each step does without
+    seed: int
+
+    def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
+        """The file of a network for ``images`` of shape (n, inputs) and their class numbers, its weights rounded."""
+        chance = np.random.default_rng(self.seed)
+        side, classes = math.isqrt(images.shape[1]), int(labels.max()) + 1
+        layers = self._layers(side, classes, chance)
+        descent = _Descent([weights for layer in layers for weights in layer.weights], self.decay)
+        shown = images.astype(np.float32).reshape(-1, side, side, 1)
+        steps = self.passes * (len(shown) // _BATCH)
+        for number in range(steps):
+            at = number % (len(shown) // _BATCH)
+            if at == 0:
+                order = chance.permutation(len(shown))
+            rows = order[at * _BATCH : (at + 1) * _BATCH]
+            _slopes(layers, shown[rows], labels[rows])
+            size = self.step * (1 + math.cos(math.pi * number / steps)) / 2 * min(1.0, (number + 1) / _WARM_UP)
+            descent.step([slopes for layer in layers for slopes in layer.slopes], size)
+        for layer in layers:
+            for weights in layer.weights:
+                # So that last bits do not show.
+                weights[...] = np.round(weights, _DECIMALS)
+        return onnx_file(layers, side, classes)
+
+    def architecture(self, inputs: int, classes: int) -> str:
+        """The layers in words."""
+        side = math.isqrt(inputs)
+        first, second, third = self.filters
+        return (
+            f"convolutional network {side} x {side}: {first} filters of 5 x 5, the largest of 2 x 2, {second} and "
+            f"{third} filters of 3 x 3, {self.hidden}-{classes}, ReLU, Adam"
+        )
+
+    def _layers(self, side: int, classes: int, chance: Generator) -> tuple[Layer, ...]:
+        first, second, third = self.filters
+        half = side // 2
+        return (
+            Filters(5, 1, first, 2, chance),
+            Halving(),
+            Positive(),
+            Filters(3, first, second, 1, chance),
+            Positive(),
+            Filters(3, second, third, 0, chance),
+            Positive(),
+            Flat(),
+            Forgetting(self.forget, chance),
+            Dense((half - 2) ** 2 * third, self.hidden, chance),
+            Positive(),
+            Dense(self.hidden, classes, chance),
+        )
+
+
+class _Descent:
+    """Adam (D. Kingma, J. Ba, ICLR 2015) with decay of the weights (I. Loshchilov, F. Hutter, ICLR 2019)."""
+
+    def __init__(self, weights: Sequence[Floats], decay: float) -> None:
+        self._weights, self._decay, self._steps = weights, decay, 0
+        self._means = [np.zeros_like(each) for each in weights]
+        self._squares = [np.zeros_like(each) for each in weights]
+
+    def step(self, slopes: Sequence[Floats], size: float) -> None:
+        """Take one step down ``slopes``, one a weight."""
+        self._steps += 1
+        corrected = size * math.sqrt(1 - _SQUARE**self._steps) / (1 - _MEAN**self._steps)
+        for weights, slope, mean, square in zip(self._weights, slopes, self._means, self._squares, strict=True):
+            mean += (1 - _MEAN) * (slope - mean)
+            square += (1 - _SQUARE) * (slope * slope - square)
+            if weights.ndim > 1:
+                weights *= 1 - size * self._decay
+            weights -= corrected * mean / (np.sqrt(square) + 1e-8)
+
+
+def _slopes(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:
+    """Let every layer have the slopes of the mean cross entropy of its softmax over ``images``."""
+    values = images
+    for layer in layers:
+        values = layer.forward(values)
+    powers = np.exp(values - values.max(axis=1, keepdims=True))
+    slopes = powers / powers.sum(axis=1, keepdims=True)
+    slopes[np.arange(len(labels)), labels] -= 1
+    slopes /= np.float32(len(labels))
+    for layer in reversed(layers):
+        slopes = layer.backward(slopes)
