@@ -231,3 +231,22 @@ def test_11_messages_are_lost_out_of_range_or_facing_the_wrong_way(
     assert [message.lost for message in recording.messages if message.sender == "robot"] == [lost] * 3
     assert len(texts(recording, "responder")) == (0 if lost else 3)
     assert recording.spoken[-1].text == "all done"
+
+
+def test_12_a_convolutional_network_in_place_of_the_perceptron(runner: TrialRunner) -> None:
+    """The image parser's own message, shown to both kinds of network."""
+    folder = examples("mlp-against-cnn") / "reference"
+    networks = {
+        "mlp_digits_14x14.joblib": weights_bytes("digits"),
+        "cnn_digits_14x14.onnx": weights_bytes("digits-cnn"),
+    }
+    recording = run_program(
+        runner,
+        (folder / "robot.py").read_text(),
+        Pose(700, 1050, 90),
+        background="MNIST_Digits",
+        responder=(folder / "responder.py").read_text(),
+        files=networks,
+    )
+    digit = recording.images[0].truth
+    assert [line.text for line in recording.spoken] == [f"The MLP reads {digit}, the CNN {digit}"]
