@@ -21,6 +21,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits
 from responders.sandbox.zygote import Role
+from sim.recording import TICK
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder": ChildLimits(2, 512 << 20)}
 _SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
@@ -40,9 +41,11 @@ while True:
 _WORKER = """
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
+from sim.recording import TICK
 sandboxes = Sandboxes()
 child = sandboxes.spawn("robot", ChildLimits(60, 64 << 20))
-child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": []})
+child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": [], "modules": {},
+            "tick": TICK})
 print(child._pid, flush=True)
 input()
 """
@@ -141,7 +144,7 @@ def _echo(sandboxes: Sandboxes) -> Child:
 
 
 def _start(child: Child, role: Role, text: str) -> None:
-    own = {"preamble": "none", "sensors": []} if role == "robot" else {"function": None}
+    own = {"preamble": "none", "sensors": [], "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 

@@ -39,7 +39,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from responders.sandbox.zygote import NONE, Isolation, Role
-from sim.recording import Verdict
+from sim.recording import TICK, Verdict
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
@@ -323,7 +323,14 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
     child = sandboxes.spawn(role, LIMITS, folder)
     try:
         job = {"name": f"{role}.py", "text": text, "seed": 1}
-        child.send(job | ({"preamble": "none", "sensors": []} if role == "robot" else {"function": None}))
+        child.send(
+            job
+            | (
+                {"preamble": "none", "sensors": [], "modules": {}, "tick": TICK}
+                if role == "robot"
+                else {"function": None}
+            )
+        )
         yield child
     finally:
         child.close()

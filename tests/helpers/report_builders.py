@@ -27,6 +27,7 @@ from service.grading.grade import (
     Shown,
     TrialResult,
 )
+from service.reports.rows import TableRow
 from sim.floors import floor
 from sim.recording import (
     Call,
@@ -41,6 +42,7 @@ from sim.recording import (
     Touch,
     Verdict,
 )
+from submissions.people import Student
 from submissions.submission import Submission
 
 SHAPES = (
@@ -58,6 +60,11 @@ HOSTILE = (
 )
 ROWS, COLUMNS = np.mgrid[0:20, 0:20]
 MASK = (ROWS - 10) ** 2 + (COLUMNS - 10) ** 2 < 100
+
+
+def row_of(grade: Grade) -> TableRow[Grade]:
+    """The row of one grade in a table."""
+    return TableRow(Student(grade.student), f"{grade.student}.zip", grade.assignment, grade)
 
 
 def line_follower_recording(count: int = 300, background: str = "Lollipop", start: Pose | None = None) -> Recording:

@@ -206,6 +206,9 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
 class _NoRuns:
     """Nothing that a notebook calls starts a robot."""
 
+    def standing(self) -> PlannedRun:
+        return PlannedRun(_spec())
+
     def call(self, call: object) -> PlannedRun:
         return PlannedRun(notes=("noted",))
 

@@ -42,7 +42,7 @@ from submissions.assignment.folder import assignment_folder
         ("run x.py --loss 2", "loss is 2.0, expected at most 1"),
         ("run x.py --range 300", 'the channel has range and no link that it limits, expected link = "infrared"'),
         ("run x.py --link infrared", "nothing at its other end, expected beacon = [x, y] beside it"),
-        ("run x.py --link radio", 'link is "radio", expected "cable" or "infrared"'),
+        ("run x.py --link radio", 'link is "radio", expected "cable", "infrared" or "between robots"'),
         ("run x.py --beacon here", "--beacon is here, expected X,Y such as 1200,600"),
         ("run \x1b[31mx", "\\x1b[31mx cannot be read"),
     ],

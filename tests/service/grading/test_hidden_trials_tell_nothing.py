@@ -13,13 +13,14 @@ from typing import Any
 
 import pytest
 
+from report_builders import row_of
 from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.csv_output import moodle_csv
 from service.reports.formats.gradescope import gradescope_text
 from service.reports.formats.json_output import json_text
+from service.reports.formats.moodle import moodle_csv
 from service.reports.formats.text import plain_text
 from service.reports.html import report
 from service.reports.plots.drawn import draw_all
@@ -73,7 +74,7 @@ def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) 
         "json": json_text(view),
         "text": plain_text(view),
         "gradescope": gradescope_text(gradebook_view(graded)),
-        "moodle": moodle_csv([gradebook_view(graded)]),
+        "moodle": moodle_csv([row_of(graded).shown(gradebook_view)]),
         "view": repr(view),
     }
 

@@ -13,7 +13,7 @@ from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobLimits, Spent
-from service.grading.grade import Cost, Grade
+from service.grading.grade import Cost
 from service.reports.formats import FORMATS
 from service.reports.formats.csv_output import marks_csv
 from service.reports.formats.gradescope import gradescope_document, gradescope_text
@@ -23,15 +23,9 @@ from service.reports.formats.moodle import moodle_csv
 from service.reports.formats.rich_text import rich_report
 from service.reports.formats.text import plain_text
 from service.reports.html import report
-from service.reports.rows import TableRow
 from service.reports.view import View, gradebook_view, staff_view, student_view, worst_trial
 from service.reports.words import verdict_words
 from sim.recording import Verdict
-from submissions.people import Student
-
-
-def row_of(grade: Grade) -> TableRow[Grade]:
-    return TableRow(Student(grade.student), f"{grade.student}.zip", grade.assignment, grade)
 
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
@@ -114,7 +108,7 @@ def test_junit_calls_an_unmarked_grade_an_error() -> None:
 
 def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
     evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
-    table = marks_csv([row_of(grade).shown(staff_view) for grade in (build.shape_grade(), evil)])
+    table = marks_csv([build.row_of(grade).shown(staff_view) for grade in (build.shape_grade(), evil)])
     rows = list(csv.DictReader(io.StringIO(table)))
     assert rows[0]["student"] == "s1234567"
     assert rows[0]["accuracy"] == "0.8333"
@@ -124,7 +118,7 @@ def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
 
 
 def test_moodle_feedback_says_nothing_of_hidden_criteria() -> None:
-    row = next(csv.DictReader(io.StringIO(moodle_csv([row_of(build.hidden_grade()).shown(gradebook_view)]))))
+    row = next(csv.DictReader(io.StringIO(moodle_csv([build.row_of(build.hidden_grade()).shown(gradebook_view)]))))
     assert row["Grade"] == "8"
     assert "SECRET" not in row["Feedback comments"]
     assert "Names the right shape: 5 of 6" in row["Feedback comments"]
@@ -218,7 +212,7 @@ def test_staff_read_what_was_used_and_students_what_may_be() -> None:
     assert all(LIMITS in page and "of 240 s" not in page for page in for_students)
     assert all(
         "of 240 s" not in text
-        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([row_of(COSTLY).shown(gradebook_view)]))
+        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([build.row_of(COSTLY).shown(gradebook_view)]))
     )
     assert json_document(staff_view(COSTLY))["cost"]["spent"] == {
         "kept_bytes": 150_000,
@@ -242,8 +236,8 @@ def test_every_format_writes_an_odd_grade_and_ends_its_last_line(name: str) -> N
     assert form.document or form.table or form.filled_in or form.packed
     assert form.suffix.startswith(".")
     written = [form.document(grade)] if form.document else []
-    written += [form.table([row_of(grade), row_of(grade)])] if form.table else []
-    written += [form.refusal(replace(row_of(grade), grade=None, reason=build.HOSTILE))] if form.refusal else []
+    written += [form.table([build.row_of(grade), build.row_of(grade)])] if form.table else []
+    written += [form.refusal(replace(build.row_of(grade), grade=None, reason=build.HOSTILE))] if form.refusal else []
     for text in written:
         assert text.endswith("\n")
         assert "\x1b" not in text
