@@ -48,7 +48,7 @@ def run_program(
     second: str | None = None,
     second_start: Pose = Pose(1500, 500, 180),  # noqa: B008
     given: bool = False,
-    program_limits: ChildLimits = PROGRAM_LIMITS,
+    program_limits: ChildLimits | None = None,
     child_seed: int | None = None,
 ) -> Recording:
     """One trial; the start is the background's own unless given. With a ``second`` program there are two robots.
@@ -58,10 +58,12 @@ def run_program(
     ground = floor(background)
     partner = None
     if second is not None:
-        program_of_second = ProgramSpec(Code("robot2.py", second), preamble, program_limits, output_bytes)
+        program_of_second = ProgramSpec(
+            Code("robot2.py", second), preamble, program_limits or PROGRAM_LIMITS, output_bytes
+        )
         partner = PartnerSpec(program_of_second, second_start, given=given)
     spec = TrialSpec(
-        program=ProgramSpec(Code("robot.py", program), preamble, program_limits, output_bytes),
+        program=ProgramSpec(Code("robot.py", program), preamble, program_limits or PROGRAM_LIMITS, output_bytes),
         responder=None
         if responder is None
         else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
