@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -69,6 +70,7 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     (tmp_path / "my-robots").mkdir()
     (tmp_path / "my-robots" / "robot.py").write_text("print('PY::hello')\n")
     (tmp_path / "my-robots" / "robot2.py").write_text("%%sim_magic_preloaded -x 1500 -y 500 -a 180\n")
+    _download_from_moodle(tmp_path)
     environment = os.environ | {"ROBOMARK_HOME": str(tmp_path / "home")}
     ids: dict[str, str] = {}
     for words in commands(document):
@@ -86,6 +88,19 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
         if words[:2] == ["batch", "submit"]:
             ids["BATCH"] = re.search(r"batch (\w+)", done.stdout)[1]  # type: ignore[index]
             ids["GRADE"] = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)[1]  # type: ignore[index]
+
+
+def _download_from_moodle(folder: Path) -> None:
+    """One student's folder in a zip, and the worksheet that goes with it."""
+    with zipfile.ZipFile(folder / "CS101-Robots.zip", "w") as archive:
+        for file in EXAMPLE.iterdir():
+            # Not the very same as in the folder: that would be nothing new.
+            archive.writestr(f"Ada Lovelace_500000_assignsubmission_file_/{file.name}", file.read_bytes() + b"\n# 2\n")
+    (folder / "Grades-CS101.csv").write_text(
+        "Identifier,Full name,ID number,Email address,Status,Grade,Maximum Grade,Grade can be changed,"
+        "Last modified (submission),Last modified (grade),Feedback comments\n"
+        "Participant 500000,Ada Lovelace,ada,ada@example.org,Submitted for grading,,12.00,Yes,-,-,\n"
+    )
 
 
 def test_the_assignment_shown_is_in_order(tmp_path: Path) -> None:
