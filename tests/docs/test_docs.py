@@ -96,6 +96,7 @@ def _download_from_moodle(folder: Path) -> None:
         for file in EXAMPLE.iterdir():
             # Not the very same as in the folder: that would be nothing new.
             archive.writestr(f"Ada Lovelace_500000_assignsubmission_file_/{file.name}", file.read_bytes() + b"\n# 2\n")
+    (folder / "people.csv").write_text("id,name,email\nada,Ada Lovelace,ada@example.org\n")
     (folder / "Grades-CS101.csv").write_text(
         "Identifier,Full name,ID number,Email address,Status,Grade,Maximum Grade,Grade can be changed,"
         "Last modified (submission),Last modified (grade),Feedback comments\n"
