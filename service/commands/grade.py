@@ -14,21 +14,7 @@ import typer
 from rich.console import Console
 
 from responders.sandbox.zygote import FULL, NONE
-from service.commands.channel_flags import (
-    BeaconFlag,
-    BlockedByFlag,
-    CorruptionFlag,
-    DelayFlag,
-    DuplicationFlag,
-    FacingFlag,
-    JitterFlag,
-    LinkFlag,
-    LossFlag,
-    RangeFlag,
-    ReorderingFlag,
-    changed,
-    given_flags,
-)
+from service.commands import channel_flags
 from service.commands.format_option import format_option
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
@@ -58,17 +44,17 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
-    link: LinkFlag = None,
-    beacon: BeaconFlag = None,
-    reach: RangeFlag = None,
-    facing: FacingFlag = None,
-    blocked_by: BlockedByFlag = None,
-    loss: LossFlag = None,
-    delay: DelayFlag = None,
-    jitter: JitterFlag = None,
-    duplication: DuplicationFlag = None,
-    reordering: ReorderingFlag = None,
-    corruption: CorruptionFlag = None,
+    link: channel_flags.LinkFlag = None,
+    beacon: channel_flags.BeaconFlag = None,
+    reach: channel_flags.RangeFlag = None,
+    facing: channel_flags.FacingFlag = None,
+    blocked_by: channel_flags.BlockedByFlag = None,
+    loss: channel_flags.LossFlag = None,
+    delay: channel_flags.DelayFlag = None,
+    jitter: channel_flags.JitterFlag = None,
+    duplication: channel_flags.DuplicationFlag = None,
+    reordering: channel_flags.ReorderingFlag = None,
+    corruption: channel_flags.CorruptionFlag = None,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
@@ -85,7 +71,7 @@ def grade(
     rows: list[TableRow[Grade]] = []
     if report is not None:
         prepare_folder(report)
-    given = given_flags(
+    given = channel_flags.given_flags(
         link=link,
         beacon=beacon,
         range=reach,
@@ -142,7 +128,7 @@ def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
     """The assignment with the channel of the flags in every scenario: another one, for it marks otherwise."""
     if not given:
         return asked
-    scenarios = tuple(replace(each, channel=changed(each.channel, given)) for each in asked.scenarios)
+    scenarios = tuple(replace(each, channel=channel_flags.changed(each.channel, given)) for each in asked.scenarios)
     version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
     return replace(asked, scenarios=scenarios, version=version)
 

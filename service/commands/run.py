@@ -18,21 +18,7 @@ from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import PartnerSpec, ProgramSpec, ResponderSpec, TrialSpec
-from service.commands.channel_flags import (
-    BeaconFlag,
-    BlockedByFlag,
-    CorruptionFlag,
-    DelayFlag,
-    DuplicationFlag,
-    FacingFlag,
-    JitterFlag,
-    LinkFlag,
-    LossFlag,
-    RangeFlag,
-    ReorderingFlag,
-    changed,
-    given_flags,
-)
+from service.commands import channel_flags
 from service.commands.grade import warn_of_no_sandbox
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
 from service.grading.grade import TrialResult
@@ -111,17 +97,17 @@ def run(
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,
-    link: LinkFlag = None,
-    beacon: BeaconFlag = None,
-    reach: RangeFlag = None,
-    facing: FacingFlag = None,
-    blocked_by: BlockedByFlag = None,
-    loss: LossFlag = None,
-    delay: DelayFlag = None,
-    jitter: JitterFlag = None,
-    duplication: DuplicationFlag = None,
-    reordering: ReorderingFlag = None,
-    corruption: CorruptionFlag = None,
+    link: channel_flags.LinkFlag = None,
+    beacon: channel_flags.BeaconFlag = None,
+    reach: channel_flags.RangeFlag = None,
+    facing: channel_flags.FacingFlag = None,
+    blocked_by: channel_flags.BlockedByFlag = None,
+    loss: channel_flags.LossFlag = None,
+    delay: channel_flags.DelayFlag = None,
+    jitter: channel_flags.JitterFlag = None,
+    duplication: channel_flags.DuplicationFlag = None,
+    reordering: channel_flags.ReorderingFlag = None,
+    corruption: channel_flags.CorruptionFlag = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     diagrams: Annotated[
@@ -149,9 +135,9 @@ def run(
         "P": pen_colour,
     }
     switches = {letter for letter, on in (("p", pen_down), ("L", collab), ("m", move)) if on}
-    channel = changed(
+    channel = channel_flags.changed(
         Channel(),
-        given_flags(
+        channel_flags.given_flags(
             link=link,
             beacon=beacon,
             range=reach,

@@ -1,6 +1,6 @@
-"""Who is first in what an assignment ranks, across a batch: ties, and how sure each figure is.
+"""Who is first in what an assignment ranks, across a batch: ties, and how sure each value is.
 
-What a figure is worth to each student was decided by its judge; nothing here gives marks.
+What a value is worth to each student was decided by its judge; nothing here gives marks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _T95 = (
 
 
 @dataclass(frozen=True, slots=True)
-class RankedFigures:
+class StudentMeasures:
     """What one student's trials measured: those of ``trials`` that count."""
 
     student: str
@@ -29,14 +29,14 @@ class RankedFigures:
 
 @dataclass(frozen=True, slots=True)
 class RankRow:
-    """A student's place, shared where the figures are equal as shown; none without a trial that counts.
+    """A student's place, shared where the measures are equal as shown; none without a trial that counts.
 
     ``value`` is the mean of the trials that count, ``low`` to ``high`` its 95 % interval, where there are two or more.
     """
 
     place: int | None
     shared: bool
-    figures: RankedFigures
+    measures: StudentMeasures
     value: float | None = None
     low: float | None = None
     high: float | None = None
@@ -44,7 +44,7 @@ class RankRow:
 
 @dataclass(frozen=True, slots=True)
 class RankTable:
-    """The students of a batch by one figure, the best first."""
+    """The students of a batch by one value, the best first."""
 
     assignment: str
     title: str
@@ -54,32 +54,32 @@ class RankTable:
 
     @property
     def texts(self) -> list[tuple[str, ...]]:
-        """Place, student, figure, interval and trials of each row, as every table shows them."""
+        """Place, student, value, interval and trials of each row, as every table shows them."""
         return [_texts(row) for row in self.rows]
 
 
-def ranked(figures: Sequence[RankedFigures], *, highest: bool) -> tuple[RankRow, ...]:
+def ranked(measures: Sequence[StudentMeasures], *, highest: bool) -> tuple[RankRow, ...]:
     """The rows in order of their places; 1, 2, 2, 4 where the second and the third are equal."""
-    means = {each: round(fmean(each.values), 2) for each in figures if each.values}
+    means = {each: round(fmean(each.values), 2) for each in measures if each.values}
     placed = [
         _row(each, 1 + sum((other > mean) if highest else (other < mean) for other in means.values()), mean, means)
         for each, mean in means.items()
     ]
-    without = [RankRow(None, False, each) for each in figures if not each.values]
-    return (*sorted(placed, key=lambda row: (row.place, row.figures.student)), *without)
+    without = [RankRow(None, False, each) for each in measures if not each.values]
+    return (*sorted(placed, key=lambda row: (row.place, row.measures.student)), *without)
 
 
-def _row(figures: RankedFigures, place: int, mean: float, means: dict[RankedFigures, float]) -> RankRow:
+def _row(measures: StudentMeasures, place: int, mean: float, means: dict[StudentMeasures, float]) -> RankRow:
     shared = list(means.values()).count(mean) > 1
-    count = len(figures.values)
+    count = len(measures.values)
     if count < 2:
-        return RankRow(place, shared, figures, mean)
-    half = _T95[min(count - 1, len(_T95)) - 1] * stdev(figures.values) / math.sqrt(count)
-    return RankRow(place, shared, figures, mean, mean - half, mean + half)
+        return RankRow(place, shared, measures, mean)
+    half = _T95[min(count - 1, len(_T95)) - 1] * stdev(measures.values) / math.sqrt(count)
+    return RankRow(place, shared, measures, mean, mean - half, mean + half)
 
 
 def _texts(row: RankRow) -> tuple[str, ...]:
     place = "" if row.place is None else f"{row.place}{'=' if row.shared else ''}"
     value = "none" if row.value is None else f"{row.value:.2f}"
     interval = "" if row.low is None or row.high is None else f"{row.low:.2f} to {row.high:.2f}"
-    return place, row.figures.student, value, interval, f"{len(row.figures.values)} of {row.figures.trials}"
+    return place, row.measures.student, value, interval, f"{len(row.measures.values)} of {row.measures.trials}"

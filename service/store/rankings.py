@@ -1,4 +1,4 @@
-"""The figures that the assignments of a batch rank, read from its grades: a table for each criterion. Only reads.
+"""The measures that the assignments of a batch rank, read from its grades: a table for each criterion. Only reads.
 
 Places, ties and intervals are worked out in ``service.grading.ranks``.
 """
@@ -12,7 +12,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.grading.grade import Evidence
-from service.grading.ranks import RankedFigures, RankTable, ranked
+from service.grading.ranks import RankTable, StudentMeasures, ranked
 from service.store.batches import JobLine
 from service.store.codec import decode
 from service.store.models import AssignmentVersion, CriterionResultRow, Job
@@ -55,7 +55,7 @@ def _contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
 
 
 def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[JobLine]) -> RankTable:
-    figures, unit = [], ""
+    measures, unit = [], ""
     for jobs in _portions(lines):
         rows = session.execute(
             select(CriterionResultRow.job_id, CriterionResultRow.evidence).where(
@@ -67,5 +67,5 @@ def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[
             found = [measure for each in evidence for measure in each.measures if measure.name == ranking.measure]
             unit = next((measure.unit for measure in found), unit)
             values = tuple(measure.value for measure in found)
-            figures.append(RankedFigures(jobs[job_id].student, values, len(evidence)))
-    return RankTable(assignment, ranking.title, ranking.measure, unit, ranked(figures, highest=ranking.highest))
+            measures.append(StudentMeasures(jobs[job_id].student, values, len(evidence)))
+    return RankTable(assignment, ranking.title, ranking.measure, unit, ranked(measures, highest=ranking.highest))
