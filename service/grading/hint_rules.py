@@ -95,7 +95,7 @@ def of_errors(clues: Clues) -> Iterator[str]:
         where = f"line {fault.line} of {shown(fault.file)}" if fault.file else listing.at(fault.line)
         name = _NO_NAME.match(fault.message)
         if fault.hint:
-            yield f"{where}: {fault.message}. {fault.hint}"
+            yield f"{where}: {fault.message.rstrip('.')}{'' if fault.message.endswith('?') else '.'} {fault.hint}"
         elif name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
             yield (
                 f"{where} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
