@@ -324,10 +324,10 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
 
 
 def meant_as(part: Part, names: Iterable[str]) -> str:
-    """The Python file that is called nearly as the part has to be; empty if none is."""
+    """The file that is called nearly as the part has to be; empty if none is."""
     word = PART_FILES[part].removesuffix(".py")
-    python = (name for name in sorted(names) if name.lower().endswith(".py") and name != SECOND_PROGRAM)
-    stems = {name: name.lower().removesuffix(".py") for name in python}
+    texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
+    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
     near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
     return next((name for name, stem in stems.items() if word in stem or stem in near), "")
 

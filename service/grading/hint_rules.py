@@ -8,10 +8,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from responders.message_format import IMG_DATA, JSON, PY, kind
 from service.grading.hint_clues import Clues, Listing
 from service.grading.judging.words import quoted
+from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.bundle import PART_FILES, meant_as
@@ -20,13 +22,28 @@ from submissions.marked_cell import NEARLY_MAGIC
 from submissions.raw_files import shown
 
 _NOTEBOOK_LINE = re.compile(r"^\s*[%!]")
-_NEARLY_PY = re.compile(r"""\s*["']?p\s*y\s*[:;.]{1,3}""", re.IGNORECASE)
+_NEARLY_PY = re.compile(r"""\s*["']?(?:p\s*y\s*[:;.]{1,3}|\w{1,6}::)""", re.IGNORECASE)
 _NEARLY_JSON = re.compile(r"""\s*["']?json\s*[:;]{0,3}\s*(?=[\[{"'])""", re.IGNORECASE)
 _RESPONDER = re.compile(r"^(\s*)def\s+(responder|\w+_responder)\b")
 _DEFINED = re.compile(r"^def\s+(\w+)")
 _PRINT = re.compile(r"\bprint\s*\(")
 _RETURNS = re.compile(r"\breturn\s+[^\s#]")
 _RETURNS_OBJECT = re.compile(r"\breturn\b(?!.*JSON::).*(?:dumps|str\s*\(|\{)")
+_NO_ERRORS = (Verdict.TIME_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+_MOST_ERRORS, _LONGEST_ERROR = 3, 300
+#: What to do about an error, by its words and, after a line feed, the line that it is in.
+_ADVICE = [
+    (re.compile(error), advice)
+    for error, advice in (
+        (r"can only concatenate str", "Put str() round what is no text, or use an f-string."),
+        (r"^(?:IndentationError|TabError)", "The lines of one block begin with the same blanks; use no tabs."),
+        (r"^SyntaxError: invalid character '[\u2018-\u201f]", "Type straight quotes, as they are on the keyboard."),
+        (r"(?s)^IndexError.*pyState", "The queue was still empty: wait until an answer has come."),
+        (r"^TypeError: \w*responder\(\) takes", "A responder takes one value: the text that was sent."),
+        (r"^KeyError", "There is nothing under this key: print the object to see what it has."),
+        (r"^TypeError: dump\(\)", "Did you mean json.dumps?"),
+    )
+]
 _NO_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
 _NOTHING_RETURNED = "the responder returned NoneType"
 #: What ``image_data`` without a side comes to.
@@ -49,7 +66,7 @@ def of_magics(clues: Clues) -> Iterator[str]:
     for listing in clues.listings:
         if listing.part is None:
             continue
-        lines = [fault.line for fault in faulty if _is_in(fault, listing)]
+        lines = [fault.line for fault in faulty if _name_of(fault) == listing.name]
         if not lines:
             continue
         place = magic_place("\n".join(listing.lines))
@@ -87,20 +104,23 @@ def of_responder_names(clues: Clues) -> Iterator[str]:
 
 
 def of_errors(clues: Clues) -> Iterator[str]:
-    """Errors about a name that is nearly another, or that only the preloaded magic brings."""
-    for fault in clues.faults:
-        listing = next((each for each in clues.listings if _is_in(fault, each)), None)
-        if listing is None or fault.verdict not in (Verdict.PROGRAM_ERROR, Verdict.RESPONDER_ERROR):
+    """The first error of a trial in its own words, with what was probably meant."""
+    firsts = (faults[0] for recording in clues.recordings if (faults := faults_of(recording)))
+    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in firsts))[:_MOST_ERRORS]:
+        where, code = _place(fault, clues)
+        if not where or fault.verdict in _NO_ERRORS:
             continue
-        where = f"line {fault.line} of {shown(fault.file)}" if fault.file else listing.at(fault.line)
         name = _NO_NAME.match(fault.message)
-        if fault.hint:
-            yield f"{where}: {fault.message.rstrip('.')}{'' if fault.message.endswith('?') else '.'} {fault.hint}"
-        elif name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
+        if name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
             yield (
                 f"{where} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
                 "or the name to be defined"
             )
+            continue
+        advice = fault.hint or next((words for error, words in _ADVICE if error.search(f"{fault.message}\n{code}")), "")
+        sentence = fault.message[:_LONGEST_ERROR].rstrip(".")
+        end = "" if not advice or sentence.endswith("?") else "."
+        yield f"{where}: {sentence}{end}{advice and ' '}{advice}"
 
 
 def of_messages(clues: Clues) -> Iterator[str]:
@@ -111,7 +131,7 @@ def of_messages(clues: Clues) -> Iterator[str]:
         begin = _NEARLY_PY.match(text)
         if begin and not text.startswith(PY):
             yield (
-                f"{clues.where('program', _literal(begin[0]))} prints {quoted(text)}, which is not sent as a message; "
+                f'{clues.where("program", _literal(begin[0]))} prints "{text[:60]}", which is not sent as a message; '
                 f'expected "{PY}" at its very start, in capitals, with two colons and no blank'
             )
             return
@@ -190,13 +210,22 @@ def _wants_queue(clues: Clues) -> bool:
     return asked or any(listing.find(re.compile("pyState")) for listing in clues.of("program"))
 
 
-def _is_in(fault: Fault, listing: Listing) -> bool:
-    if fault.agent or fault.file:
-        return bool(fault.file) and listing.part == ("program" if fault.who == "program" else "responder")
+def _place(fault: Fault, clues: Clues) -> tuple[str, str]:
+    """Where a fault is, and the line; empty where that is no text of the student's."""
+    name = _name_of(fault)
+    listing = next((each for each in clues.listings if each.name == name), Listing(shown(name), None, ()))
+    if not listing.lines and name not in clues.files:
+        return "", ""
+    return listing.at(fault.line), "".join(listing.lines[(fault.line or 0) - 1 : fault.line])
+
+
+def _name_of(fault: Fault) -> str:
+    if fault.file:
+        return fault.file
     if fault.cell is not None:
-        return listing.name == f"cell {fault.cell}"
+        return f"cell {fault.cell}"
     parts = {"program": "robot.py", "responder": "responder.py", "second program": SECOND_PROGRAM}
-    return listing.name == parts.get(fault.who)
+    return f"{fault.agent}.py" if fault.agent else parts.get(fault.who, "")
 
 
 def _is_empty(line: str) -> bool:

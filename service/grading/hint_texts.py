@@ -18,7 +18,7 @@ from submissions.criteria.replies import Replies
 from submissions.criteria.texts import Messages, Prints, Says, TextSequence
 
 _NEAR = 0.72
-_MOST_TEXTS, _LONGEST = 60, 120
+_MOST_TEXTS, _LONGEST = 20, 80
 _DIGITS = re.compile(r"[\d.,]+")
 _QUOTE = re.compile("[\"']")
 
@@ -95,7 +95,7 @@ def _wanted(criterion: Criterion) -> Iterator[_Wanted]:
 
 
 def _is_near(wanted: _Wanted, text: str) -> bool:
-    if len(wanted.text) > _LONGEST or len(text) > 2 * _LONGEST:
+    if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
         return False
     return any(_alike(part, wanted.text) for part in wanted.begins_in(text))
 

@@ -25,18 +25,11 @@ from service.grading.run_plan import RunPlan
 from submissions.submission import Submission
 
 _MOST = 5
-#: What keeps everything else from happening comes first.
-_RULES: Sequence[Callable[[Clues], Iterator[str]]] = (
-    of_missing_files,
-    of_magics,
-    of_responder_names,
-    of_errors,
-    of_messages,
-    of_images,
-    of_printed_answers,
-    of_answers,
-    of_texts,
-)
+Rule = Callable[[Clues], Iterator[str]]
+#: What explains an error better than its own words do; those are told where none of these does.
+_OF_ERRORS: Sequence[Rule] = (of_magics, of_responder_names, of_printed_answers)
+#: What errors come of.
+_OF_MESSAGES: Sequence[Rule] = (of_messages, of_images, of_answers)
 
 
 def hints_for(
@@ -50,6 +43,12 @@ def hints_for(
 
 
 def near_misses(clues: Clues) -> tuple[str, ...]:
-    """All that the rules find, whatever the marks."""
-    found = (sentence for rule in _RULES for sentence in rule(clues))
+    """All that the rules find, whatever the marks; what keeps everything else from happening first."""
+    explained = _found(_OF_ERRORS, clues)
+    errors = () if explained else tuple(of_errors(clues))
+    found = (*of_missing_files(clues), *explained, *_found(_OF_MESSAGES, clues), *errors, *of_texts(clues))
     return tuple(dict.fromkeys(found))[:_MOST]
+
+
+def _found(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
+    return tuple(sentence for rule in rules for sentence in rule(clues))

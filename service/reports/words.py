@@ -190,7 +190,8 @@ def _next_step(grade: Grade, words: VerdictWords) -> str:
     if lost is None or lost.marks >= lost.max_marks:
         return "Full marks: everything that was asked for is there."
     missing, of = number(lost.max_marks - lost.marks), number(lost.max_marks)
-    most = f"Most is to be gained at “{one_line(lost.title, 100)}”, where {missing} of {of} marks are missing."
+    verb = "is" if missing == "1" else "are"
+    most = f"Most is to be gained at “{one_line(lost.title, 100)}”, where {missing} of {of} marks {verb} missing."
     return f"{most} {words.next_step}"
 
 
@@ -217,8 +218,10 @@ def _is_of_an_agent(grade: Grade) -> bool:
 
 def hints_of(grade: Grade) -> tuple[str, ...]:
     """What probably cost marks, as sentences that are fit to be shown; to be said before anything else."""
-    told = (readable(hint[:1].upper() + hint[1:], 600) for hint in grade.hints)
-    return tuple(hint if hint.endswith("?") else f"{hint.rstrip('.')}." for hint in told)
+    told = (readable(hint, 600).rstrip(".") for hint in grade.hints)
+    # The name of a file stays as it is.
+    began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
+    return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
 
 
 def accuracy_words(grade: Grade) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import builtins
 import difflib
 import keyword
+import os
 import re
 import sys
 from collections.abc import Iterable
@@ -40,6 +41,8 @@ def meant_by(error: BaseException) -> str:
         if isinstance(error, ModuleNotFoundError) and str(error).startswith("No module named"):
             brick = _BRICK if "brick_link" in sys.modules else ()
             return _near(str(error.name), [*brick, *sys.stdlib_module_names, *sys.modules], 0.8)
+        if isinstance(error, FileNotFoundError) and isinstance(error.filename, str) and os.getcwd() != "/":
+            return _near(error.filename, os.listdir(), 0.7)
         found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
         return _near(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
     except Exception:

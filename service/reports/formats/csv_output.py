@@ -82,16 +82,7 @@ def _long(row: TableRow[View]) -> Iterator[list[str]]:
     hints = " ".join(hints_of(row.grade.grade))
     for result in row.grade.grade.criteria:
         marks = [number(result.marks), number(result.max_marks)]
-        yield [
-            *_who(row),
-            result.id,
-            result.title,
-            *marks,
-            result.message,
-            " ".join(hints_of(row.grade.grade)),
-            row.source,
-            row.reason,
-        ]
+        yield [*_who(row), result.id, result.title, *marks, result.message, hints, row.source, row.reason]
 
 
 def _who(row: TableRow[View]) -> list[str]:

@@ -100,11 +100,11 @@ def _marks(row: TableRow[GradebookView]) -> str:
 
 def _feedback(row: TableRow[GradebookView]) -> str:
     told = [] if row.grade is None else row.grade.shown.criteria
-    lines = [] if row.grade is None else list(hints_of(row.grade.shown))
-    lines += [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
+    lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    return one_line("; ".join(lines), _LONGEST)
+    hints = () if row.grade is None else hints_of(row.grade.shown)
+    return one_line(" ".join([*hints, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
