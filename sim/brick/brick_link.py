@@ -5,6 +5,7 @@ It knows no physics: positions, sensor values and the time come with the answers
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn, Protocol
 
@@ -16,7 +17,9 @@ FREE_READS = 100_000
 
 _WAITS = frozenset({"until", "until_said", "paid_motor"})
 
-#: Acts that programs do by the thousand go packed; these are their numbers, and those of their words.
+#: Acts that programs do by the thousand go packed: what it is, of which part of the robot, a motor's set point and
+#: command, and a value.
+_packed = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR = range(3)
 _PORTS = {"outB": 0, "outC": 1}
 _SET_POINTS = {"speed_sp": 1, "position_sp": 2, "position": 3, "time_sp": 4}
@@ -39,9 +42,9 @@ class Wire(Protocol):
 
     def send_later(self, frame: Frame) -> None: ...
 
-    def act(self, kind: int, part: int, value: float) -> None: ...
+    def act(self, packed: bytes) -> None: ...
 
-    def act_later(self, kind: int, part: int, set_point: int, command: int, value: float) -> None: ...
+    def act_later(self, packed: bytes) -> None: ...
 
     def receive(self) -> Frame: ...
 
@@ -61,7 +64,7 @@ class Link:
         self._wire: Wire = _Unconnected()
         self._stuck: Callable[[], None] | None = None
         self._free = 0
-        self._sensors: dict[str, tuple[int, int | slice]] = {}
+        self._sensors: dict[tuple[str, int], tuple[bytes, int | slice]] = {}
         self._seen: list[float] = []  # what the sensors read in tick number _seen_in
         self._seen_in = -1
         self._tick = SECOND
@@ -75,7 +78,9 @@ class Link:
         self._wire, self._stuck, self._tick = wire, stuck, tick
         start = 0
         for index, (name, width) in enumerate(sensors.items()):
-            self._sensors[name] = index, slice(start, start + width) if width else start
+            where = slice(start, start + width) if width else start
+            for times in (1, 2):
+                self._sensors[name, times] = _packed(_READ, index, 0, 0, times), where
             start += width or 1
 
     def tell(self, frame: Frame) -> None:
@@ -97,9 +102,9 @@ class Link:
         part, left = _PORTS[port], len(set_points)
         for name, value in set_points.items():
             left -= 1
-            self._wire.act_later(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], value)
+            self._wire.act_later(_packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], value))
         if not set_points and command is not None:
-            self._wire.act_later(_MOTOR, part, 0, _COMMANDS[command], 0)
+            self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
 
     def ask(self, frame: Frame) -> Any:
         """The answer's value, once the world has moved as far as the question takes."""
@@ -125,14 +130,14 @@ class Link:
         Values change only at ticks: a reading that ends before the next one is known already, so the world is told
         of it and not asked. The world counts the time by the same rule, and gives no answer then.
         """
-        index, where = self._sensors[what]
+        packed, where = self._sensors[what, times]
         self._free = 0
         end = self.units + times * READ
         if self._seen_in == end // self._tick:
             self.units = end
-            self._wire.act_later(_READ, index, 0, 0, times)
+            self._wire.act_later(packed)
         else:
-            self._wire.act(_READ, index, times)
+            self._wire.act(packed)
             self._seen = self._answer()
             self._seen_in = self.ticks
         return self._seen[where]
@@ -155,7 +160,7 @@ class Link:
     def wait_units(self, units: int) -> None:
         """The same, in thirds of a microsecond."""
         self._free = 0
-        self._wire.act(_WAIT, 0, units)
+        self._wire.act(_packed(_WAIT, 0, 0, 0, units))
         self._answer()
 
 

@@ -17,8 +17,6 @@ MOST = 65536
 
 #: What begins a packet, where a line begins with a brace: zero, how many entries follow, and the packet's number.
 _HEADER = struct.Struct("<BxHxxxxQ")
-#: An act of a robot program: what it is, of which part of the robot, a motor's set point and command, and a value.
-_ACT = struct.Struct("<BBBBd")
 _MOST_ACTS = 2000
 #: What may be read at once; longer frames come in pieces.
 _AT_ONCE = 8192
@@ -36,15 +34,15 @@ class Wire:
         self._held = b""
         self._acts: list[bytes] = []
 
-    def act_later(self, kind: int, part: int, set_point: int, command: int, value: float) -> None:
-        """An act of a robot program, packed, is sent with the next frame that cannot wait."""
-        self._acts.append(_ACT.pack(kind, part, set_point, command, value))
+    def act_later(self, packed: bytes) -> None:
+        """An act of a robot program is sent with the next frame that cannot wait."""
+        self._acts.append(packed)
         if len(self._acts) == _MOST_ACTS:
             self._write(b"")
 
-    def act(self, kind: int, part: int, value: float) -> None:
+    def act(self, packed: bytes) -> None:
         """An act that asks for something: sent now, after what was held back."""
-        self._acts.append(_ACT.pack(kind, part, 0, 0, value))
+        self._acts.append(packed)
         self._write(b"")
 
     def send_later(self, frame: Frame) -> None:
