@@ -102,7 +102,9 @@ class Link:
         part, left = _PORTS[port], len(set_points)
         for name, value in set_points.items():
             left -= 1
-            self._wire.act_later(_packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], value))
+            self._wire.act_later(
+                _packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], float(value))
+            )
         if not set_points and command is not None:
             self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
 
