@@ -14,6 +14,8 @@ from service.similarity.tokens import Tokens
 
 #: Tokens in a gram, and the neighbours of which one is picked.
 GRAM, WINDOW = 8, 3
+#: Different tokens in a gram that says something; ``[number], [number]`` has four.
+FEWEST_DIFFERENT = 5
 
 _FACTOR, _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9)
 
@@ -28,6 +30,15 @@ def grams(tokens: Tokens) -> NDArray[np.uint64]:
     for place in range(GRAM):
         made = made * _MIX + mixed[place : place + len(made)]
     return made ^ (made >> np.uint64(32))
+
+
+def varied(tokens: Tokens) -> NDArray[np.bool_]:
+    """Of each gram, whether it has enough different tokens to say something; those of tables of numbers have not."""
+    if len(tokens) < GRAM:
+        return np.empty(0, np.bool_)
+    in_order = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
+    steps = np.count_nonzero(in_order[:, 1:] != in_order[:, :-1], axis=1)
+    return np.asarray(steps + 1 >= FEWEST_DIFFERENT)
 
 
 def winnowed(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:

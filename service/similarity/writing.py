@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.similarity.tokens import Tokens, tokens_of
-from service.similarity.winnowing import GRAM, covered, grams, winnowed
+from service.similarity.winnowing import GRAM, covered, grams, varied, winnowed
 
 #: Of a source's own tokens, the part that is in another's from which on two are alike.
 ALIKE = 0.6
@@ -72,8 +72,8 @@ class Writing:
 class _Indexed:
     source: Source
     grams: NDArray[np.uint64]
-    is_own: NDArray[np.bool_]  # of each gram: neither given nor common
-    own_tokens: NDArray[np.bool_]  # of each token: in no gram that is given or common
+    is_own: NDArray[np.bool_]  # of each gram: neither given nor common, and varied
+    own_tokens: NDArray[np.bool_]  # of each token: in a varied gram, and in none that is given or common
     fingerprints: NDArray[np.uint64]
 
     @property
@@ -86,16 +86,18 @@ def source_of(student: str, file: str, text: str) -> Source:
     return Source(student, file, tokens_of(text))
 
 
-def compare(sources: Sequence[Source], given: Sequence[str]) -> Writing:
-    """All pairs of different students' sources that are alike."""
+def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIKE) -> Writing:
+    """All pairs of different students' sources of which one has the part ``alike`` of its own tokens in the other."""
     all_grams = [grams(source.tokens) for source in sources]
     left_out = np.union1d(_given(given), _common(sources, all_grams))
     indexed = [_index(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
     long_enough = [each for each in indexed if each.own >= FEWEST_TOKENS]
-    compared = (_compared(one, other) for one, other in _candidates(long_enough))
-    alike = sorted((each for each in compared if each is not None), key=lambda each: (-each.share, each.students))
+    compared = (_compared(one, other) for one, other in _candidates(long_enough, alike))
+    found = sorted(
+        (each for each in compared if each.share >= alike), key=lambda each: (-each.share, each.students, each.files)
+    )
     heard = {each.source.student for each in long_enough}
-    return Writing(tuple(alike), tuple(sorted({source.student for source in sources} - heard)))
+    return Writing(tuple(found), tuple(sorted({source.student for source in sources} - heard)))
 
 
 def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
@@ -112,13 +114,14 @@ def _common(sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]]) 
 
 
 def _index(source: Source, own: NDArray[np.uint64], left_out: NDArray[np.uint64]) -> _Indexed:
-    masked = np.isin(own, left_out)
+    masked, telling = np.isin(own, left_out), varied(source.tokens)
+    is_own, size = telling & ~masked, len(source.tokens)
     places = winnowed(own)
-    fingerprints = np.unique(own[places[~masked[places]]])
-    return _Indexed(source, own, ~masked, ~covered(masked, len(source.tokens)), fingerprints)
+    fingerprints = np.unique(own[places[is_own[places]]])
+    return _Indexed(source, own, is_own, covered(telling, size) & ~covered(masked, size), fingerprints)
 
 
-def _candidates(indexed: Sequence[_Indexed]) -> Iterator[tuple[_Indexed, _Indexed]]:
+def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[_Indexed, _Indexed]]:
     """Pairs with so many fingerprints in common that they may be alike."""
     if not indexed:
         return
@@ -135,16 +138,14 @@ def _candidates(indexed: Sequence[_Indexed]) -> Iterator[tuple[_Indexed, _Indexe
             other = indexed[number]
             fewest = min(len(one.fingerprints), len(other.fingerprints))
             # Half of what is asked for, as fingerprints are a sample.
-            if shared[number] >= ALIKE / 2 * fewest and one.source.student != other.source.student:
+            if shared[number] >= alike / 2 * fewest and one.source.student != other.source.student:
                 yield one, other
 
 
-def _compared(one: _Indexed, other: _Indexed) -> AlikeSources | None:
+def _compared(one: _Indexed, other: _Indexed) -> AlikeSources:
     like = np.isin(one.grams, other.grams[other.is_own]) & one.is_own
     other_like = np.isin(other.grams, one.grams[one.is_own]) & other.is_own
     shares = (_share(one, like), _share(other, other_like))
-    if max(shares) < ALIKE:
-        return None
     return AlikeSources(
         (one.source.student, other.source.student),
         (one.source.file, other.source.file),
