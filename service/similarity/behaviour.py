@@ -19,7 +19,7 @@ from sim.recorded import faults_of
 from sim.recording import Recording, Verdict
 
 Aspect = Literal["path", "messages", "faults"]
-#: Students with a trial from which on it can be told what is rare among them.
+#: Students who did anything in a trial, from which on it can be told what is rare among them.
 FEWEST_STUDENTS = 8
 #: The part of them that may share what is rare; always two.
 RARE_PART = 0.1
@@ -39,7 +39,7 @@ class TrialName:
 
 @dataclass(frozen=True, slots=True)
 class SameInTrial:
-    """A trial in which two did the same: what of it, how many of all students did so, and how many there are."""
+    """A trial in which two did the same: what of it, how many students did so, of how many that did anything there."""
 
     trial: TrialName
     aspect: Aspect
@@ -64,12 +64,14 @@ def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
 def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
     """For each two students what they did the same and few others did, by their names in order."""
     sharing: dict[tuple[TrialName, Aspect], dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+    active: dict[TrialName, set[str]] = defaultdict(set)
     for student in sorted(behaviours):
-        for what, digest in behaviours[student].items():
-            sharing[what][digest].append(student)
+        for (trial, aspect), digest in behaviours[student].items():
+            sharing[trial, aspect][digest].append(student)
+            active[trial].add(student)
     found: dict[tuple[str, str], list[SameInTrial]] = defaultdict(list)
     for (trial, aspect), groups in sorted(sharing.items(), key=lambda item: (item[0][0].scenario, item[0][0].index)):
-        students = sum(map(len, groups.values()))
+        students = len(active[trial])
         most = max(2, RARE_PART * students)
         for group in groups.values():
             if students >= FEWEST_STUDENTS and 2 <= len(group) <= most:
