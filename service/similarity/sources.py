@@ -56,7 +56,7 @@ def _python_in(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
 
 @cache
 def _python_below(path: Path) -> tuple[str, ...]:
-    paths = [path] if path.is_file() else sorted(path.rglob("*.py"))
+    paths = sorted(path.rglob("*.py")) if path.is_dir() else [path]
     try:
         return tuple(decode_source(each.read_bytes(), each.name).text for each in paths)
     except OSError as error:
