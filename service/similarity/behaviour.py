@@ -16,7 +16,7 @@ from typing import Literal
 
 from service.grading.grade import TrialResult
 from sim.recorded import faults_of
-from sim.recording import Recording, Verdict
+from sim.recording import Fault, Recording, Verdict
 
 Aspect = Literal["path", "messages", "faults"]
 #: Students who did anything in a trial, from which on it can be told what is rare among them.
@@ -100,7 +100,7 @@ def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
     ]
     if said:
         yield "messages", _digest(text.encode("utf-8", "surrogatepass") for text in said)
-    faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in faults_of(recording)]
+    faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _mistakes(recording)]
     if faults:
         yield "faults", _digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
 
@@ -108,6 +108,11 @@ def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
 def _moved(recording: Recording) -> bool:
     ticks = recording.ticks
     return len(ticks) > 0 and bool((ticks.x != ticks.x[0]).any() or (ticks.heading != ticks.heading[0]).any())
+
+
+def _mistakes(recording: Recording) -> list[Fault]:
+    """A program that is stopped when its time is over has none in that: many may run for ever."""
+    return [fault for fault in faults_of(recording) if fault.verdict is not Verdict.TIME_LIMIT]
 
 
 def _digest(pieces: Iterable[bytes]) -> str:

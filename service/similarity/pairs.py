@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from service.similarity.behaviour import Behaviour, SameInTrial, same_in_trials
 from service.similarity.writing import AlikeSources, Source, compare
 
-#: The part of the trials, and at least so many, in which robots that did the same make a pair without alike sources.
+#: The part of the trials, and at least so many, in which robots with the same path make a pair without alike sources.
+#: The same messages make none: where few are right, those few say the same.
 SAME_PART, FEWEST_TRIALS = 0.5, 2
 
 
@@ -57,4 +58,4 @@ def similarity(
 
 
 def _often(same: Sequence[SameInTrial], trials: Iterable[int]) -> bool:
-    return len({each.trial for each in same}) >= max(FEWEST_TRIALS, SAME_PART * max(trials))
+    return sum(each.aspect == "path" for each in same) >= max(FEWEST_TRIALS, SAME_PART * max(trials))

@@ -172,7 +172,7 @@ def _stretches(one: _Indexed, other: _Indexed, like: NDArray[np.bool_]) -> tuple
             runs = [(_run(own, others, begin, at), -at) for at in places[own[begin]][:_MOST_PLACES]]
             length, at = max(runs)
             found.append((begin, -at, length))
-            end = begin + length
+            end = begin + length + GRAM - 1
     longest = sorted(found, key=lambda each: (-each[2], each[0]))[:_MOST_STRETCHES]
     return tuple(_stretch(one, other, each) for each in longest)
 

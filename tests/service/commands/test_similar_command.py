@@ -74,7 +74,10 @@ def test_who_wrote_and_did_the_same_is_one_pair_with_all_its_evidence(graded: tu
     (pair,) = found.pairs
     assert pair.students == ("ada", "zebedee")
     assert [each.files for each in pair.sources] == [("responder.py", "responder.py")]
-    assert {(each.trial.scenario, each.aspect) for each in pair.trials} >= {("plain", "path"), ("with-obstacle", "path")}
+    assert {(each.trial.scenario, each.aspect) for each in pair.trials} >= {
+        ("plain", "path"),
+        ("with-obstacle", "path"),
+    }
     assert found.too_short == tuple(f"s{number}" for number in range(8))
     given = similarities(store, lines, examples(ASSIGNMENT) / "reference" / "responder.py")
     assert [each.sources for each in given[0].pairs] == [()]
@@ -93,7 +96,9 @@ def test_the_command_shows_a_table_and_writes_a_page(
     page = (tmp_path / "similar.html").read_text(encoding="utf-8")
     assert "Alike in &lt;class&gt;" in page
     assert "across, down = shape.sum" in page
-    with pytest.raises(UsageError, match=r"nowhere: cannot be read \(No such file or directory\), expected Python files"):
+    with pytest.raises(
+        UsageError, match=r"nowhere: cannot be read \(No such file or directory\), expected Python files"
+    ):
         similar(batch, given=tmp_path / "nowhere")
 
 

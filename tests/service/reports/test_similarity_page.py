@@ -1,4 +1,4 @@
-"""What is alike, told: to staff as a page, a table and JSON, with nothing of a student's run; to students not at all."""
+"""What is alike, told to staff as a page, a table and JSON, with nothing of a student's run; to students not at all."""
 
 from __future__ import annotations
 

@@ -32,8 +32,7 @@ def alike(found: Writing) -> AlikeSources:
 def program(number: int, lines: int = 14) -> str:
     """A program like no other of another number: what it calls is its own."""
     return "\n".join(
-        f"motor_{number}.turn_{line}(speed) + sensor_{number}.read_{line}(not limit_{number})"
-        for line in range(lines)
+        f"motor_{number}.turn_{line}(speed) + sensor_{number}.read_{line}(not limit_{number})" for line in range(lines)
     )
 
 
@@ -114,7 +113,7 @@ def test_stretches_of_what_changed_places_point_crosswise() -> None:
 
 def test_names_numbers_texts_and_layout_do_not_count() -> None:
     one = "total = 0\nfor place in range(9):\n    total += read(place, 'left')\n"
-    other = "t=1 # sum\nfor i in range(10) :\n\tt += read( i,\n  \"right\" )\n"
+    other = 't=1 # sum\nfor i in range(10) :\n\tt += read( i,\n  "right" )\n'
     assert tokens_of(one).numbers.tolist() == tokens_of(other).numbers.tolist()
     assert tokens_of(one).numbers.tolist() != tokens_of(one.replace("read", "write")).numbers.tolist()
 
