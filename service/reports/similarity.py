@@ -25,13 +25,15 @@ _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 
 
 def what_it_says(found: Similarity) -> str:
-    """One sentence on an assignment: how many pairs, and for how many students nothing can be said."""
+    """One sentence on an assignment: how many pairs, and of what nothing can be said."""
     pairs = "1 pair is" if len(found.pairs) == 1 else f"{len(found.pairs) or 'no'} pairs are"
     said = f"{found.assignment}: {pairs} alike among {found.students} students"
-    if not found.too_short:
-        return said
-    who = "1 has" if len(found.too_short) == 1 else f"{len(found.too_short)} have"
-    return f"{said}; {who} too little code of their own to compare (under {FEWEST_TOKENS} tokens)"
+    if found.too_short:
+        who = "1 has" if len(found.too_short) == 1 else f"{len(found.too_short)} have"
+        said += f"; {who} too little code of their own to compare (under {FEWEST_TOKENS} tokens)"
+    if found.not_compared:
+        said += f"; {found.not_compared} pairs that have less in common were too many to compare"
+    return said
 
 
 def similarity_rows(found: Similarity) -> list[tuple[str, ...]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from heapq import nlargest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ ALIKE = 0.6
 FEWEST_TOKENS = 60
 #: What this part of the students has, and at least so many, is common to them: a page of the docs, a hint in class.
 COMMON_PART, FEWEST_IN_COMMON = 1 / 3, 5
+#: Pairs that are compared, those with most in common; hundreds of copies of one large file are thousands of pairs.
+MOST_PAIRS = 2000
 #: Places of the same gram that a stretch may go on from.
 _MOST_PLACES = 8
 _MOST_STRETCHES = 50
@@ -62,10 +65,14 @@ class AlikeSources:
 
 @dataclass(frozen=True, slots=True)
 class Writing:
-    """What is alike in a batch, the most alike first; ``too_short`` are the students with too little of their own."""
+    """What is alike in a batch, the most alike first.
+
+    ``too_short`` are the students with too little of their own; ``not_compared`` are pairs of sources that were too many.
+    """
 
     alike: tuple[AlikeSources, ...]
     too_short: tuple[str, ...]
+    not_compared: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +99,15 @@ def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIK
     left_out = np.union1d(_given(given), _common(sources, all_grams))
     indexed = [_index(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
     long_enough = [each for each in indexed if each.own >= FEWEST_TOKENS]
-    compared = (_compared(one, other) for one, other in _candidates(long_enough, alike))
+    candidates = list(_candidates(long_enough, alike))
+    chosen = nlargest(MOST_PAIRS, candidates, key=lambda candidate: candidate[0])
+    compared = (_compared(one, other) for _, one, other in chosen)
     found = sorted(
         (each for each in compared if each.share >= alike), key=lambda each: (-each.share, each.students, each.files)
     )
     heard = {each.source.student for each in long_enough}
-    return Writing(tuple(found), tuple(sorted({source.student for source in sources} - heard)))
+    too_short = sorted({source.student for source in sources} - heard)
+    return Writing(tuple(found), tuple(too_short), len(candidates) - len(chosen))
 
 
 def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
@@ -121,8 +131,8 @@ def _index(source: Source, own: NDArray[np.uint64], left_out: NDArray[np.uint64]
     return _Indexed(source, own, is_own, covered(telling, size) & ~covered(masked, size), fingerprints)
 
 
-def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[_Indexed, _Indexed]]:
-    """Pairs with so many fingerprints in common that they may be alike."""
+def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[float, _Indexed, _Indexed]]:
+    """Pairs with so many fingerprints in common that they may be alike, and what part of them that is."""
     if not indexed:
         return
     numbers = np.concatenate([each.fingerprints for each in indexed])
@@ -136,10 +146,10 @@ def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[_In
         shared = np.bincount(np.concatenate([np.empty(0, np.int64), *who]), minlength=len(indexed))
         for number in (np.flatnonzero(shared[place + 1 :]) + place + 1).tolist():
             other = indexed[number]
-            fewest = min(len(one.fingerprints), len(other.fingerprints))
+            part = shared[number] / min(len(one.fingerprints), len(other.fingerprints))
             # Half of what is asked for, as fingerprints are a sample.
-            if shared[number] >= alike / 2 * fewest and one.source.student != other.source.student:
-                yield one, other
+            if part >= alike / 2 and one.source.student != other.source.student:
+                yield float(part), one, other
 
 
 def _compared(one: _Indexed, other: _Indexed) -> AlikeSources:

@@ -156,3 +156,13 @@ def test_only_candidates_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     found = compare([*sources, source_of("eve", "robot.py", program(7))], [])
     assert [pair.students for pair in found.alike] == [("7", "eve")]
     assert len(compared) == 1
+
+
+def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writing, "MOST_PAIRS", 2)
+    half = f"{program(1)}\n{program(2)}"
+    sources = [source_of("ada", "robot.py", program(1)), source_of("bob", "robot.py", half)]
+    sources += [source_of(str(number), "robot.py", program(number)) for number in range(3, 18)]
+    sources += [source_of("eve", "robot.py", program(3)), source_of("ivy", "robot.py", f"{program(4)}\n{program(5)}")]
+    found = compare(sources, [])
+    assert (len(found.alike), found.not_compared) == (2, 2)
