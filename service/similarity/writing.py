@@ -67,7 +67,7 @@ class AlikeSources:
 class Writing:
     """What is alike in a batch, the most alike first.
 
-    ``too_short`` are the students with too little of their own; ``not_compared`` are pairs of sources that were too many.
+    ``too_short`` are the students with too little of their own, ``not_compared`` how many pairs were too many.
     """
 
     alike: tuple[AlikeSources, ...]
