@@ -94,7 +94,11 @@ def source_of(student: str, file: str, text: str) -> Source:
 
 
 def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIKE) -> Writing:
-    """All pairs of different students' sources of which one has the part ``alike`` of its own tokens in the other."""
+    """All pairs of different students' sources of which one has the part ``alike`` of its own tokens in the other.
+
+    The students of a pair stand in the order of their names.
+    """
+    sources = sorted(sources, key=lambda source: source.student)
     all_grams = [grams(source.tokens) for source in sources]
     left_out = np.union1d(_given(given), _common(sources, all_grams))
     indexed = [_index(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
