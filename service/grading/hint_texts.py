@@ -30,7 +30,7 @@ class _Wanted:
     text: str
     how: str
 
-    def begins_in(self, text: str) -> Iterator[str]:
+    def compared_parts(self, text: str) -> Iterator[str]:
         """What of a text is to be compared with it: all, as many words from its start, or from anywhere."""
         words, count = text.split(), len(self.text.split())
         if self.how == "equals":
@@ -97,7 +97,7 @@ def _wanted(criterion: Criterion) -> Iterator[_Wanted]:
 def _is_near(wanted: _Wanted, text: str) -> bool:
     if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
         return False
-    return any(_alike(part, wanted.text) for part in wanted.begins_in(text))
+    return any(_alike(part, wanted.text) for part in wanted.compared_parts(text))
 
 
 def _alike(one: str, other: str) -> bool:

@@ -187,7 +187,9 @@ def _next_step(grade: Grade, words: VerdictWords) -> str:
     if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
         return words.next_step
     lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
-    if lost is None or lost.marks >= lost.max_marks:
+    if lost is None:
+        return words.next_step
+    if lost.marks >= lost.max_marks:
         return "Full marks: everything that was asked for is there."
     missing, of = number(lost.max_marks - lost.marks), number(lost.max_marks)
     verb = "is" if missing == "1" else "are"
