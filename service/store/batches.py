@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
@@ -104,8 +105,8 @@ def find_job(session: Session, start: str) -> str:
 
 def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
     """The newest batches first."""
-    query = select(Batch.id).order_by(Batch.created_at.desc(), Batch.id).limit(limit)
-    return [batch(session, batch_id) for batch_id in session.scalars(query)]
+    rows = session.scalars(select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
+    return _batch_lines(session, rows)
 
 
 def batch(session: Session, batch_id: str) -> BatchLine:
@@ -113,13 +114,7 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     row = session.get(Batch, batch_id)
     if row is None:
         raise UsageError(f"there is no batch {batch_id}")
-    # What a worker in quarantine graded is in the batch a second time.
-    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
-    states = dict(session.execute(counted.group_by(Job.state)).all())
-    refusals = decode(tuple[Refusal, ...], row.refusals)
-    return BatchLine(
-        row.id, row.name, row.state, row.created_at, refusals, sum(states.values()), states, row.regrade_of
-    )
+    return _batch_lines(session, [row])[0]
 
 
 def job_lines(session: Session, batch_id: str) -> list[JobLine]:
@@ -154,6 +149,29 @@ def progress(session: Session, batch_id: str) -> BatchProgress:
         partial=session.scalar(running) or 0.0,
         plots_due=session.scalar(waiting) or 0,
     )
+
+
+def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
+    # What a worker in quarantine graded is in the batch a second time.
+    counted = select(Job.batch_id, Job.state, func.count()).where(
+        Job.batch_id.in_([row.id for row in rows]), Job.suspect.is_(None)
+    )
+    states: dict[str | None, dict[JobState, int]] = {row.id: {} for row in rows}
+    for batch_id, state, count in session.execute(counted.group_by(Job.batch_id, Job.state)):
+        states[batch_id][state] = count
+    return [
+        BatchLine(
+            row.id,
+            row.name,
+            row.state,
+            row.created_at,
+            decode(tuple[Refusal, ...], row.refusals),
+            sum(states[row.id].values()),
+            states[row.id],
+            row.regrade_of,
+        )
+        for row in rows
+    ]
 
 
 def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:

@@ -165,6 +165,8 @@ class Job(Base):
         Index(None, "started_at"),
         Index(None, "plots", "plots_due_at"),
         Index(None, "worker", "finished_at"),
+        # All that the counts of a batch are made of, so that they read no job.
+        Index(None, "batch_id", "state", "plots", "suspect"),
         CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
     )
 
@@ -173,7 +175,7 @@ class Job(Base):
     assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"), index=True)
     # The two shares that a claim weighs, beside the job so that a claim reads one table.
     enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"), index=True)
-    batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
+    batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))
     lane: Mapped[Lane]
     state: Mapped[JobState] = mapped_column(default=JobState.QUEUED)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, Subquery, and_, case, func, not_, or_, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import Session
 
 from service.store.models import Batch, Job
 from service.store.states import BatchState, JobState, Lane
@@ -38,13 +38,15 @@ def next_job(session: Session, at: datetime, worker: str) -> str | None:
     The lane first: people before batches, but for one job in five. In a lane, the batch and then the student of
     whom fewest jobs were begun in the last minute; then the oldest job.
     """
-    recent = (Job.started_at > at - SHARE_WINDOW,)
-    by_lane = dict(session.execute(select(Job.lane, func.count()).where(*recent).group_by(Job.lane)).all())
+    begun = select(Job.lane, Job.batch_id, Job.enrolment_id).where(Job.started_at > at - SHARE_WINDOW)
+    # A common table, or SQLite would walk all jobs there ever were to count each share.
+    recent = begun.cte("recent")
+    by_lane = dict(session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane)).all())
     people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
     first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
 
-    of_batch = _begun(Job.batch_id, at)
-    of_student = _begun(Job.enrolment_id, at)
+    of_batch = _shares(recent.c.batch_id)
+    of_student = _shares(recent.c.enrolment_id)
     query = (
         select(Job.id)
         .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
@@ -70,10 +72,5 @@ def _better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
     return and_(failed_here, Job.due_at > at - ELSEWHERE, another_lives(worker, at))
 
 
-def _begun(share: InstrumentedAttribute[str | None] | InstrumentedAttribute[int], at: datetime) -> Subquery:
-    return (
-        select(share.label("share"), func.count().label("begun"))
-        .where(Job.started_at > at - SHARE_WINDOW)
-        .group_by(share)
-        .subquery()
-    )
+def _shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
+    return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()

@@ -12,7 +12,7 @@ from sqlalchemy import func, select, update
 
 import report_builders
 from builders import grading_request, settings_in
-from databases import fresh_database
+from harness.postgresql_server import fresh_database
 from service.settings import Settings
 from service.store import jobs, regrades, results
 from service.store.backup import back_up, restore

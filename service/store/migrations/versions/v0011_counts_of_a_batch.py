@@ -1,0 +1,20 @@
+"""The index that finds a batch's jobs has all that its counts are made of, so that counting reads no job."""
+
+from __future__ import annotations
+
+from alembic import op
+
+from service.store.migrate import refuse_downgrade
+
+revision = "0011"
+down_revision = "0010"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.create_index("ix_job_batch_id_state_plots_suspect", "job", ["batch_id", "state", "plots", "suspect"])
+    op.drop_index("ix_job_batch_id", "job")
+
+
+downgrade = refuse_downgrade
