@@ -26,10 +26,9 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
-from builders import grading_request
-from paths import DATA
-from postgresql_server import PostgresqlServer
-from processes import children, command_line, descendants
+from harness.postgresql_server import PostgresqlServer
+from harness.process_tree import children, command_line, descendants
+from responders.code import Code
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.queue.broker import EmbeddedBroker
@@ -44,7 +43,9 @@ from service.store.intake import accept_batch, load_grading_request
 from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
 from service.store.states import UNFINISHED, JobState, Lane
 from sim.errors import HostError
+from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
+from submissions.submission import Submission
 
 #: Behaviours that differ; every submission is one of them, with a text of its own so that none is a copy of another.
 _VARIANTS = 12
@@ -58,6 +59,8 @@ _MOMENTS = (
     "graded_at",
     "finished_at",
 )
+#: A Python started with this on its path has a clock that is wrong.
+_WRONG_CLOCK = Path(__file__).parent / "wrong_clock"
 _STEP = timedelta(hours=1)
 
 
@@ -76,7 +79,13 @@ def _program(variant: int, number: int) -> str:
 
 def some_requests(count: int) -> list[GradingRequest]:
     """Short submissions of many students, each with a text of its own."""
-    return [grading_request(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
+    return [_request(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
+
+
+def _request(student: str, program: str) -> GradingRequest:
+    responder = Code("responder.py", "def responder(msg):\n    return msg\n")
+    submission = Submission(student, Code("robot.py", program), responder)
+    return GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")
 
 
 def quiet_hashes() -> list[tuple[str, ...]]:
@@ -182,7 +191,7 @@ class FaultInjector:
         environment = {**os.environ, **self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
         if place == 0 and self._server is not None:
             # On many machines, one's clock is wrong.
-            environment["PYTHONPATH"] = str(DATA / "wrong_clock")
+            environment["PYTHONPATH"] = str(_WRONG_CLOCK)
         log = self._home / "log" / f"worker-{place}.log"
         return start_process([sys.executable, "-m", "service.queue.worker"], environment, log, signal.SIGKILL)
 

@@ -1,4 +1,4 @@
-"""A PostgreSQL server from a wheel that can be killed and started again."""
+"""A PostgreSQL server from a wheel that can be killed and started again, and empty databases on it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import signal
 import subprocess
 import tempfile
 import time
+import uuid
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import psycopg
 
@@ -70,3 +71,19 @@ class PostgresqlServer:
         """End it and remove its data."""
         self._server.cleanup()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def fresh_database(server: str) -> str:
+    """A new, empty database on the server; its URL as SQLAlchemy has it."""
+    name = f"test_{uuid.uuid4().hex}"
+    with psycopg.connect(server, autocommit=True) as connection:
+        connection.execute(f'CREATE DATABASE "{name}"')  # type: ignore[call-overload]
+    base, _, query = server.partition("?")
+    url = base.rsplit("/", 1)[0] + f"/{name}" + (f"?{query}" if query else "")
+    return url.replace("postgresql://", "postgresql+psycopg://", 1)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from builders import settings_in
-from databases import fresh_database, postgresql_server
+from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from service.store.engine import Store, open_store
@@ -35,8 +35,8 @@ def runner() -> Iterator[TrialRunner]:
 
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[str]:
-    with postgresql_server() as url:
-        yield url
+    with PostgresqlServer() as server:
+        yield server.url
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])

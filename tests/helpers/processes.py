@@ -33,27 +33,6 @@ def alive(pid: int) -> bool:
         return False
 
 
-def command_line(pid: int) -> str:
-    """What the process was started as; empty when it has ended."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-    except (FileNotFoundError, ProcessLookupError):
-        return ""
-
-
-def children(pid: int) -> list[int]:
-    """Those that the main thread of the process has started."""
-    try:
-        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except (FileNotFoundError, ProcessLookupError):
-        return []
-
-
-def descendants(pid: int) -> list[int]:
-    """All below the process."""
-    return [each for child in children(pid) for each in (child, *descendants(child))]
-
-
 @contextmanager
 def robomark(*arguments: str | Path, **environment: str) -> Iterator[subprocess.Popen[str]]:
     """A command that runs meanwhile, with its output in pipes; killed at the end if it still runs."""

@@ -17,8 +17,9 @@ from typing import Any
 import pytest
 
 from command import COMMAND
+from harness.process_tree import children
 from hostile import FIND_WIRE, forged, packed
-from processes import children, until
+from processes import until
 from responders.bridge import Bridge
 from responders.code import Code
 from responders.conversation import Conversation

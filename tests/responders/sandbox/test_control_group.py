@@ -18,9 +18,10 @@ from typing import Any
 import pytest
 
 from builders import settings_in
+from harness.process_tree import descendants
 from memory_group import MemoryGroup, memory_group
 from paths import HELPERS
-from processes import PATIENCE, alive, descendants, until
+from processes import PATIENCE, alive, until
 from responders.sandbox import control_group
 from responders.sandbox.control_group import ControlGroup
 from service.queue.broker import EmbeddedBroker

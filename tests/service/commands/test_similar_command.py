@@ -13,7 +13,7 @@ from test_batch_commands import robomark
 
 import report_builders
 from builders import opened, settings_in
-from copyists import COPYISTS
+from harness.copyists import COPYISTS
 from responders.code import Code
 from service.commands.batch.similar import similar
 from service.report_files import write_batch

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from builders import settings_in
-from databases import fresh_database
-from fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
-from postgresql_server import PostgresqlServer
+from harness.fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
+from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.store.engine import open_store
 from service.store.states import JobState
 

@@ -15,8 +15,9 @@ from rich.console import Console
 from sqlalchemy import func, select
 
 from builders import comparable, grading_request, settings_in
-from databases import fresh_database
-from processes import children, command_line, descendants, until
+from harness.postgresql_server import fresh_database
+from harness.process_tree import children, command_line, descendants
+from processes import until
 from service.commands.batch.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner

@@ -17,7 +17,8 @@ from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import func, select
 
 from builders import accept_one, grading_request, settings_in
-from processes import COMMAND, alive, command_line, descendants, robomark, until
+from harness.process_tree import command_line, descendants
+from processes import COMMAND, alive, robomark, until
 from service.command_line import main
 from service.queue.broker import broker_answers
 from service.queue.worker import worker_lives
