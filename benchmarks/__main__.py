@@ -1,35 +1,74 @@
 """Prints each measurement beside its budget. Ratios and CPU time, so that a busy machine changes little.
 
-``python -m benchmarks queue`` measures the queue alone; ``python -m benchmarks chaos`` does harm to it.
+``python -m benchmarks queue rows`` measures these two alone. ``chaos``, ``capacity``, ``costs`` and ``plans`` are no
+part of the table (docs/performance.md).
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
-from rich.console import Console
-from rich.table import Table
-
-from benchmarks import chaos, queue, sandbox, simulator, submission
+from benchmarks import (
+    calibration,
+    chaos,
+    cold_batch,
+    commands,
+    grading,
+    growth,
+    original,
+    queue,
+    rows,
+    sandbox,
+    simulator,
+    submission,
+    table,
+)
 from benchmarks.measurement import Measurement
+
+#: Each measures so often as it is told, and gives its lines.
+GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
+    {
+        "calibration": calibration.measure,
+        "commands": commands.measure,
+        "grading": grading.measure,
+        "simulator": simulator.measure,
+        "original": original.measure,
+        "growth": growth.measure,
+        "cold_batch": cold_batch.measure,
+        "submission": submission.measure,
+        "sandbox": sandbox.measure,
+        "rows": rows.measure,
+        "queue": queue.measure,
+    }
+)
+#: Those that ``--quick`` measures, under a minute in all.
+_QUICK = ("calibration", "commands", "grading", "simulator", "original", "growth")
+_OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType({"chaos": chaos.main, "plans": rows.main})
 
 
 def main(arguments: list[str]) -> int:
-    """Measure, then print one table."""
-    if arguments[:1] == ["chaos"]:
-        return chaos.main(arguments[1:])
-    if arguments[:1] == ["queue"]:
-        _print(queue.measure())
-    else:
-        _print([*simulator.measure(), *submission.measure(), *sandbox.measure(), *queue.measure()])
-    return 0
+    """Measure, then print one table; 1 if a ratio misses its budget."""
+    if arguments and arguments[0] in _OTHERS:
+        return _OTHERS[arguments[0]](arguments[1:])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("group", nargs="*", help="what is measured; all by default")
+    parser.add_argument("--quick", action="store_true", help="what can be measured in less than a minute")
+    parser.add_argument("--record", action="store_true", help="keep the lines as what later runs are compared with")
+    chosen = parser.parse_args(arguments)
+    if unknown := [name for name in chosen.group if name not in GROUPS]:
+        parser.error(f"there is no group {unknown[0]}; there are {', '.join(GROUPS)}")
+    names = chosen.group or (_QUICK if chosen.quick else tuple(GROUPS))
+    before = table.recorded()
+    measured = [row for name in names for row in GROUPS[name](3 if chosen.quick else 5)]
+    table.show(measured, before)
+    table.write(table.LATEST, measured)
+    if chosen.record:
+        table.write(table.RECORDED, measured)
+    return int(any(row.gates for row in measured))
 
 
-def _print(rows: list[Measurement]) -> None:
-    table = Table("what", "measured", "budget", "beyond", box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(row.what, row.measured, row.budget, row.beyond)
-    Console(width=140).print(table)
-
-
-sys.exit(main(sys.argv[1:]))
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -5,17 +5,12 @@ Not part of the table: ``python -m benchmarks chaos [SUBMISSIONS]`` runs it and 
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
-# The harness is the one of the tests.
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
-
-from builders import settings_in
-from databases import fresh_database
-from fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
-from postgresql_server import PostgresqlServer
+from harness.fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
+from harness.postgresql_server import PostgresqlServer, fresh_database
+from service.settings import load_settings
 from service.store.engine import open_store
 from service.store.states import JobState
 
@@ -46,7 +41,14 @@ def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int
         server = None if database == "SQLite" else PostgresqlServer(folder)
         home = folder / "home" if server is None else Path(elsewhere)
         url = "" if server is None else fresh_database(server.url)
-        settings = settings_in(home, concurrency=1, lease_seconds=_LEASE_SECONDS, database_url=url)
+        settings = load_settings(
+            home=home,
+            concurrency=1,
+            backoff_seconds=0.2,
+            notify_seconds=1.0,
+            lease_seconds=_LEASE_SECONDS,
+            database_url=url,
+        )
         try:
             with open_store(settings) as store:
                 injector = FaultInjector(settings, store, server, _WORKERS, campaign.seed, disk)

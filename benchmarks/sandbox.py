@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.measurement import Measurement
+from benchmarks.measurement import KIBIBYTES, MEGABYTES, MILLISECONDS, SECONDS, Measurement, median, wall_seconds
 from responders import wire
 from responders.sandbox.inside import grants, lockdown
 from responders.sandbox.manager import Sandboxes
@@ -51,10 +51,10 @@ input()
 """
 
 
-def measure() -> list[Measurement]:
+def measure(_times: int) -> list[Measurement]:
     """About twenty seconds."""
     with Sandboxes() as sandboxes, sandboxes.private_folder() as folder:
-        cold = _seconds(lambda: _spawn(sandboxes, "responder").close())
+        cold = wall_seconds(lambda: _spawn(sandboxes, "responder").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
         heavy = _many(100, lambda: _until_locked(sandboxes, "responder"))
         answers = _many(50, lambda: _until_answer(sandboxes))
@@ -66,27 +66,28 @@ def measure() -> list[Measurement]:
         stalled = _stall_overshoot(sandboxes)
         output = _output_overshoot(sandboxes, folder)
     return [
-        Measurement("sandbox: fork to locked, robot", _spread(light), "10 ms, p95 15 ms"),
-        Measurement("sandbox: fork to locked, responder with scikit-learn", _spread(heavy), "15 ms, p95 25 ms"),
-        Measurement("sandbox: fork to first answer, responder", _spread(answers), "20 ms, p95 30 ms"),
-        Measurement("sandbox: Landlock and the filter alone", _spread(alone), "5 ms"),
-        Measurement("sandbox: message and answer", _spread(turns), "0.2 ms"),
-        Measurement("sandbox: kill and reap, responder", _spread(ends), "p95 15 ms"),
-        Measurement("sandbox: zygote with scikit-learn, cold start", f"{cold:.2f} s", "5 s"),
-        Measurement(
-            "sandbox: idle responder of ten, its own and its share", f"{dirty:.1f} MB, {share:.1f} MB", "5 MB, 20 MB"
-        ),
-        Measurement("sandbox: CPU beyond the limit", f"{cpu * 1000:.0f} ms", "100 ms"),
-        Measurement("sandbox: waiting beyond the limit", f"{stalled * 1000:.0f} ms", "100 ms"),
-        Measurement("sandbox: output beyond the limit", f"{output / 1024:.0f} KiB", "128 KiB"),
-        Measurement("sandbox: worker killed, until nothing is left", f"{_until_nothing_left() * 1000:.0f} ms", "1 s"),
+        _timed("fork to locked, robot", light, 10),
+        _timed("fork to locked, responder with scikit-learn", heavy, 15, 8),
+        _timed("fork to first answer, responder", answers, 20),
+        _timed("Landlock and the filter alone", alone, 5),
+        _timed("message and answer", turns, 0.2),
+        _timed("kill and reap, responder", ends, 15),
+        Measurement("sandbox: zygote with scikit-learn, cold start", cold, SECONDS, 5),
+        Measurement("sandbox: memory of an idle responder's own, one of ten", dirty, MEGABYTES, 5),
+        Measurement("sandbox: its share of all memory", share, MEGABYTES, 20),
+        Measurement("sandbox: CPU beyond the limit", 1000 * cpu, MILLISECONDS, 100),
+        Measurement("sandbox: waiting beyond the limit", 1000 * stalled, MILLISECONDS, 100),
+        Measurement("sandbox: output beyond the limit", output / 1024, KIBIBYTES, 128),
+        Measurement("sandbox: worker killed, until nothing is left", _until_nothing_left(), SECONDS, 1),
     ]
 
 
-def _spread(seconds: list[float]) -> str:
+def _timed(what: str, seconds: list[float], budget: float, beyond: float | None = None) -> Measurement:
     ordered = sorted(seconds)
-    median, late = ordered[len(ordered) // 2], ordered[len(ordered) * 95 // 100]
-    return f"{median * 1000:.2f} ms, p95 {late * 1000:.2f} ms"
+    late = ordered[len(ordered) * 95 // 100]
+    return Measurement(
+        f"sandbox: {what}", 1000 * median(ordered), MILLISECONDS, budget, beyond, f"p95 {1000 * late:.2f} ms"
+    )
 
 
 def _many(count: int, sample: Callable[[], float]) -> list[float]:
@@ -94,12 +95,6 @@ def _many(count: int, sample: Callable[[], float]) -> list[float]:
     for _ in range(5):
         sample()
     return [sample() for _ in range(count)]
-
-
-def _seconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
 
 
 def _spawn(sandboxes: Sandboxes, role: Role, folder: Path | None = None) -> Child:
@@ -115,7 +110,7 @@ def _until_locked(sandboxes: Sandboxes, role: Role) -> float:
 
 
 def _until_gone(sandboxes: Sandboxes) -> float:
-    return _seconds(_spawn(sandboxes, "responder").close)
+    return wall_seconds(_spawn(sandboxes, "responder").close)
 
 
 def _until_answer(sandboxes: Sandboxes) -> float:
@@ -130,7 +125,7 @@ def _until_answer(sandboxes: Sandboxes) -> float:
 def _turns(sandboxes: Sandboxes) -> list[float]:
     child = _echo(sandboxes)
     try:
-        return _many(500, lambda: _seconds(lambda: _turn(child)))
+        return _many(500, lambda: wall_seconds(lambda: _turn(child)))
     finally:
         child.close()
 
@@ -205,7 +200,7 @@ def _cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
 
 def _stall_overshoot(sandboxes: Sandboxes) -> float:
     text = "import select; select.select([], [], [])"
-    return _seconds(lambda: _run_to_its_end(sandboxes, text, _LIMITS["robot"])) - _STALLED
+    return wall_seconds(lambda: _run_to_its_end(sandboxes, text, _LIMITS["robot"])) - _STALLED
 
 
 def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:

@@ -12,17 +12,14 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from pathlib import Path
 
+from harness.copyists import COPYISTS
 from models.intervals import wilson
 from service.similarity.sources import given_with
 from service.similarity.writing import ALIKE, FEWEST_TOKENS, compare, source_of
 from submissions.assignment.examples import REFERENCE, examples
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
-from copyists import COPYISTS
 
 #: Solutions of one assignment of which none was made of another, as their texts show; one of each hand and idea.
 WRITTEN_ANEW = (

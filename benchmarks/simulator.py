@@ -2,97 +2,121 @@
 
 from __future__ import annotations
 
-import time
+import random
 
-from benchmarks.measurement import Measurement, cpu_seconds, median_of
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.measurement import (
+    COUNT,
+    MILLISECONDS,
+    RATIO,
+    SPEED,
+    Measurement,
+    cpu_seconds,
+    median_of,
+    wall_seconds,
+)
 from responders.channel import Channel
 from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
-from sim.camera import BulletCamera, CachedCamera, LightCamera
+from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, LightCamera
 from sim.floors import floor
 from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World
 
-_SECONDS = 60
-_START = Pose(320, 500, 90)
-_FLOOR = "Loop"
+SECONDS = 60
+START = Pose(320, 500, 90)
+FLOOR = "Loop"
 #: Stays at the edge of the loop for the whole minute.
-_FOLLOWER = """
+FOLLOWER = """
 while True:
     turn = (colorLeft.reflected_light_intensity - 128) * 0.15
     colorRight.reflected_light_intensity
     tank_drive.on(25 - turn, 25 + turn)
 """
+_ALONE = "simulator alone, 60 s line follower"
+_SIDE = 20
 _LIMITS = ChildLimits(30, 512 << 20)
 
 
-def measure() -> list[Measurement]:
-    """Times real time, on one core, by CPU time."""
-    pixels = floor(_FLOOR).pixels
+def measure(times: int) -> list[Measurement]:
+    """Times real time, on one core, by CPU time; and what the two sandboxed processes add."""
+    pixels = floor(FLOOR).pixels
     arena, cached, camera = Arena(), CachedCamera(pixels), BulletCamera(pixels)
     try:
-        table = median_of(5, lambda: cpu_seconds(lambda: _follow(arena, cached)))
-        shots = median_of(3, lambda: cpu_seconds(lambda: _follow(arena, camera)))
+        table = median_of(times, lambda: cpu_seconds(lambda: _follow(arena, cached)))
+        shots = median_of(min(times, 3), lambda: cpu_seconds(lambda: _follow(arena, camera)))
+        differing = _differing_pixels(camera, pixels)
     finally:
         camera.close()
         cached.close()
         arena.close()
     with TrialRunner() as runner:
-        both = median_of(5, lambda: _through_processes(runner))
-        ready = median_of(20, lambda: _until_ready(runner))
+        both = median_of(times, lambda: through_processes(runner, spec(FOLLOWER)))
+        ready = median_of(4 * times, lambda: wall_seconds(lambda: runner.run(spec("pass"))))
     return [
-        Measurement("simulator alone, 60 s line follower, sensor table", _times(table), "400x", "800x"),
-        Measurement("the same, a PyBullet camera image each tick", _times(shots), "60x"),
-        Measurement("the same through both sandboxed processes", _times(both), "100x", "250x"),
-        Measurement("a whole trial of an empty program with a responder", f"{ready * 1000:.0f} ms", "30 ms"),
+        Measurement(f"{_ALONE}, sensor table", SECONDS / table, SPEED, 400, 800, f"{table:.3f} s"),
+        Measurement(f"{_ALONE}, a PyBullet camera image each tick", SECONDS / shots, SPEED, 60, told=f"{shots:.3f} s"),
+        Measurement(
+            "the same through both sandboxed processes, CPU of all against the simulator alone",
+            both / table,
+            RATIO,
+            3,
+            2,
+            f"{both:.3f} s, {SECONDS / both:.0f}x",
+        ),
+        Measurement("a whole trial of an empty program with a responder", 1000 * ready, MILLISECONDS, 30),
+        Measurement("pixels that PyBullet's camera sees otherwise than the image", differing, COUNT, 0),
     ]
-
-
-def _times(seconds: float) -> str:
-    return f"{_SECONDS / seconds:.0f}x ({seconds:.3f} s)"
 
 
 def _follow(arena: Arena, camera: LightCamera) -> None:
     """Both sensors read fifty times a second, as a program that only reads them does."""
-    world = World(robot("Default_Robot"), arena, camera, _START, Noise(), 0, Chain())
+    world = World(robot("Default_Robot"), arena, camera, START, Noise(), 0, Chain())
     left, right = world.drive.left, world.drive.right
     left.run("run-forever", 0)
     right.run("run-forever", 0)
-    for _ in range(_SECONDS * 30):
+    for _ in range(SECONDS * 30):
         for _ in range(3):
             turn = (world.left_sums[0] // 305 - 128) * 0.15
             left.speed_sp, right.speed_sp = 10.5 * (25 - turn), 10.5 * (25 + turn)
         world.tick()
 
 
-def _spec(program: str) -> TrialSpec:
+def _differing_pixels(camera: LightCamera, pixels: NDArray[np.uint8]) -> int:
+    """In two hundred windows of twenty by twenty pixels, all over the floor."""
+    chance = random.Random(0)
+    places = [(chance.randrange(WIDTH - _SIDE), chance.randrange(HEIGHT - _SIDE)) for _ in range(200)]
+    return sum(
+        int(np.count_nonzero((camera.window(x, y, _SIDE) != pixels[y : y + _SIDE, x : x + _SIDE]).any(axis=2)))
+        for x, y in places
+    )
+
+
+def spec(program: str) -> TrialSpec:
+    """A trial of sixty seconds on the loop, with a responder that gives back what it hears."""
     return TrialSpec(
         ProgramSpec(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
         ResponderSpec(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
         True,
-        floor(_FLOOR),
+        floor(FLOOR),
         robot("Default_Robot"),
-        _START,
+        START,
         Noise(),
         Channel(),
-        _SECONDS,
+        SECONDS,
         seed=0,
         child_seed=0,
     )
 
 
-def _through_processes(runner: TrialRunner) -> float:
+def through_processes(runner: TrialRunner, wanted: TrialSpec) -> float:
     """CPU seconds of the worker and of both students' processes together."""
     before = runner.children_cpu_seconds
-    own = cpu_seconds(lambda: runner.run(_spec(_FOLLOWER)))
+    own = cpu_seconds(lambda: runner.run(wanted))
     return own + runner.children_cpu_seconds - before
-
-
-def _until_ready(runner: TrialRunner) -> float:
-    start = time.perf_counter()
-    runner.run(_spec("pass"))
-    return time.perf_counter() - start

@@ -1,0 +1,51 @@
+"""What makes machines comparable: a loop of ten million additions, and a turn on a bare socket pair."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+from benchmarks.measurement import MICROSECONDS, SECONDS, Measurement, cpu_seconds, median_of, wall_seconds
+
+LOOP = "a Python loop of ten million additions, CPU"
+_TURNS = 5000
+_BYTES = 80
+
+
+def measure(times: int) -> list[Measurement]:
+    """The loop, by which figures of two machines are compared, and the turn, which is the kernel's part."""
+    return [
+        Measurement(LOOP, loop_seconds(times), SECONDS),
+        Measurement(
+            f"a turn of {_BYTES} bytes on a bare socket pair, both ends",
+            median_of(times, lambda: wall_seconds(_turns)) / _TURNS * 1e6,
+            MICROSECONDS,
+        ),
+    ]
+
+
+def loop_seconds(times: int) -> float:
+    return median_of(times, lambda: cpu_seconds(_loop))
+
+
+def _loop() -> None:
+    total = 0
+    for number in range(10_000_000):
+        total += number
+
+
+def _turns() -> None:
+    """Between this process and one that only answers."""
+    here, there = socket.socketpair()
+    pid = os.fork()
+    if pid == 0:
+        here.close()
+        while text := there.recv(_BYTES):
+            there.sendall(text)
+        os._exit(0)
+    there.close()
+    for _ in range(_TURNS):
+        here.sendall(b"x" * _BYTES)
+        here.recv(_BYTES)
+    here.close()
+    os.waitpid(pid, 0)

@@ -1,0 +1,34 @@
+"""`robomark grade` of one short submission that imports nothing but the standard library, in CPU; and its report."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from benchmarks.calibration import loop_seconds
+from benchmarks.commands import ROBOMARK
+from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, median_of
+from submissions.assignment.examples import REFERENCE, examples
+
+_ASSIGNMENT = "echo-responder"
+#: One second where the loop takes 0.6.
+_BUDGET, _BEYOND = 1.0 / 0.6, 0.6 / 0.6
+
+
+def measure(times: int) -> list[Measurement]:
+    """All processes of the command together, against the loop that calibrates."""
+    submission = str(examples(_ASSIGNMENT) / REFERENCE)
+    loop = loop_seconds(times)
+    with tempfile.TemporaryDirectory() as home:
+        command = (*ROBOMARK, "grade", submission, "-a", _ASSIGNMENT)
+        seconds = median_of(times, lambda: command_cpu_seconds(command, {"ROBOMARK_HOME": str(Path(home))}))
+    return [
+        Measurement(
+            "robomark grade, one short submission, standard library only, CPU against the loop",
+            seconds / loop,
+            RATIO,
+            _BUDGET,
+            _BEYOND,
+            told=f"{seconds:.2f} s",
+        )
+    ]

@@ -1,0 +1,64 @@
+"""How CPU grows with the length of a trial, its messages, the number of trials, and the size of a batch.
+
+Each is taken at three sizes, each four times the one before; what the second step costs a piece, against the first, is
+1 where growth is even.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.graded_store import short_request
+from benchmarks.measurement import RATIO, Measurement, cpu_seconds, median_of
+from benchmarks.simulator import FOLLOWER, spec, through_processes
+from responders.trial_spec import TrialSpec
+from service.grading.trial_runner import TrialRunner
+from service.settings import load_settings
+from service.store import intake
+from service.store.engine import open_store
+
+#: What a step may cost a piece, more than the step before it.
+_EVEN = 1.5
+_TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.02)\n"
+
+
+def measure(times: int) -> list[Measurement]:
+    """Each with what one piece costs in the last step."""
+    with TrialRunner() as runner, tempfile.TemporaryDirectory() as home:
+
+        def trial(wanted: TrialSpec) -> float:
+            return through_processes(runner, wanted)
+
+        def length(seconds: int) -> float:
+            return trial(replace(spec(FOLLOWER), seconds=seconds))
+
+        def talk(messages: int) -> float:
+            return trial(spec(_TALKER.format(messages)))
+
+        def trials(count: int) -> float:
+            return sum(trial(spec("pass")) for _ in range(count))
+
+        with open_store(load_settings(home=Path(home))) as store:
+
+            def batch(submissions: int) -> float:
+                asked = [short_request(f"student {number}") for number in range(submissions)]
+                return cpu_seconds(lambda: intake.accept_batch(store, "batch", asked, [], max_attempts=3))
+
+            return [
+                _even("a simulated second of a line follower, 15 to 60 to 240", length, 15, times),
+                _even("a message and its answer, 100 to 400 to 1600", talk, 100, times),
+                _even("a trial of an empty program, 4 to 16 to 64", trials, 4, times),
+                _even("a submission taken in with its batch, 50 to 200 to 800", batch, 50, times),
+            ]
+
+
+def _even(what: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
+    small, medium, large = (
+        median_of(min(times, 3), lambda size=size: cost(size)) for size in (smallest, 4 * smallest, 16 * smallest)
+    )
+    piece = (large - medium) / (12 * smallest)
+    before = (medium - small) / (3 * smallest)
+    return Measurement(f"growth: {what}", piece / before, RATIO, _EVEN, told=f"{1000 * piece:.2f} ms of CPU each")

@@ -1,0 +1,121 @@
+"""The original's stepping loop in plain Python beside ours, with the same programs, in one run.
+
+Both must end at the same place, or neither is timed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from benchmarks.measurement import GAIN, Measurement, cpu_seconds, median_of
+from benchmarks.original_loop import OriginalSimulator
+from benchmarks.simulator import FLOOR, START
+from sim.arena import Arena
+from sim.camera import CachedCamera
+from sim.floors import floor
+from sim.robot import robot
+from sim.world import Chain, Noise, World
+
+_TICKS = 600
+_NEAR = 0.01  # mm, and degrees
+
+
+class _Wheel(Protocol):
+    speed_sp: float
+    position_sp: float
+
+    def run(self, command: str, clock: int, /) -> None: ...
+
+
+#: Sets the two wheels before the tick of a number, by what the left light sensor sees of red, 0 to 255.
+_Program = Callable[[_Wheel, _Wheel, float, int], None]
+
+
+def _follow(left: _Wheel, right: _Wheel, red: float, clock: int) -> None:
+    """Along the edge of the line."""
+    turn = (int(red) - 128) * 0.15
+    left.speed_sp, right.speed_sp = 10.5 * (25 - turn), 10.5 * (25 + turn)
+    if clock == 0:
+        left.run("run-forever", clock)
+        right.run("run-forever", clock)
+
+
+def _square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
+    """Two seconds ahead, two on the spot, to positions."""
+    if clock % 60 == 0:
+        ahead = clock % 120 == 0
+        left.speed_sp = right.speed_sp = 315
+        left.position_sp, right.position_sp = (1080, 1080) if ahead else (-576, 576)
+        left.run("run-to-rel-pos", clock)
+        right.run("run-to-rel-pos", clock)
+
+
+_PROGRAMS: tuple[tuple[str, _Program, Noise], ...] = (
+    ("a line follower", _follow, Noise()),
+    ("a square", _square, Noise()),
+    ("a line follower with sensor noise", _follow, Noise(light=32)),
+)
+
+
+def measure(times: int) -> list[Measurement]:
+    """How many times faster than the port ours is, in CPU."""
+    pixels = floor(FLOOR).pixels
+    canvas = np.dstack((pixels, np.full(pixels.shape[:2], 255, np.uint8))).tobytes()
+    arena, camera = Arena(), CachedCamera(pixels)
+    try:
+        return [
+            _beside(
+                name,
+                lambda program=program, noise=noise: _theirs(canvas, program, noise),
+                lambda program=program, noise=noise: _ours(arena, camera, program, noise),
+                noise,
+                times,
+            )
+            for name, program, noise in _PROGRAMS
+        ]
+    finally:
+        camera.close()
+        arena.close()
+
+
+def _beside(
+    name: str, theirs: Callable[[], OriginalSimulator], ours: Callable[[], World], noise: Noise, times: int
+) -> Measurement:
+    if noise.light == 0:
+        _compare(name, theirs(), ours())
+    port, own = (median_of(min(times, 3), lambda run=run: cpu_seconds(run)) for run in (theirs, ours))
+    seconds = _TICKS / 30
+    return Measurement(
+        f"the original's loop in plain Python against ours, {name}",
+        port / own,
+        GAIN,
+        told=f"{seconds / port:.0f}x and {seconds / own:.0f}x real time",
+    )
+
+
+def _compare(name: str, port: OriginalSimulator, own: World) -> None:
+    drive = own.drive
+    apart = (port.x - drive.x, port.y - drive.y, math.degrees(port.angle - drive.heading))
+    apart = (*apart, port.ultrasonic - own.ultrasonic, port.left_red - own.left_means[0])
+    if max(map(abs, apart)) > _NEAR:
+        raise RuntimeError(f"the port and ours do not end alike with {name}: {apart}")
+
+
+def _theirs(canvas: bytes, program: _Program, noise: Noise) -> OriginalSimulator:
+    simulator = OriginalSimulator(canvas, START.x, START.y, math.radians(START.heading), noise.motor, noise.light)
+    for clock in range(_TICKS):
+        program(simulator.left, simulator.right, simulator.left_red, clock)
+        simulator.tick()
+    return simulator
+
+
+def _ours(arena: Arena, camera: CachedCamera, program: _Program, noise: Noise) -> World:
+    world = World(robot("Default_Robot"), arena, camera, START, noise, 0, Chain())
+    for clock in range(_TICKS):
+        program(world.drive.left, world.drive.right, world.left_means[0], clock)
+        world.tick()
+    return world

@@ -1,0 +1,207 @@
+"""The original simulator's stepping loop (``nbev3devsim`` 0.0.12) ported to plain Python, line by line.
+
+What it draws is left out; what it computes at each frame is all here, the text of each light sensor's pixels included.
+It is fast where plain Python can be: names are local, masks and offsets are made once.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass, field
+
+WIDTH, HEIGHT, FPS = 2362, 1143, 30
+_DIAMETER, _SPACING, _WEIGHT = 56, 180, 6
+_MOST = 5000 / _WEIGHT / FPS
+_SIDE = 20
+_RADIUS = _SIDE / 2
+_RAYS = (0, 7, -7, 14, -14, 21, -21)
+_REACH = 2550
+#: Which of a sensor's pixels count, row by row.
+_MASK = [(row - _RADIUS) ** 2 + (column - _RADIUS) ** 2 < _RADIUS**2 for row in range(_SIDE) for column in range(_SIDE)]
+_SEEN = sum(_MASK)
+_OUTSIDE = ("245", "226", "225", "255")
+_SENSORS = ((-20, 30), (20, 30))
+#: Begin, end, and direction in degrees.
+_WALLS = (
+    (0, 0, 0, HEIGHT, 90),
+    (0, HEIGHT, WIDTH, HEIGHT, 0),
+    (WIDTH, HEIGHT, WIDTH, 0, 90),
+    (WIDTH, 0, 0, 0, 0),
+)
+
+
+def _rounded(value: float) -> int:
+    """As JavaScript rounds."""
+    return math.floor(value + 0.5)
+
+
+@dataclass(slots=True)
+class Motor:
+    """One of the two wheels."""
+
+    position: float = 0.0
+    speed: float = 0.0
+    speed_sp: float = 0.0
+    position_sp: float = 0.0
+    command: str = ""
+    position_target: float = 0.0
+
+    def run(self, command: str, _clock: int) -> None:
+        self.command = command
+        if command == "run-to-rel-pos":
+            self.position_target = self.position + self.position_sp
+
+    def set_speed(self, noise: float) -> None:
+        if self.speed < self.speed_sp:
+            self.speed = min(self.speed + _MOST, self.speed_sp)
+        elif self.speed > self.speed_sp:
+            self.speed = max(self.speed - _MOST, self.speed_sp)
+        noisy = self.speed + (random.uniform(-noise, noise) if noise > 0 else 0.0)
+        if noisy >= 0:
+            self.speed = min(_rounded(noisy), 1050)
+
+    def distance(self) -> float:
+        degrees = self.speed / FPS
+        if self.command == "run-forever":
+            self.position += degrees
+        elif self.command == "run-to-rel-pos":
+            if self.position_sp < 0:
+                degrees = -degrees
+            self.position += degrees
+            if self.position > self.position_target if self.position_sp >= 0 else self.position < self.position_target:
+                return 0.0
+            self.position += degrees
+        else:
+            return 0.0
+        return degrees * math.pi * _DIAMETER / 360
+
+
+@dataclass(slots=True)
+class OriginalSimulator:
+    """A robot on a floor; ``pixels`` is RGBA, row by row from the top, as a canvas gives it."""
+
+    pixels: bytes
+    x: float
+    y: float
+    angle: float  # radians
+    wheel_noise: float = 0.0
+    sensor_noise: float = 0.0
+    clock: int = 0
+    left: Motor = field(default_factory=Motor)
+    right: Motor = field(default_factory=Motor)
+    gyro: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    ultrasonic: float = 0.0
+    means: list[tuple[float, float, float]] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._light_sensors()
+
+    @property
+    def left_red(self) -> float:
+        return self.means[0][0]
+
+    def tick(self) -> None:
+        """One frame."""
+        self.clock += 1
+        self.left.set_speed(self.wheel_noise)
+        self.right.set_speed(self.wheel_noise)
+        left, right = self.left.distance(), self.right.distance()
+        way = (left + right) / 2
+        self.x += way * math.cos(self.angle)
+        self.y += way * math.sin(self.angle)
+        turned = (right - left) / _SPACING
+        self.angle += turned
+        if self.angle > 2 * math.pi:
+            self.angle -= 2 * math.pi
+        degrees = math.degrees(turned)
+        self.gyro[0] -= degrees
+        self.gyro[1] = -degrees * FPS
+        if self.clock % 3 == 0:
+            self._sonar()
+        self._light_sensors()
+
+    def _light_sensors(self) -> None:
+        cosine, sine = math.cos(self.angle - math.pi / 2), math.sin(self.angle - math.pi / 2)
+        seen = []
+        for across, ahead in _SENSORS:
+            column = int(cosine * across - sine * ahead + self.x - _RADIUS)
+            row = int(-(sine * across + cosine * ahead) + (HEIGHT - self.y) - _RADIUS)
+            seen.append(self._light(column, row))
+        self.means = [means for means, _ in seen]
+        self.texts = [text for _, text in seen]
+
+    def _light(self, column: int, row: int) -> tuple[tuple[float, float, float], str]:
+        """The means, and the values of all pixels with commas between, from one window of the canvas."""
+        if 0 <= column <= WIDTH - _SIDE and 0 <= row <= HEIGHT - _SIDE:
+            pixels, stride = self.pixels, 4 * WIDTH
+            begin = row * stride + 4 * column
+            window = b"".join(pixels[begin + stride * k : begin + stride * k + 4 * _SIDE] for k in range(_SIDE))
+        else:
+            window = self._partly_outside(column, row)
+        noise = self.sensor_noise
+        red = green = blue = 0
+        values: list[str] = []
+        offset = 0
+        for counts in _MASK:
+            if counts:
+                r, g, b = window[offset], window[offset + 1], window[offset + 2]
+                if noise > 0:
+                    r = min(255, max(0, _rounded(r + random.uniform(-noise, noise))))
+                    g = min(255, max(0, _rounded(g + random.uniform(-noise, noise))))
+                    b = min(255, max(0, _rounded(b + random.uniform(-noise, noise))))
+                red += r
+                green += g
+                blue += b
+                values += (str(r), str(g), str(b), "255")
+            else:
+                values += _OUTSIDE
+            offset += 4
+        return (red / _SEEN, green / _SEEN, blue / _SEEN), ",".join(values)
+
+    def _partly_outside(self, column: int, row: int) -> bytes:
+        window = bytearray(4 * _SIDE * _SIDE)
+        for k in range(_SIDE * _SIDE):
+            x, y = column + k % _SIDE, row + k // _SIDE
+            if 0 <= x < WIDTH and 0 <= y < HEIGHT:
+                begin = 4 * (y * WIDTH + x)
+                window[4 * k : 4 * k + 4] = self.pixels[begin : begin + 4]
+        return bytes(window)
+
+    def _sonar(self) -> None:
+        heading = math.degrees(self.angle)
+        x, y = self.x + 20 * math.cos(self.angle), self.y + 20 * math.sin(self.angle)
+        nearest = float(_REACH)
+        for ray in _RAYS:
+            towards = math.radians(heading + ray)
+            end_x, end_y = x + _REACH * math.cos(towards), y + _REACH * math.sin(towards)
+            for wall in _WALLS:
+                distance = _hit(x, y, end_x, end_y, wall)
+                if distance is not None and distance < nearest and _counts(heading, wall[4]):
+                    nearest = distance
+        self.ultrasonic = min(_REACH, max(0, _rounded(nearest)))
+
+
+def _counts(heading: float, line: float) -> bool:
+    incidence = abs(line - heading)
+    if incidence > 180:
+        incidence = 360 - incidence
+    return 40 < incidence < 140
+
+
+def _hit(
+    x: float, y: float, end_x: float, end_y: float, wall: tuple[float, float, float, float, float]
+) -> float | None:
+    """How far the ray goes to the wall; None where it does not reach it."""
+    x3, y3, x4, y4, _ = wall
+    below = (x - end_x) * (y3 - y4) - (y - end_y) * (x3 - x4)
+    if below == 0:
+        return None
+    ray, edge = x * end_y - y * end_x, x3 * y4 - y3 * x4
+    at_x = (ray * (x3 - x4) - (x - end_x) * edge) / below
+    at_y = (ray * (y3 - y4) - (y - end_y) * edge) / below
+    for at, one, other in ((at_x, x, end_x), (at_y, y, end_y), (at_x, x3, x4), (at_y, y3, y4)):
+        if not min(one, other) - 0.01 <= at <= max(one, other) + 0.01:
+            return None
+    return math.hypot(at_x - x, at_y - y)

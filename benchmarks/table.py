@@ -1,0 +1,89 @@
+"""The table on the screen, the JSON beside it, and the run that it is compared with. Measures nothing."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from benchmarks.calibration import LOOP
+from benchmarks.measurement import Measurement
+
+#: The run that others are compared with, kept with the code.
+RECORDED = Path(__file__).parent / "recorded.json"
+#: The last run on this machine.
+LATEST = Path(__file__).parent / "latest.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What an earlier run measured, by what it is called."""
+
+    at: str
+    values: dict[str, float]
+
+    def on_a_machine_like(self, loop_seconds: float | None, row: Measurement) -> float | None:
+        """What it would have measured where the loop takes so long; None where it did not measure that."""
+        value, then = self.values.get(row.what), self.values.get(LOOP)
+        if value is None or not then or not loop_seconds or row.what == LOOP:
+            return value
+        return value * (loop_seconds / then) ** row.unit.slowness
+
+
+def recorded(path: Path = RECORDED) -> Run | None:
+    """The run in the file; None where there is none."""
+    if not path.exists():
+        return None
+    written = json.loads(path.read_text())
+    return Run(written["at"], {line["what"]: line["value"] for line in written["lines"]})
+
+
+def write(path: Path, rows: Sequence[Measurement]) -> None:
+    """The rows in place of what the file has of the same name; its other lines stay."""
+    lines = {line["what"]: line for line in json.loads(path.read_text())["lines"]} if path.exists() else {}
+    lines |= {row.what: _line(row) for row in rows}
+    written = {
+        "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "python": platform.python_version(),
+        "lines": list(lines.values()),
+    }
+    path.write_text(json.dumps(written, indent=1) + "\n")
+
+
+def show(rows: Sequence[Measurement], before: Run | None) -> None:
+    """Each line beside its budget and beside the recorded run, as that would be on this machine."""
+    loop = next((row.value for row in rows if row.what == LOOP), None)
+    table = Table("what", box=None, pad_edge=False)
+    for heading in ("measured", "budget", "beyond", "recorded"):
+        table.add_column(heading, justify="right")
+    table.add_column("spread")
+    for row in rows:
+        then = None if before is None else before.on_a_machine_like(loop, row)
+        table.add_row(
+            Text(row.what),
+            Text(row.unit.shown(row.value), style="red" if row.misses else ""),
+            *("" if value is None else row.unit.shown(value) for value in (row.budget, row.beyond, then)),
+            row.told,
+        )
+    console = Console(width=170)
+    console.print(table)
+    if before is not None:
+        console.print(f"recorded: {before.at}; times are scaled by the loop where both runs have it")
+    for row in rows:
+        if row.gates:
+            console.print(f"misses its budget: {row.what}: {row.unit.shown(row.value)}", style="red")
+
+
+def _line(row: Measurement) -> dict[str, Any]:
+    optional = {"budget": row.budget, "beyond": row.beyond, "spread": row.told or None}
+    return {"what": row.what, "value": round(row.value, 6), "unit": row.unit.word.strip()} | {
+        name: value for name, value in optional.items() if value is not None
+    }
