@@ -62,7 +62,7 @@ def main(arguments: list[str]) -> int:
         parser.error(f"there is no group {unknown[0]}; there are {', '.join(GROUPS)}")
     names = chosen.group or (_QUICK if chosen.quick else tuple(GROUPS))
     before = table.recorded()
-    measured = [row for name in names for row in GROUPS[name](3 if chosen.quick else 5)]
+    measured = [row for name in names for row in GROUPS[name](1 if chosen.quick else 5)]
     table.show(measured, before)
     table.write(table.LATEST, measured)
     if chosen.record:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from pathlib import Path
 
 from benchmarks.calibration import loop_seconds
 from benchmarks.commands import ROBOMARK
-from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, median_of
+from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, median
 from submissions.assignment.examples import REFERENCE, examples
 
 _ASSIGNMENT = "echo-responder"
@@ -21,7 +20,7 @@ def measure(times: int) -> list[Measurement]:
     loop = loop_seconds(times)
     with tempfile.TemporaryDirectory() as home:
         command = (*ROBOMARK, "grade", submission, "-a", _ASSIGNMENT)
-        seconds = median_of(times, lambda: command_cpu_seconds(command, {"ROBOMARK_HOME": str(Path(home))}))
+        seconds = median([command_cpu_seconds(command, {"ROBOMARK_HOME": home}) for _ in range(times)])
     return [
         Measurement(
             "robomark grade, one short submission, standard library only, CPU against the loop",

@@ -22,7 +22,7 @@ from service.store.engine import open_store
 
 #: What a step may cost a piece, more than the step before it.
 _EVEN = 1.5
-_TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.02)\n"
+_TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.005)\n"
 
 
 def measure(times: int) -> list[Measurement]:
@@ -49,9 +49,9 @@ def measure(times: int) -> list[Measurement]:
 
             return [
                 _even("a simulated second of a line follower, 15 to 60 to 240", length, 15, times),
-                _even("a message and its answer, 100 to 400 to 1600", talk, 100, times),
-                _even("a trial of an empty program, 4 to 16 to 64", trials, 4, times),
-                _even("a submission taken in with its batch, 50 to 200 to 800", batch, 50, times),
+                _even("a message and its answer, 400 to 1600 to 6400", talk, 400, times),
+                _even("a trial of an empty program, 2 to 8 to 32", trials, 2, times),
+                _even("a submission taken in with its batch, 25 to 100 to 400", batch, 25, times),
             ]
 
 
