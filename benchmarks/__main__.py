@@ -13,9 +13,11 @@ from types import MappingProxyType
 
 from benchmarks import (
     calibration,
+    capacity,
     chaos,
     cold_batch,
     commands,
+    costs,
     grading,
     growth,
     original,
@@ -46,7 +48,9 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
 )
 #: Those that ``--quick`` measures, under a minute in all.
 _QUICK = ("calibration", "commands", "grading", "simulator", "original", "growth")
-_OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType({"chaos": chaos.main, "plans": rows.main})
+_OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType(
+    {"capacity": capacity.main, "chaos": chaos.main, "costs": costs.main, "plans": rows.main}
+)
 
 
 def main(arguments: list[str]) -> int:

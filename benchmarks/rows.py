@@ -87,10 +87,16 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _asked(database: str, store: Store, question: _Question, times: int) -> Measurement:
-    seconds = [wall_seconds(lambda: question.ask(store)) for _ in range(times)]
+    seconds = _seconds(question.ask, store, times)
     what = f"{many_rows.GRADES:,} grades, {database}: {question.name}"
     told = f"most {1000 * max(seconds):.1f} ms"
     return Measurement(what, 1000 * median(seconds), MILLISECONDS, question.milliseconds, told=told)
+
+
+def claim_seconds() -> float:
+    """How long a claim takes PostgreSQL where 10,000 jobs wait."""
+    *_, seconds = (_seconds(_claim, store, _TIMES) for _, store in _filled())
+    return median(seconds)
 
 
 def main(_arguments: list[str]) -> int:
@@ -102,6 +108,10 @@ def main(_arguments: list[str]) -> int:
             parts += [f"\n{plan}\n" for plan in _plans(store, question)]
     _PLANS.write_text("".join(parts))
     return 0
+
+
+def _seconds(ask: Callable[[Store], object], store: Store, times: int) -> list[float]:
+    return [wall_seconds(lambda: ask(store)) for _ in range(times)]
 
 
 def _filled() -> Iterator[tuple[str, Store]]:

@@ -1,0 +1,184 @@
+"""Where the CPU goes: one trial, one submission and one batch, each in its parts. ``python -m benchmarks costs``."""
+
+from __future__ import annotations
+
+import cProfile
+import os
+import pstats
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TypeVar
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.calibration import loop_seconds
+from benchmarks.graded_store import short_request
+from benchmarks.measurement import median
+from benchmarks.simulator import FOLLOWER, spec
+from service.grading.grade import Grade
+from service.grading.grader import GradingProgress, grade
+from service.grading.trial_runner import TrialRunner
+from service.plotting import draw
+from service.reports.html import report
+from service.reports.view import student_view
+from service.settings import load_settings
+from service.store import intake, jobs, results
+from service.store.engine import Store, open_store
+from submissions.grading_request import GradingRequest
+
+_ROOT = Path(__file__).parents[1]
+_TIMES = 7
+_ROOMS = 8
+TAKEN_IN, CLAIMED, STORED, DRAWN = "taking it in", "claiming it", "storing the grade", "drawing its plots"
+_GRADING = ("trials, in the worker", "judging", "program and responder, their processes")
+#: Paid once by each worker, not by each submission.
+STARTS = ("start of the clean processes with their imports, once",)
+Made = TypeVar("Made")
+
+
+@dataclass(slots=True)
+class Costs:
+    """CPU seconds of each part of grading one short submission, as often as it was measured."""
+
+    parts: dict[str, list[float]] = field(default_factory=dict)
+
+    def take(self, part: str, seconds: float) -> None:
+        self.parts.setdefault(part, []).append(seconds)
+
+    def timed(self, part: str, work: Callable[[], Made]) -> Made:
+        start = time.process_time()
+        made = work()
+        self.take(part, time.process_time() - start)
+        return made
+
+    def of(self, *parts: str) -> float:
+        """The median of each, together."""
+        return sum(median(self.parts[part]) for part in parts)
+
+    @property
+    def grading(self) -> float:
+        """What a worker spends on one submission before its marks are stored."""
+        return self.of(*_GRADING, "packing the recordings")
+
+
+def main(_arguments: list[str]) -> int:
+    """Print the three tables."""
+    print(f"a loop of ten million additions: {loop_seconds(5):.2f} s")
+    _show("One trial, a line follower of 60 s", of_trial())
+    costs = of_submission()
+    once = {part: costs.of(part) for part in costs.parts if part not in STARTS}
+    _show("One short submission of two trials, warm, from its files to a report", once)
+    cold = {part: costs.of(part) for part in STARTS}
+    _show("Ten of them, cold", cold | {part: 10 * seconds for part, seconds in once.items()})
+    return 0
+
+
+def of_trial() -> Mapping[str, float]:
+    """CPU seconds of each module of ours in the worker, with what libraries do for it."""
+    wanted = spec(FOLLOWER)
+    with TrialRunner() as runner:
+        runner.run(wanted)
+        plain, children = [], []
+        for _ in range(_TIMES):
+            before, start = runner.children_cpu_seconds, time.process_time()
+            runner.run(wanted)
+            plain.append(time.process_time() - start)
+            children.append(runner.children_cpu_seconds - before)
+        profile = cProfile.Profile(time.process_time)
+        profile.runcall(runner.run, wanted)
+    shares = _by_module(profile)
+    worker = median(plain)
+    # A profile slows everything, so that only its shares are used.
+    rows = {f"worker: {name}": worker * share for name, share in shares[:_ROOMS]}
+    rest = sum(share for _, share in shares[_ROOMS:])
+    return rows | {"worker: all other modules": worker * rest, "program and responder, two children": median(children)}
+
+
+def _by_module(profile: cProfile.Profile) -> list[tuple[str, float]]:
+    """The share of each of our modules, the largest first; what is built in counts for who calls it."""
+    seconds: Counter[str] = Counter()
+    for (file, _, _), (_, _, own, _, callers) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
+        name = _module(file)
+        if name is not None or not callers:
+            seconds[name or "Python itself"] += own
+            continue
+        for (caller, _, _), (_, _, share, _) in callers.items():
+            seconds[_module(caller) or "Python itself"] += share
+    whole = sum(seconds.values())
+    return [(name, value / whole) for name, value in seconds.most_common()]
+
+
+def _module(file: str) -> str | None:
+    path = Path(file)
+    return str(path.relative_to(_ROOT)) if path.is_relative_to(_ROOT) and ".venv" not in path.parts else None
+
+
+def of_submission() -> Costs:
+    """Each part of grading a short submission, on SQLite, without a queue."""
+    costs = Costs()
+    with (
+        tempfile.TemporaryDirectory() as home,
+        open_store(load_settings(home=Path(home))) as store,
+        TrialRunner() as runner,
+    ):
+        # The first one warms up.
+        _one(store, runner, "nobody", Costs())
+        for number in range(_TIMES):
+            _one(store, runner, f"student {number}", costs)
+    costs.take(STARTS[0], _cold_seconds() - costs.of(*_GRADING))
+    return costs
+
+
+def _one(store: Store, runner: TrialRunner, student: str, costs: Costs) -> None:
+    asked = short_request(student)
+    costs.timed(TAKEN_IN, lambda: intake.accept(store, asked, max_attempts=3))
+    claim = costs.timed(CLAIMED, lambda: jobs.claim(store, "worker", 60))
+    assert claim is not None
+    graded = _graded(asked, runner, costs)
+    prepared = costs.timed("packing the recordings", lambda: results.prepare(graded))
+    costs.timed(STORED, lambda: jobs.finish(store, claim, prepared, datetime.now(UTC)))
+    drawn = costs.timed(DRAWN, lambda: draw(graded, asked.assignment, asked.submission))
+    costs.timed("the report", lambda: report(student_view(graded), drawn, asked.submission))
+
+
+def _graded(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
+    """The grade; trials and judging are told apart by the moment of the last trial's end."""
+    moments: list[float] = []
+
+    def observe(_progress: GradingProgress) -> None:
+        moments.append(time.process_time())
+
+    before, start = runner.children_cpu_seconds, time.process_time()
+    graded = grade(asked.submission, asked.assignment, observe=observe, runner=runner)
+    end = time.process_time()
+    trials, judging, children = _GRADING
+    costs.take(trials, moments[-1] - start)
+    costs.take(judging, end - moments[-1])
+    costs.take(children, runner.children_cpu_seconds - before)
+    return graded
+
+
+def _cold_seconds() -> float:
+    """CPU of a grading that starts its own processes, theirs included once they have ended."""
+    before = os.times()
+    asked = short_request("cold")
+    grade(asked.submission, asked.assignment)
+    after = os.times()
+    return sum(after[:4]) - sum(before[:4])
+
+
+def _show(title: str, parts: Mapping[str, float]) -> None:
+    whole = sum(parts.values())
+    table = Table(title=f"{title}: {whole:.3f} s", box=None, title_justify="left")
+    table.add_column("part")
+    for heading in ("CPU", "share"):
+        table.add_column(heading, justify="right")
+    for part, seconds in sorted(parts.items(), key=lambda item: -item[1]):
+        table.add_row(part, f"{1000 * seconds:.1f} ms", f"{seconds / whole:.0%}")
+    Console(width=120).print(table)
