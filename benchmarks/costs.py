@@ -73,7 +73,7 @@ def main(_arguments: list[str]) -> int:
     _show("One trial, a line follower of 60 s", of_trial())
     costs = of_submission()
     once = {part: costs.of(part) for part in costs.parts if part not in STARTS}
-    _show("One short submission of two trials, warm, from its files to a report", once)
+    _show("One short submission, warm, from its files to a report", once)
     cold = {part: costs.of(part) for part in STARTS}
     _show("Ten of them, cold", cold | {part: 10 * seconds for part, seconds in once.items()})
     return 0
