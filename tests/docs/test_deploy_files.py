@@ -24,7 +24,7 @@ MANIFESTS = [
     manifest for file in sorted(DEPLOY.glob("kubernetes/*.yaml")) for manifest in yaml.safe_load_all(file.read_text())
 ]
 UNITS = sorted(DEPLOY.glob("systemd/*.service"))
-FILES = [file for file in sorted(DEPLOY.rglob("*")) if file.is_file() and file.name != "requirements.lock"]
+FILES = [DEPLOY / "Dockerfile", *sorted(DEPLOY.rglob("*.yaml")), *UNITS]
 SETTINGS = {f"ROBOMARK_{name.upper()}" for name in Settings.model_fields}
 
 
