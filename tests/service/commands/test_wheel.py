@@ -6,6 +6,8 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,12 +24,15 @@ def _open_to_others(python: Path) -> bool:
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed() -> Iterator[Path]:
     """The command of an environment with the wheel and what it needs, as the lock has it, and no checkout."""
-    folder = tmp_path_factory.mktemp("wheel")
-    # Others come this far too.
-    for above in (folder, folder.parent, folder.parent.parent):
-        above.chmod(above.stat().st_mode | 0o011)
+    # Not in pytest's own folder: each run closes that to others, also while this one goes on.
+    with tempfile.TemporaryDirectory(prefix="robomark-wheel-") as made:
+        Path(made).chmod(0o755)
+        yield _install(Path(made))
+
+
+def _install(folder: Path) -> Path:
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
     (wheel,) = folder.glob("*.whl")
