@@ -14,6 +14,7 @@ from typing import Protocol
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
+from service.grading.hints import hints_for
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
@@ -93,6 +94,7 @@ def grade(
         grader_version=GRADER_VERSION,
         notes=(*submission.notes, *plan.notes, *plan.trial.notes_on_all(results), *_unjudged_notes(criteria)),
         missing=PART_FILES[plan.missing] if plan.missing else "",
+        hints=hints_for(submission, plan, results, criteria),
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )

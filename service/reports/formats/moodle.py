@@ -19,6 +19,7 @@ from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
+from service.reports.words import hints_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -102,7 +103,8 @@ def _feedback(row: TableRow[GradebookView]) -> str:
     lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    return one_line("; ".join(lines), _LONGEST)
+    hints = () if row.grade is None else hints_of(row.grade.shown)
+    return one_line(" ".join([*hints, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
