@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from service.reports.plots.style import FAULT, font
-from sim.errors import UsageError
 from sim.floors import floor, names
 from submissions.assignment.examples import examples
 
@@ -35,7 +34,7 @@ def draw_report() -> None:
     """The beginning of the report on a submission that is neither right nor hopeless."""
     browser = next((found for name in _BROWSERS if (found := shutil.which(name))), None)
     if browser is None:
-        raise UsageError("the report's picture needs Chromium; expected " + " or ".join(_BROWSERS))
+        raise SystemExit("the report's picture needs Chromium; expected " + " or ".join(_BROWSERS))
     with tempfile.TemporaryDirectory() as folder:
         _robomark("grade", examples("shape-recognition") / "flawed", "-a", "shape-recognition", "--report", folder)
         flags = ["--headless", "--disable-gpu", "--hide-scrollbars", "--no-first-run", f"--window-size={_PAGE}"]
