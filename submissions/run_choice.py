@@ -18,7 +18,7 @@ from submissions.submission import Notebook
 _SENDS = ("PY::", "IMG_DATA")
 #: A test of a sensor: how many statements it has, and characters, at most.
 _TEST_STATEMENTS, _TEST_LENGTH = 2, 300
-_MOST_SHOWN = 6
+_MOST_SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class RunCandidate:
     misfits: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        why = f": {', '.join(self.misfits)}" if self.misfits else ""
+        why = f": {self.misfits[0]}" if self.misfits else ""
         return f"run {self.number} (cell {self.site.cell}{why})"
 
 
@@ -83,8 +83,9 @@ def _told(candidates: tuple[RunCandidate, ...], site: Site, why: str) -> tuple[s
     marked = next(each for each in candidates if each.site == site)
     others = [str(each) for each in candidates if each is not marked]
     more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
+    shown = ", ".join(others[:_MOST_SHOWN]) + more
     return (
-        f"that is run {marked.number} of {len(candidates)}, {why}; the others are {', '.join(others[:_MOST_SHOWN])}{more}",
+        f"that is run {marked.number} of {len(candidates)}, {why}; the others are {shown}",
         "another run is marked with --run NUMBER, or with run = NUMBER in submission.toml",
     )
 
@@ -121,5 +122,5 @@ def _is_test(text: str) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     statements = [node for node in nodes if isinstance(node, ast.stmt)]
-    calls = [node.func for node in nodes if isinstance(node, ast.Call)]
-    return len(statements) <= _TEST_STATEMENTS and all(isinstance(each, ast.Name) and each.id == "print" for each in calls)
+    called = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
+    return len(statements) <= _TEST_STATEMENTS and set(called) <= {"print"}
