@@ -228,7 +228,7 @@ class _Execution:
         answers = spec.collaborative and (process.missing is None or planned.needs_responder)
         first_call = len(process.calls)
         arena, camera = self._ground(spec, planned.obstacles)
-        program = self._sandboxes.spawn("robot", spec.program.limits, meter=self._meter)
+        program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
         try:
             bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()

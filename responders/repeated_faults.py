@@ -97,7 +97,7 @@ class RepeatedFaults:
 
     def child(self, role: str, folder: Path | None, meter: JobMeter | None, spawn: Callable[[], Child]) -> ServedChild:
         """A child of this role, or what stands for it. ``spawn`` makes one."""
-        spared = self._last is not None and role == _role(self._last) and self._misses < _MOST_MISSES
+        spared = self._last is not None and role.startswith(_role(self._last)) and self._misses < _MOST_MISSES
         if not spared or meter is None or self._diverged:
             return spawn()
         if self._known:
