@@ -26,7 +26,7 @@ def marks_csv(rows: Sequence[TableRow[View]]) -> str:
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
-    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "file", "reason"]
+    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "notes", "file", "reason"]
     return csv_text([header, *(_wide(row, criteria) for row in rows)])
 
 
@@ -52,7 +52,7 @@ def safe_cell(value: str) -> str:
 
 def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
     grade = None if row.grade is None else row.grade.grade
-    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 1)
+    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 2)
     return [*_who(row), *marked, row.source, row.reason]
 
 
@@ -70,6 +70,7 @@ def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
         "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
+        "; ".join(grade.notes[:20]),
     ]
 
 
