@@ -210,6 +210,24 @@ def test_a_last_program_that_is_never_come_to_gives_way_to_the_last_that_ran(
     assert recording.start.x == 300
 
 
+def test_what_is_marked_instead_is_told(tmp_path: Path, runner: TrialRunner) -> None:
+    cells = [RESPONDER, PROGRAM, two_programs("two"), "if False:\n    %sim_magic -R -b Simple_Shapes"]
+    result = graded(tmp_path, runner, [*cells[:1], PROGRAM.replace("Loop", "Simple_Shapes"), *cells[2:]])
+    assert spoken(result.trials[0].recording) == ["done"]
+    assert any("that is run 1 of 3, the last that fits" in note for note in result.notes)
+    never = graded(tmp_path, runner, [RESPONDER, two_programs("one"), cells[3]])
+    assert "the run of cell 3 was never come to, so that of cell 2 is marked" in never.notes
+
+
+def test_a_responder_that_comes_too_late_is_told_with_its_cell(tmp_path: Path, runner: TrialRunner) -> None:
+    recording = recorded(tmp_path, runner, [PROGRAM, "x = 1", RESPONDER, "y = 2"])
+    told = {(fault.message, fault.hint) for fault in recording.faults}
+    assert told == {
+        ("the responder is defined in cell 3, after the robot of cell 1 has run", "Move cell 3 above cell 1.")
+    }
+    assert "there is no responder" in recorded(tmp_path, runner, [PROGRAM, "x = 1"]).faults[0].message
+
+
 def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, runner: TrialRunner) -> None:
     cells = [RESPONDER, two_programs("one"), "import math\nmath.sqrt(-1)\n%sim_magic -R"]
     result = graded(tmp_path, runner, cells, 'cell = "tag:this"', tags={3: ["this"]})
