@@ -143,6 +143,11 @@ class _Written:
             self._part = _Part(_without_seed(frame), self.sandbox)
         self._begun = True
 
+    def send_readings(self, units: int, values: Sequence[float]) -> None:
+        self._child.send_readings(units, values)
+        if self._part is not None:
+            self._part.add(_Told(_readings(units, values), ()), 8 * len(values))
+
     def receive(self, schema: wire.Schema) -> wire.Frame:
         before = self._meter.spent.kept_bytes
         said: wire.Frame | ChildStopped
@@ -190,8 +195,14 @@ class _ByHeart:
             self._child.send(frame, arrived)
         elif self._steps is None:
             self._begin(frame, arrived)
-        elif self._step() != _Told(frame, tuple(arrived)):
-            raise Diverged("a child was told something new")
+        else:
+            self._compare(_Told(frame, tuple(arrived)))
+
+    def send_readings(self, units: int, values: Sequence[float]) -> None:
+        if self._child is not None:
+            self._child.send_readings(units, values)
+        else:
+            self._compare(_Told(_readings(units, values), ()))
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         if self._child is not None:
@@ -222,10 +233,18 @@ class _ByHeart:
         self.sandbox = self._child.sandbox
         self._child.send(frame, arrived)
 
+    def _compare(self, told: _Told) -> None:
+        if self._step() != told:
+            raise Diverged("a child was told something new")
+
     def _step(self) -> _Told | _Said | None:
         assert self._steps is not None
         self._next += 1
         return self._steps[self._next - 1] if self._next <= len(self._steps) else None
+
+
+def _readings(units: int, values: Sequence[float]) -> wire.Frame:
+    return {"t": units, "v": list(values)}
 
 
 def _costly(faults: Sequence[Fault]) -> Fault | None:

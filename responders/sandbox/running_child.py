@@ -70,6 +70,9 @@ class ServedChild(Protocol):
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
         """Send one frame, with what has ``arrived`` as JSON."""
 
+    def send_readings(self, units: int, values: Sequence[float]) -> None:
+        """Answer a reading to which nothing has arrived."""
+
     def receive(self, schema: wire.Schema) -> wire.Frame:
         """The next frame. Raises ChildStopped."""
 
