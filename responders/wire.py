@@ -62,11 +62,12 @@ def _or_none(check: Check) -> Check:
 def _error(value: object) -> bool:
     return (
         isinstance(value, dict)
-        and value.keys() == {"type", "text", "line", "file"}
+        and value.keys() - {"hint"} == {"type", "text", "line", "file"}
         and isinstance(value["type"], str)
         and isinstance(value["text"], str)
         and _line(value["line"])
         and _file(value["file"])
+        and isinstance(value.get("hint", ""), str)
     )
 
 

@@ -6,12 +6,13 @@ Reading files safely is ``raw_files.py``; what a submission is marked against is
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -130,7 +131,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     # Two robots are not marked by halves.
     if files and (len(missing) == len(wanted) or asked.second_program != "none"):
         names, expected = " and ".join(files), " and ".join(needed)
-        raise UsageError(f"{where}: has no {names}, expected {expected}.")
+        raise UsageError(f"{where}: has no {names}, expected {expected}{_renamed(missing, submission.files)}.")
     for part in missing:
         others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
         beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
@@ -328,7 +329,24 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
             notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
         return found
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
-    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both.")
+    renamed = _renamed(PART_FILES, files)
+    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both{renamed}.")
+
+
+def meant_as(part: Part, names: Iterable[str]) -> str:
+    """The file that is called nearly as the part has to be; empty if none is."""
+    word = PART_FILES[part].removesuffix(".py")
+    texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
+    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
+    near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
+    return next((name for name, stem in stems.items() if word in stem or stem in near), "")
+
+
+def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str:
+    """What is to be called otherwise, of the files that are there."""
+    found = {part: meant_as(part, files) for part in missing}
+    renamed = [f"{shown(name)} to {PART_FILES[part]}" for part, name in found.items() if name]
+    return f"; rename {' and '.join(renamed)}" if renamed else ""
 
 
 def _looks_like(data: bytes, name: str) -> Part:

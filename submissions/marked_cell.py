@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
 from submissions.magics import is_program_magic, magic_place, parse_flags, parse_magic
+from submissions.raw_files import shown
 from submissions.submission import Cell, Notebook
 
 LAST = "last"
@@ -22,6 +23,8 @@ _LINE = re.compile(
 )
 _AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
 _EXPANDED = re.compile(r"[{$]")
+#: A line that was to begin a robot program.
+NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 
 
@@ -51,7 +54,8 @@ def marked_site(notebook: Notebook, which: str) -> Site:
     found = sites(notebook)
     if not found:
         raise UsageError(
-            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded."
+            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded"
+            f"{_near_miss(notebook)}."
         )
     if which.isdecimal():
         number, cells = int(which), programs(notebook)
@@ -116,6 +120,16 @@ def _tagged(notebook: Notebook, tag: str) -> Site:
             "%%sim_magic_preloaded as its first line."
         )
     return found[-1]
+
+
+def _near_miss(notebook: Notebook) -> str:
+    """A line that is nearly a program's magic, or is one in the wrong place."""
+    for cell in notebook.cells:
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            if NEARLY_MAGIC.match(line[:200]):
+                why = "below other code" if is_program_magic(line) else "another word"
+                return f"; line {number} of cell {cell.number} has {shown(line.split()[0])}, {why}"
+    return ""
 
 
 def _count(number: int) -> str:

@@ -15,6 +15,7 @@ from responders.repeated_faults import SPARED, Diverged, RepeatedFaults
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
+from service.grading.hints import hints_for
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
@@ -100,6 +101,7 @@ def grade(
             *_unjudged_notes(criteria),
         ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
+        hints=hints_for(submission, plan, results, criteria),
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )

@@ -16,6 +16,7 @@ from types import CodeType, FrameType
 from typing import Any
 
 from .frames import Frame, clip
+from .near_names import meant_by
 
 _MOST_WARNINGS, _LONGEST_WARNING = 20, 180
 Namespace = dict[str, Any]
@@ -60,7 +61,7 @@ class StudentFiles:
         return None
 
     def described(self, error: BaseException) -> Frame:
-        """The error as a frame: its type, its words, and the last line of the student's files on the way to it."""
+        """The error as a frame: its type, its words, the last line of the student's files on the way to it, a hint."""
         place: Frame = {"line": None, "file": None}
         if isinstance(error, SyntaxError) and error.filename is not None and self.has(error.filename):
             place = self._place(error.filename, error.lineno)
@@ -70,7 +71,9 @@ class StudentFiles:
                 if self.has(frame.f_code.co_filename):
                     place = self._place(frame.f_code.co_filename, number)
             words = _words(error)
-        return {"type": type(error).__name__, "text": clip(self.without_folders(words)), **place}
+        told = {"type": type(error).__name__, "text": clip(self.without_folders(words)), **place}
+        hint = meant_by(error)
+        return {**told, "hint": hint} if hint else told
 
     def without_folders(self, text: str) -> str:
         """``text`` without what leads to this machine's modules and to the working folder."""

@@ -18,6 +18,7 @@ from service.commands.batch.awaited import marks_awaited
 from service.commands.batch.control import BatchId, cancel, pause, resume, retry
 from service.commands.batch.export import export
 from service.commands.batch.regrade import publish, regrade
+from service.commands.batch.similar import similar
 from service.commands.batch.tables import (
     changes_table,
     history_table,
@@ -192,6 +193,7 @@ batch_app.command()(cancel)
 batch_app.command()(retry)
 batch_app.command()(regrade)
 batch_app.command()(publish)
+batch_app.command()(similar)
 
 
 def _checked(grading_requests: Path, assignment: str | None, people: Path | None, console: Console) -> BatchContents:
