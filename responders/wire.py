@@ -165,7 +165,7 @@ RESPONDER: Schema = MappingProxyType(
 NOTEBOOK: Schema = MappingProxyType(
     {
         **RESPONDER,
-        "cell": ({"place": _whole(0, 10**5)}, {}),
+        "cell": ({"place": _whole(0, 10**5), "answers": _flag}, {}),
         "raised": ({"error": _error}, {}),
         "note": ({"text": _text, **_PLACE}, {}),
         "magic": (

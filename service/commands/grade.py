@@ -44,6 +44,9 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
+    run: Annotated[
+        str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
+    ] = None,
     link: channel_flags.LinkFlag = None,
     beacon: channel_flags.BeaconFlag = None,
     reach: channel_flags.RangeFlag = None,
@@ -95,6 +98,7 @@ def grade(
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
+                submission = _with_run(submission, run)
                 graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
                 graded = replace(graded, notes=(*_tried(given), *graded.notes))
             except RobomarkError as error:
@@ -122,6 +126,15 @@ def grade(
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")
+
+
+def _with_run(submission: Submission, run: str | None) -> Submission:
+    """The submission with another run to be marked. Raises UsageError for one that has no runs."""
+    if run is None:
+        return submission
+    if submission.notebook is None:
+        raise UsageError(f"{submission.student}: is no notebook and has no run {run}; leave --run out.")
+    return replace(submission, run=run)
 
 
 def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:

@@ -337,6 +337,8 @@ def _show(recording: Recording) -> None:
         typer.echo(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", err=True)
         if fault.hint:
             typer.echo(f"            {fault.hint}", err=True)
+    for note in recording.notes:
+        typer.echo(f"note: {readable(note, 400)}", err=True)
 
 
 def _drawn(recording: Recording, name: str, seed: int, own: Floor | None) -> bytes:

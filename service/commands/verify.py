@@ -11,6 +11,7 @@ from rich.text import Text
 
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
+from service.grading.trial_runner import TrialRunner
 from service.settings import load_settings
 from service.store import batches, intake, results
 from service.store.engine import open_store
@@ -28,7 +29,7 @@ _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verd
 def verify(
     grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
 ) -> None:
-    """Run a stored grading again and compare; exit status 3 if anything differs that must not."""
+    """Run a stored grading again, every trial of it, and compare; exit status 3 if anything differs that must not."""
     with open_store(load_settings()) as store:
         own = secret_of(store)
         with store.reading() as session:
@@ -36,7 +37,8 @@ def verify(
             stored = results.load(session, job.id)
             grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
-    again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret)
+    with TrialRunner(spares=False) as runner:
+        again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret, runner=runner)
     rows = list(zip(stored.trials, again.trials, strict=False))
     table = Table("scenario", "trial", "stored", "again", "", box=None, pad_edge=False)
     for before, after in rows:
