@@ -14,6 +14,7 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Engine, text
 from sqlalchemy.engine import Connection
 
+from service.store.revision import newest_revision
 from sim.errors import HostError
 
 #: An arbitrary number that all Robomarks share: PostgreSQL's advisory lock for migrations.
@@ -26,21 +27,6 @@ def configuration(connection: Connection) -> Config:
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
     config.attributes["connection"] = connection
     return config
-
-
-def newest_revision() -> str:
-    """The revision that this release needs."""
-    config = Config()
-    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
-    head = ScriptDirectory.from_config(config).get_current_head()
-    assert head is not None
-    return head
-
-
-def current_revision(engine: Engine) -> str | None:
-    """The revision the database is at; None for an empty one."""
-    with engine.begin() as connection:
-        return MigrationContext.configure(connection).get_current_revision()
 
 
 def refuse_downgrade() -> None:

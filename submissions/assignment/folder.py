@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.schema import did_you_mean
+from submissions.nearest import did_you_mean
 
 FILE_NAME = "assignment.toml"
 

@@ -37,7 +37,7 @@ def export(
     form: Annotated[str, format_option("What to write.", FORMATS)] = "csv",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--out", "--output", help="A file instead of the screen; a folder for a file each."),
+        typer.Option("-o", "--output", help="A file instead of the screen; a folder for a file each."),
     ] = None,
     published: Annotated[bool, typer.Option("--published", help="Only the grades that are published.")] = False,
     worksheet: Annotated[
@@ -51,7 +51,7 @@ def export(
     chosen = FORMATS[form]
     if output is None and (chosen.packed is not None or (chosen.table is None and chosen.document is not None)):
         what = "a folder" if chosen.document is not None else "a file"
-        raise UsageError(f"{form} is no text for a screen; name {what} with --out")
+        raise UsageError(f"{form} is no text for a screen; name {what} with --output")
     if (chosen.filled_in is None) != (worksheet is None):
         raise UsageError("--worksheet names what --format moodle-worksheet fills in; expected both or neither")
     with open_store(load_settings()) as store:
@@ -123,7 +123,8 @@ def _write_each(chosen: Format, rows: Sequence[TableRow[Grade]], folder: Path) -
         stems += refused_stems([(row.source, row.student.id) for row in refused])
     for stem, text in zip(stems, texts, strict=True):
         _write(folder / f"{stem}{chosen.suffix}", text)
-    print(f"{len(texts)} files in {folder}")
+    document(output=folder, files=len(texts))
+    tell(f"{len(texts)} files in {folder}")
 
 
 def _opened(path: Path) -> BinaryIO:

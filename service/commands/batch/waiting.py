@@ -94,7 +94,7 @@ class Waiting:
             while True:
                 if (held := self._held()) is not was_held:
                     goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
-                    self.console.print(f"batch {self.batch_id} {goes_on}", highlight=False, soft_wrap=True)
+                    self.console.print(f"batch {self.batch_id} {goes_on}", soft_wrap=True)
                     was_held = held
                 self.keep_up()
                 if time.monotonic() - swept >= _REAP_SECONDS:
