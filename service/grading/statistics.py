@@ -1,4 +1,4 @@
-"""What a class got for an assignment: mean, spread, each criterion's share of its marks, and what cost marks most often.
+"""What a class got for an assignment: mean, spread, each criterion's share of its marks, and what cost marks most.
 
 A pure function of marks that are there already; it reads no database and judges nothing.
 """

@@ -22,6 +22,7 @@ from sqlalchemy.pool import NullPool
 
 from service.home import open_home
 from service.settings import Settings
+from service.store.migrate import upgrade
 from service.store.revision import current_revision, newest_revision
 from sim.errors import HostError
 from submissions.seeds import Secret
@@ -119,9 +120,6 @@ def open_store(settings: Settings) -> Store:
             os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
         if current_revision(engine.execution_options(**{_ONLY_READS: True})) != newest_revision():
-            # Alembic takes as long to load as all that a command which only asks needs.
-            from service.store.migrate import upgrade
-
             upgrade(engine)
     except OperationalError as error:
         engine.dispose()

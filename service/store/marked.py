@@ -35,8 +35,8 @@ def marked(session: Session, lines: Sequence[JobLine]) -> list[MarkedSubmission]
             )
             .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
         )
-        for job_id, *of_criterion in rows:
-            criteria[job_id].append(MarkedCriterion(*of_criterion))
+        for job_id, criterion, title, marks, max_marks in rows:
+            criteria[job_id].append(MarkedCriterion(criterion, title, marks, max_marks))
     return [
         MarkedSubmission(
             line.student, line.assignment, line.marks, line.max_marks, line.verdict or "", tuple(criteria[line.id])

@@ -38,9 +38,7 @@ def find(session: Session, key: str) -> str | None:
     Never one without the sandbox, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
     """
     distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
-    cut = exists().where(
-        TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE)
-    )
+    cut = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
     unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
     query = (
         select(Job.id)

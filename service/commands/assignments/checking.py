@@ -1,4 +1,4 @@
-"""``robomark assignments check``: what can be said to it. What it does is ``examples.py``'s, which takes long to load."""
+"""``robomark assignments check``: what can be said to it. What it does is ``examples.py``'s, which loads long."""
 
 from __future__ import annotations
 

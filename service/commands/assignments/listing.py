@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from service.commands.shown import document, show, table
 
 
@@ -11,7 +13,7 @@ def list_assignments() -> None:
     from submissions.assignment.folder import catalogue
     from submissions.assignment.reader import find_assignment
 
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "section": assignment.section,
             "id": assignment.id,

@@ -6,7 +6,8 @@ import re
 from typing import TYPE_CHECKING
 
 from service.commands.assignments.which import Which, count_words
-from service.commands.shown import document, show as show_parts, table, tell
+from service.commands.shown import document, table, tell
+from service.commands.shown import show as show_parts
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment

@@ -21,9 +21,7 @@ from service.store.states import BatchState, Lane
 
 
 @contextmanager
-def marks_awaited(
-    store: Store, settings: Settings, batch_ids: Sequence[str], new: int
-) -> Iterator[None]:
+def marks_awaited(store: Store, settings: Settings, batch_ids: Sequence[str], new: int) -> Iterator[None]:
     """All marks are there when the ``with`` begins, all plots when it ends; ``new`` jobs were queued just now."""
     unfinished = _unfinished(store, batch_ids)
     if not unfinished:

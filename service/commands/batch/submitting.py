@@ -108,9 +108,7 @@ def _checked(grading_requests: Path, assignment: str | None, people: Path | None
     return checked
 
 
-def _accept(
-    store: Store, settings: Settings, path: Path, checked: BatchContents, *, again: bool
-) -> intake.AcceptedNew:
+def _accept(store: Store, settings: Settings, path: Path, checked: BatchContents, *, again: bool) -> intake.AcceptedNew:
     """Take in what passed, and say what was new of it."""
     batch = (path.name, checked.grading_requests, checked.refusals)
     if again:
@@ -164,9 +162,7 @@ def _new(accepted: intake.AcceptedNew) -> int:
     return 0 if accepted.batch is None else sum(job.copied_from is None for job in accepted.batch.jobs)
 
 
-def _wait(
-    store: Store, settings: Settings, accepted: intake.AcceptedNew, refusals: Sequence[Refusal]
-) -> list[JobLine]:
+def _wait(store: Store, settings: Settings, accepted: intake.AcceptedNew, refusals: Sequence[Refusal]) -> list[JobLine]:
     """Wait for the marks of what was new and of what was known, show them, and wait for the plots."""
     own = [] if accepted.batch is None else [accepted.batch.id]
     batch_ids = [*own, *(known.batch_id for known in accepted.known if known.batch_id)]
