@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from decimal import Decimal
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from rich.console import Group, RenderableType
-from rich.table import Table
+from rich.console import Group
 from rich.text import Text
 
 from service.commands.shown import table
-from service.grading.ranks import RankTable
-from service.store.audit import AuditEntry
-from service.store.batches import BatchLine, JobLine
 from service.store.policies import in_days
-from service.store.regrades import Change, CriterionChange
 from service.store.states import BatchState, JobState, Standing
-from submissions.people import Refusal
+
+if TYPE_CHECKING:
+    from decimal import Decimal
+
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from service.grading.ranks import RankTable
+    from service.store.audit import AuditEntry
+    from service.store.batches import BatchLine, JobLine
+    from service.store.regrades import Change, CriterionChange
+    from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
