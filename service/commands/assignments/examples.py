@@ -11,7 +11,7 @@ from rich.progress import track
 
 from service.commands.assignments.which import count_words
 from service.commands.example_table import catalogue_table, examples_table, measures_table
-from service.commands.shown import document, note, progress, show, tell
+from service.commands.shown import document, progress, show, tell
 from service.commands.statistics_shown import statistics_parts
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.statistics import statistics_of
@@ -69,11 +69,11 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
 def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
     """As it is with the new expectations, which are written for somebody to read over."""
     if not checked.unwritten:
-        note(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
+        tell(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
         return checked
     with for_the_user():
         path = add_expected(assignment, checked.unwritten)
-    note(f"{path}: wrote what {', '.join(checked.unwritten)} got; is it what they must get?")
+    tell(f"{path}: wrote what {', '.join(checked.unwritten)} got; is it what they must get?")
     return checked.written()
 
 

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from service.commands.shown import document, show, table
+from service.reports.readable import number, one_line
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.overview import overview
 
 
 def list_assignments() -> None:
     """The assignments of the catalogue."""
-    from service.reports.readable import one_line
-    from submissions.assignment.folder import catalogue
-    from submissions.assignment.reader import find_assignment
-
-    rows: list[dict[str, Any]] = [
-        {
-            "section": assignment.section,
-            "id": assignment.id,
-            "title": assignment.title,
-            "marks": assignment.max_marks,
-            "trials": sum(1 for _ in assignment.trials()),
-        }
-        for assignment in map(find_assignment, catalogue())
-    ]
-    document(assignments=rows)
+    assignments = [overview(assignment_folder(name)) for name in catalogue()]
+    document(assignments=assignments)
     listed = table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
-    for row in rows:
-        listed.add_row(row["section"], row["id"], one_line(row["title"]), f"{row['marks']:g}", str(row["trials"]))
+    for each in assignments:
+        listed.add_row(each.section, each.id, one_line(each.title), number(each.marks), str(each.trials))
     show(listed)
