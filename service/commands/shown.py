@@ -71,7 +71,8 @@ def note(sentence: str) -> None:
 
 def progress() -> Console:
     """Where it is shown how far the work is; a terminal alone shows what moves."""
-    return _console(sys.stderr.isatty(), stderr=True, quiet=_quiet.get())
+    on_terminal = sys.stderr.isatty()
+    return _console(on_terminal, stderr=True, quiet=_quiet.get() or not on_terminal)
 
 
 def table(*headings: str, right: Collection[str] = (), title: str = "") -> Table:

@@ -48,7 +48,7 @@ def download(tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path, tmp_path: Path) -> None:
     home, sheet, reports = tmp_path / "home", tmp_path / "worksheet.csv", tmp_path / "reports"
-    words = ["batch", "submit", download, "-a", ECHO, "--people", sheet, "--wait", "--report", reports]
+    words = ["batch", "submit", download, "-a", ECHO, "--people", sheet, "--wait", "--output", reports]
     ended = robomark(home, *words)
     assert ended.status == 2
     found = re.search(r"batch (\w{12}): 2 queued", ended.out)
