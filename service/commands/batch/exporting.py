@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from service.batch_rows import rows_of, why_not_shown
 from service.commands.batch.tables import unjudged_words
-from service.commands.shown import note
+from service.commands.shown import document, note, tell
 from service.grading.grade import Grade
 from service.home import for_the_user
 from service.report_files import report_pages
@@ -106,7 +106,8 @@ def _write_each(chosen: Format, rows: Sequence[TableRow[Grade]], folder: Path) -
         stems += refused_stems([(row.source, row.student.id) for row in refused])
     for stem, text in zip(stems, texts, strict=True):
         _write(folder / f"{stem}{chosen.suffix}", text)
-    note(f"{len(texts)} files in {folder}")
+    document(output=folder, files=len(texts))
+    tell(f"{len(texts)} files in {folder}")
 
 
 def _opened(path: Path) -> BinaryIO:
