@@ -7,9 +7,10 @@ what happened. Setting a trial up and taking it down is ``trial.py``'s.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from responders import message_format, wire
+from responders import message_format, packed, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.link import link_of
@@ -21,15 +22,16 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, SENSORS, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, Fault, Image, Line, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: What a text is answered with where there is no responder.
 _PINGPONG = "pingpong "
-#: How often a program may act without waiting; its own process counts too, and can name the line.
-_FREE_ACTS = 100_100
+#: How often a program may act without waiting; its own process counts too, and can name the line. What that takes for
+#: one act of a motor may come in two.
+_FREE_ACTS = 200_100
 _MOST_NOTES = 200
 
 
@@ -89,7 +91,7 @@ class Bridge:
             return self._stopped(surprise(error))
 
     def _run(self) -> Fault | None:
-        spec = self._spec
+        spec, values = self._spec, self.world.readings()
         self._child.send(
             {
                 "name": spec.program.code.name,
@@ -97,7 +99,7 @@ class Bridge:
                 "preamble": spec.program.preamble,
                 "modules": dict(spec.program.modules),
                 "tick": spec.tick,
-                "sensors": list(SENSORS),
+                "sensors": {name: len(value) if isinstance(value, list) else 0 for name, value in values.items()},
                 "seed": Stream(spec.child_seed, "program").integer(0),
                 "number": spec.number,
             }
@@ -123,15 +125,13 @@ class Bridge:
 
     def _serve(self, frame: wire.Frame) -> None:
         match frame["do"]:
-            case "read":
-                self._read(frame["what"], frame["times"])
-            case "wait":
-                self._advance(frame["units"])
-                self._reply(None)
+            case "acts":
+                self._act(frame["acts"])
             case "print":
                 self._print(frame["text"])
-            case "motor":
-                self._set_motor(frame)
+            case "polarity":
+                self._free_act()
+                self._wheel(frame["port"]).polarity = frame["polarity"][:20]
             case "motor_state":
                 self._free_act()
                 self._reply_wheel(frame["port"])
@@ -151,6 +151,17 @@ class Bridge:
             case "refused":
                 if len(self.notes) < _MOST_NOTES:
                     self.notes.append(refusal("program", frame))
+
+    def _act(self, acts: Sequence[packed.Act]) -> None:
+        for act in acts:
+            kind = type(act)
+            if kind is packed.Read:
+                self._read(*act)
+            elif kind is packed.Move:
+                self._move(*act)
+            else:
+                self._advance(*act)
+                self._reply(None)
 
     def _advance(self, units: int) -> None:
         """Let simulated time pass; a tick that is due at the very end of a wait still runs."""
@@ -193,10 +204,25 @@ class Bridge:
         else:
             self._advance(times * _READ)
             self._values, self._told_in = self.world.readings(), self.world.clock
-            self._encoded = {name: repr(value).encode() for name, value in self._values.items()}
-        self.chain.add(what, self.now, self._encoded[what])
+            self._encoded = {}
+        encoded = self._encoded.get(what)
+        if encoded is None:
+            encoded = self._encoded[what] = repr(self._values[what]).encode()
+        self.chain.add(what, self.now, encoded)
         if not known:
-            self._reply(list(self._values.values()))
+            self._reply_readings()
+
+    def _reply_readings(self) -> None:
+        numbers: list[float] = []
+        for value in self._values.values():
+            if isinstance(value, list):
+                numbers += value
+            else:
+                numbers.append(value)
+        if self._arrived:
+            self._reply(numbers)
+        else:
+            self._child.send_readings(self.now, numbers)
 
     def _wheel(self, port: str) -> Wheel:
         return self.world.drive.left if port == "outB" else self.world.drive.right
@@ -214,15 +240,13 @@ class Bridge:
         self.chain.add(port, self.now, repr(value).encode())
         self._reply(value)
 
-    def _set_motor(self, frame: wire.Frame) -> None:
+    def _move(self, port: str, set_point: str, value: float, command: str | None) -> None:
         self._free_act()
-        wheel = self._wheel(frame["port"])
-        for name in ("speed_sp", "position_sp", "position", "time_sp", "polarity"):
-            if name in frame:
-                value = frame[name]
-                setattr(wheel, name, value[:20] if isinstance(value, str) else float(value))
-        if "command" in frame:
-            wheel.run(frame["command"], self.world.clock)
+        wheel = self._wheel(port)
+        if set_point:
+            setattr(wheel, set_point, value)
+        if command is not None:
+            wheel.run(command, self.world.clock)
 
     def _until(self, frame: wire.Frame) -> None:
         """Look every 10 ms, first at once; a time-out is over when strictly exceeded."""

@@ -1,6 +1,7 @@
 """The worker's end of the wire: frames from a child are read as if they came from the internet.
 
 One strict JSON object a line, of a closed schema; there is no frame that could carry a mark, a time or a verdict.
+What robot programs do by the thousand comes packed, which is ``packed.py``'s.
 """
 
 from __future__ import annotations
@@ -11,8 +12,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
-
-from sim.recording import SENSORS
 
 Frame = dict[str, Any]
 
@@ -26,7 +25,8 @@ class WireError(Exception):
 
 Check = Callable[[object], bool]
 
-_LARGEST = sys.float_info.max
+#: The largest number that a frame can hold, either way.
+LARGEST = sys.float_info.max
 
 
 def _text(value: object) -> bool:
@@ -43,7 +43,12 @@ def _flag(value: object) -> bool:
 
 def _number(value: object) -> bool:
     # A whole number of hundreds of digits is finite and no float.
-    return type(value) in (int, float) and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
+    return type(value) in (int, float) and -LARGEST <= value <= LARGEST  # type: ignore[operator]
+
+
+def _packed_alone(_: object) -> bool:
+    """No line can say it."""
+    return False
 
 
 def _one_of(*values: object) -> Check:
@@ -74,7 +79,9 @@ _file = _or_none(_module_file)
 #: Where in the student's files: a line, and the file if it is not the one that is run.
 _PLACE: Mapping[str, Check] = MappingProxyType({"line": _line, "file": _file})
 _port = _one_of("outB", "outC")
-_units = _whole(0, 10**15)
+#: The longest time that a program can ask for, thirds of a microsecond.
+MOST_UNITS = 10**15
+_units = _whole(0, MOST_UNITS)
 
 Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 
@@ -110,24 +117,11 @@ _REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_
 #: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
 ROBOT: Schema = MappingProxyType(
     {
+        "acts": ({"acts": _packed_alone}, {}),
         "refused": _REFUSED,
         "print": ({"text": _text}, {}),
         "say": ({"text": _text}, {}),
-        "motor": (
-            {"port": _port},
-            {
-                "speed_sp": _number,
-                "position_sp": _number,
-                "position": _number,
-                "time_sp": _number,
-                "polarity": _text,
-                "command": _one_of(
-                    "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct"
-                ),
-            },
-        ),
-        "wait": ({"units": _units}, {}),
-        "read": ({"what": _one_of(*SENSORS), "times": _whole(1, 2)}, {}),
+        "polarity": ({"port": _port, "polarity": _text}, {}),
         "motor_state": ({"port": _port}, {}),
         "paid_motor": ({"port": _port}, {}),
         "until": (
@@ -209,9 +203,7 @@ AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
 #: kept of them, and honest programs send thousands; every other frame is paid for before it is handed on.
 NOTHING_KEPT = frozenset(
     {
-        "read",
-        "wait",
-        "motor",
+        "polarity",
         "motor_state",
         "paid_motor",
         "until",
@@ -298,12 +290,15 @@ def _encodable(value: Any) -> Any:
     return value
 
 
+_encode = json.JSONEncoder(separators=(",", ":")).encode
+
+
 def encode(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
     """A frame for a child, as one line that begins with its number.
 
     What has ``arrived`` is JSON already, and goes into the list ``m`` as it is.
     """
-    line = json.dumps({"n": number, **frame}, separators=(",", ":")).encode("ascii")
+    line = _encode({"n": number, **frame}).encode("ascii")
     if arrived:
         # Halves of characters too: the child's JSON takes them.
         line = line[:-1] + f',"m":[{",".join(arrived)}]}}'.encode("utf-8", "surrogatepass")

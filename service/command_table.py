@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "submit": Command("batch.submit:submit", "Queue a submission for each student."),
                 "list": Command("batch.listing:list_batches", "List the newest batches."),
                 "status": Command("batch.status:status", "Show how far a batch is, its marks and statistics."),
+                "similar": Command("batch.similar:similar", "Show whose submissions are alike, for staff."),
                 "export": Command("batch.export:export", "Write the marks of a batch for another program."),
                 "pause": Command("batch.control:pause", "Begin no more of a batch."),
                 "resume": Command("batch.control:resume", "Let a paused batch go on."),

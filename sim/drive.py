@@ -37,7 +37,9 @@ class Wheel:
     def run(self, command: str, clock: int) -> None:
         """Take a command between two ticks; ``clock`` counts the ticks that have passed."""
         self.command = command
-        if command == "run-timed":
+        if command == "run-forever":
+            self.state = "running"
+        elif command == "run-timed":
             self._time_target = clock + self.time_sp * 30
             self.state = "running"
         elif command == "run-to-rel-pos":
@@ -48,8 +50,6 @@ class Wheel:
             self._position_target = self.position_sp
             if self._position_target != self.position:
                 self.state = "running"
-        elif command == "run-forever":
-            self.state = "running"
 
     def change_speed(self, most: float, noise: float, both_directions: bool = False) -> None:
         """Move the speed towards its set point. Unless ``both_directions``, no negative speed is rounded and noisy.

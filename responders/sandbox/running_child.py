@@ -12,18 +12,22 @@ import os
 import select
 import signal
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from responders import wire
+from responders import packed, wire
 from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.errors import HostError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
+_POLL_TIME = struct.pack("ll", 0, round(_POLL_SECONDS * 1e6))
+#: What is read of the wire at once, bytes; most of what comes is far shorter.
+_AT_ONCE = 8192
 #: What a child is charged for a frame at least; made by our own code there, one costs it several times this. It keeps
 #: a child that writes thousands of frames at a stroke from holding up the worker, to which each costs more.
 _FRAME_CPU_SECONDS = 5e-6
@@ -36,7 +40,7 @@ _UNREAD_BYTES = 1 << 20
 #: How long a process that has closed the wire may take to be gone.
 _END_SECONDS = 1.0
 #: Frames that a program sends thousands of times to the letter; each is checked once.
-_REPEATED = frozenset({"read", "wait", "motor_state", "until"})
+_REPEATED = frozenset({"motor_state", "until"})
 _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 #: What a responder may keep in its folder, beside the files that it was given.
 _FOLDER_BYTES = 16 << 20
@@ -84,13 +88,17 @@ class Child:
         self._overran: Callable[[], bool] | None = None
         self._pending = b""
         self._sent = self._received = 0  # frames
+        self._charged = 0  # frames, and acts in packets
         self._known: dict[bytes, wire.Frame] = {}
         self._closed = False
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
         self._queued_before = _seconds_queued()
-        connection.settimeout(_POLL_SECONDS)
+        # The kernel's own time limits: with Python's there would be a second system call beside each.
+        connection.setblocking(True)
+        for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            connection.setsockopt(socket.SOL_SOCKET, limit, _POLL_TIME)
 
     def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
         """From now on student code may run in it, and what it costs is counted by ``meter``.
@@ -102,13 +110,20 @@ class Child:
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
         """Send one frame, with what has ``arrived`` as JSON; a child that is deaf shows at the next ``receive``."""
-        data = memoryview(wire.encode(frame, self._sent, arrived))
+        self._send(wire.encode(frame, self._sent, arrived))
+
+    def send_readings(self, units: int, values: Sequence[float]) -> None:
+        """Answer a reading to which nothing has arrived: the time, and what all sensors read."""
+        self._send(packed.pack_readings(units, values, self._sent))
+
+    def _send(self, frame: bytes) -> None:
+        data = memoryview(frame)
         self._sent += 1
         began = time.monotonic()
         while data:
             try:
                 data = data[self._socket.send(data) :]
-            except TimeoutError:
+            except BlockingIOError:
                 self._check_cpu()
                 if time.monotonic() - began > _STALLED_SECONDS:
                     raise self._stalled() from None
@@ -118,15 +133,13 @@ class Child:
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         """The next frame, paid for if anything of it may be kept. Raises ChildStopped, or KilledFromOutside."""
-        line, newline, rest = self._pending.partition(b"\n")
-        if not newline:
-            line, rest = self._read_line()
-        self._pending = rest
+        data = self._pending or self._more()
         try:
+            if data[0] == packed.MARK and "acts" in schema:
+                return {"do": "acts", "acts": self._acts(data)}
+            line, self._pending = self._line(data)
             number, line = wire.unnumbered(line)
-            if number != self._received:
-                raise wire.WireError(f"frame {number} where frame {self._received} was due")
-            self._received += 1
+            self._count(number)
             frame = self._known.get(line)
             if frame is not None:
                 return frame
@@ -144,6 +157,29 @@ class Child:
         elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
             self._known[line] = frame
         return frame
+
+    def _acts(self, data: bytes) -> list[packed.Act]:
+        """Those of the packet that begins with ``data``. Nothing of them is kept, so nothing is paid."""
+        while len(data) < packed.HEADER_BYTES:
+            data += self._more()
+        pieces, missing = [data], packed.packet_bytes(data) - len(data)
+        while missing > 0:
+            pieces.append(self._more())
+            missing -= len(pieces[-1])
+        if missing < 0 or len(pieces) > 1:
+            data = b"".join(pieces)
+        end = len(data) + missing
+        self._pending = data[end:]
+        number, acts = packed.unpack(data[:end])
+        self._count(number)
+        self._charged += len(acts)
+        return acts
+
+    def _count(self, number: int) -> None:
+        if number != self._received:
+            raise wire.WireError(f"frame {number} where frame {self._received} was due")
+        self._received += 1
+        self._charged += 1
 
     @property
     def closed(self) -> bool:
@@ -165,22 +201,34 @@ class Child:
         with contextlib.suppress(HostError):
             self._reap()
 
-    def _read_line(self) -> tuple[bytes, bytes]:
+    def _line(self, data: bytes) -> tuple[bytes, bytes]:
+        """The line that begins with ``data``, and what came after it."""
+        pieces, size = [data], len(data)
+        while b"\n" not in pieces[-1]:
+            if size > wire.MOST:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the program's process sent an endless frame")
+            pieces.append(self._more())
+            size += len(pieces[-1])
+        line, _, rest = b"".join(pieces).partition(b"\n")
+        return line, rest
+
+    def _more(self) -> bytes:
+        """What the child sends next, a byte at least."""
         last_cpu, still_since = -1.0, time.monotonic()
-        pieces = [self._pending]
-        size = len(self._pending)
+        began = still_since
         while True:
-            began = time.monotonic()
             try:
-                data = self._socket.recv(wire.MOST)
-            except TimeoutError:
-                self._waited += time.monotonic() - began
+                data = self._socket.recv(_AT_ONCE)
+            except BlockingIOError:
+                now = time.monotonic()
+                self._waited += now - began
+                began = now
                 self._meter.heartbeat()
                 used = self._check_cpu()
                 self._check_sleep()
                 if used != last_cpu or self._runnable():
-                    last_cpu, still_since = used, time.monotonic()
-                elif time.monotonic() - still_since > _STALLED_SECONDS:
+                    last_cpu, still_since = used, now
+                elif now - still_since > _STALLED_SECONDS:
                     raise self._stalled() from None
                 continue
             except OSError:
@@ -194,19 +242,13 @@ class Child:
                 self._meter.heartbeat()
                 self._check_cpu()
                 self._check_sleep()
-            pieces.append(data)
-            size += len(data)
-            if b"\n" in data:
-                line, _, rest = b"".join(pieces).partition(b"\n")
-                return line, rest
-            if size > wire.MOST:
-                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the program's process sent an endless frame")
+            return data
 
     def _check_cpu(self) -> float:
         """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
         self._check_folder()
         used = self.cpu_seconds()
-        charged = max(used, self._received * _FRAME_CPU_SECONDS)
+        charged = max(used, self._charged * _FRAME_CPU_SECONDS)
         if charged > self._limits.cpu_seconds:
             raise self._too_busy(self._last_word())
         self._meter.check_cpu(charged)
@@ -257,7 +299,7 @@ class Child:
                 break
             try:
                 more = self._socket.recv(wire.MOST)
-            except TimeoutError:
+            except BlockingIOError:
                 continue
             except OSError:
                 break

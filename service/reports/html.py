@@ -60,7 +60,7 @@ def gallery(floors: Sequence[PrintedFloor]) -> str:
     shown = [
         {"name": floor.name, "image": _data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
     ]
-    return _render("gallery.html", floors=shown)
+    return render("gallery.html", floors=shown)
 
 
 def report(view: View, plots: Mapping[str, bytes], submission: Submission | None = None) -> str:
@@ -69,13 +69,13 @@ def report(view: View, plots: Mapping[str, bytes], submission: Submission | None
     ``plots`` are those of ``draw_all``; the ones that are missing are left out.
     """
     images = {name: _data_uri(data) for name, data in plots.items()}
-    return _render("report.html", page=page_of(view, submission), images=images)
+    return render("report.html", page=page_of(view, submission), images=images)
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
     """The page of one whose submission was refused: what was found, what was expected, what to do next."""
     found, _, expected = row.reason.partition(", expected ")
-    return _render(
+    return render(
         "refusal.html",
         who=row.student.name or row.who,
         source=row.source,
@@ -103,10 +103,11 @@ def batch_index(
         }
         for row in rows
     ]
-    return _render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
+    return render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
 
 
-def _render(template: str, **context: object) -> str:
+def render(template: str, **context: object) -> str:
+    """A page of ``templates``, with the one style and a policy that lets it load and run nothing."""
     style = _style()
     digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"

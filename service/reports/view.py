@@ -6,11 +6,13 @@ renders a view asks no more who reads it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
+from service.similarity.pairs import Similarity
 from sim.recording import Verdict
 
 #: What a student sees before anything is published.
@@ -35,6 +37,18 @@ class GradebookView:
 
     entry: Grade
     shown: Grade
+
+
+@dataclass(frozen=True, slots=True)
+class SimilarityView:
+    """What is alike in a batch, as staff may see it; a student has no view of it, and no grade has anything of it."""
+
+    found: tuple[Similarity, ...]
+
+
+def staff_similarity(found: Sequence[Similarity]) -> SimilarityView:
+    """All of it."""
+    return SimilarityView(tuple(found))
 
 
 def staff_view(grade: Grade) -> View:

@@ -89,7 +89,7 @@ def load(session: Session, job_id: str) -> Grade:
     if found is None or found[0].verdict is None:
         raise UsageError(f"{job_id} has no grade")
     job, sha256, student, version = found
-    trials = _trials(session, job_id)
+    trials = load_trials(session, job_id)
     rows = session.scalars(
         select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
     )
@@ -107,6 +107,26 @@ def load(session: Session, job_id: str) -> Grade:
         missing=job.missing,
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
         cost=None if job.cost is None else decode(Cost, job.cost),
+    )
+
+
+def load_trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
+    """The trials of a job with their recordings; none where it has no grade."""
+    files = artifacts.get(session, job_id, prefix="recording-")
+    rows = session.scalars(select(TrialRow).where(TrialRow.job_id == job_id).order_by(TrialRow.position))
+    return tuple(
+        TrialResult(
+            scenario=row.scenario,
+            index=row.scenario_index,
+            seed=row.seed,
+            light_noise=row.light_noise,
+            motor_noise=row.motor_noise,
+            visibility=row.visibility,
+            recording=_recording(files, job_id, row.position),
+            sweep=decode(tuple[tuple[str, float], ...], row.sweep),
+            place=row.place,
+        )
+        for row in rows
     )
 
 
@@ -170,25 +190,6 @@ def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) ->
     where = numbers.get(prediction.image)
     plain = cast(dict[str, Any], encode(replace(prediction, image=cast(Image, None))))
     return plain | {"image": where if where is not None else encode(prediction.image)}
-
-
-def _trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
-    files = artifacts.get(session, job_id, prefix="recording-")
-    rows = session.scalars(select(TrialRow).where(TrialRow.job_id == job_id).order_by(TrialRow.position))
-    return tuple(
-        TrialResult(
-            scenario=row.scenario,
-            index=row.scenario_index,
-            seed=row.seed,
-            light_noise=row.light_noise,
-            motor_noise=row.motor_noise,
-            visibility=row.visibility,
-            recording=_recording(files, job_id, row.position),
-            sweep=decode(tuple[tuple[str, float], ...], row.sweep),
-            place=row.place,
-        )
-        for row in rows
-    )
 
 
 def _recording(files: dict[str, artifacts.File], job_id: str, position: int) -> Recording:

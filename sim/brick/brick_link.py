@@ -5,8 +5,9 @@ It knows no physics: positions, sensor values and the time come with the answers
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NoReturn
+import struct
+from collections.abc import Callable, Mapping
+from typing import Any, NoReturn, Protocol
 
 Frame = dict[str, Any]
 
@@ -14,11 +15,43 @@ SECOND = 3_000_000  # thirds of a microsecond
 READ = SECOND // 100
 FREE_READS = 100_000
 
-_WAITS = frozenset({"wait", "read", "until", "until_said", "paid_motor"})
+_WAITS = frozenset({"until", "until_said", "paid_motor"})
+
+#: Acts that programs do by the thousand go packed: what it is, of which part of the robot, a motor's set point and
+#: command, and a value.
+_packed = struct.Struct("<BBBBd").pack
+_READ, _WAIT, _MOTOR = range(3)
+_PORTS = {"outB": 0, "outC": 1}
+_SET_POINTS = {"speed_sp": 1, "position_sp": 2, "position": 3, "time_sp": 4}
+_COMMANDS = {
+    None: 0,
+    "": 1,
+    "reset": 2,
+    "run-forever": 3,
+    "run-timed": 4,
+    "run-to-rel-pos": 5,
+    "run-to-abs-pos": 6,
+    "run-direct": 7,
+}
 
 
-def _unconnected(frame: Frame) -> NoReturn:
-    raise RuntimeError("this program is not connected to a robot")
+class Wire(Protocol):
+    """What leads to the world; one that sends later may hold things back until something cannot wait."""
+
+    def send(self, frame: Frame) -> None: ...
+
+    def send_later(self, frame: Frame) -> None: ...
+
+    def act(self, packed: bytes) -> None: ...
+
+    def act_later(self, packed: bytes) -> None: ...
+
+    def receive(self) -> Frame: ...
+
+
+class _Unconnected:
+    def __getattr__(self, name: str) -> NoReturn:
+        raise RuntimeError("this program is not connected to a robot")
 
 
 class Link:
@@ -28,42 +61,52 @@ class Link:
         self.units = 0
         self.number = 1  # of the robot, where there are two
         self.state: dict[str, list[Any]] = {"messages": []}
-        self._send: Callable[[Frame], None] = _unconnected
-        self._send_later: Callable[[Frame], None] = _unconnected
-        self._receive: Callable[[], Frame] | None = None
+        self._wire: Wire = _Unconnected()
         self._stuck: Callable[[], None] | None = None
         self._free = 0
-        self._sensors: list[str] = []
-        self._seen: Frame = {}  # what the sensors read in tick number _seen_in
+        self._sensors: dict[tuple[str, int], tuple[bytes, int | slice]] = {}
+        self._seen: list[float] = []  # what the sensors read in tick number _seen_in
         self._seen_in = -1
         self._tick = SECOND
 
-    def connect(
-        self,
-        send: Callable[[Frame], None],
-        send_later: Callable[[Frame], None],
-        receive: Callable[[], Frame],
-        stuck: Callable[[], None],
-        sensors: list[str],
-        tick: int,
-    ) -> None:
-        """``send_later`` may hold a frame back until the next one; ``stuck`` ends a program that never waits.
+    def connect(self, wire: Wire, stuck: Callable[[], None], sensors: Mapping[str, int], tick: int) -> None:
+        """``stuck`` ends a program that never waits.
 
-        Each time one of ``sensors`` is read, the world tells what they all give, in this order. Values change every
-        ``tick``.
+        Each time one of ``sensors`` is read, the world tells what they all give, in this order: so many numbers each,
+        0 for one that stands alone. Values change every ``tick``.
         """
-        self._sensors, self._tick = sensors, tick
-        self._send, self._send_later, self._receive, self._stuck = send, send_later, receive, stuck
+        self._wire, self._stuck, self._tick = wire, stuck, tick
+        start = 0
+        for index, (name, width) in enumerate(sensors.items()):
+            where = slice(start, start + width) if width else start
+            for times in (1, 2):
+                self._sensors[name, times] = _packed(_READ, index, 0, 0, times), where
+            start += width or 1
 
     def tell(self, frame: Frame) -> None:
         """Something happened; no answer is awaited."""
         self.read_freely()
-        self._send(frame)
+        self._wire.send(frame)
 
-    def tell_later(self, frame: Frame) -> None:
-        """Something that shows only once the world moves; it is sent with the next question at the latest."""
+    def set_motor(
+        self, port: str, command: str | None = None, polarity: str | None = None, **set_points: float
+    ) -> None:
+        """Set points, and then a command; they show only once the world moves, so they are sent with what waits."""
         self.read_freely()
-        self._send_later(frame)
+        if command not in _COMMANDS:
+            raise ValueError(
+                f"a motor has no command {command!r}: expected one of {', '.join(filter(None, _COMMANDS))}"
+            )
+        if polarity is not None:
+            self._wire.send_later({"do": "polarity", "port": port, "polarity": polarity})
+        part, left = _PORTS[port], len(set_points)
+        for name, value in set_points.items():
+            left -= 1
+            self._wire.act_later(
+                _packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], float(value))
+            )
+        if not set_points and command is not None:
+            self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
 
     def ask(self, frame: Frame) -> Any:
         """The answer's value, once the world has moved as far as the question takes."""
@@ -71,9 +114,11 @@ class Link:
             self._free = 0
         else:
             self.read_freely()
-        self._send(frame)
-        assert self._receive is not None
-        answer = self._receive()
+        self._wire.send(frame)
+        return self._answer()
+
+    def _answer(self) -> Any:
+        answer = self._wire.receive()
         self.units = answer["t"]
         arrived = answer.get("m")
         if arrived:
@@ -87,17 +132,17 @@ class Link:
         Values change only at ticks: a reading that ends before the next one is known already, so the world is told
         of it and not asked. The world counts the time by the same rule, and gives no answer then.
         """
-        frame = {"do": "read", "what": what, "times": times}
+        packed, where = self._sensors[what, times]
+        self._free = 0
         end = self.units + times * READ
         if self._seen_in == end // self._tick:
-            self._free = 0
             self.units = end
-            self._send_later(frame)
-            return self._seen[what]
-        values = self.ask(frame)
-        self._seen = dict(zip(self._sensors, values, strict=True))
-        self._seen_in = self.ticks
-        return self._seen[what]
+            self._wire.act_later(packed)
+        else:
+            self._wire.act(packed)
+            self._seen = self._answer()
+            self._seen_in = self.ticks
+        return self._seen[where]
 
     @property
     def ticks(self) -> int:
@@ -112,7 +157,13 @@ class Link:
 
     def wait(self, seconds: float) -> None:
         """Let the world move for that long."""
-        self.ask({"do": "wait", "units": round(seconds * SECOND)})
+        self.wait_units(round(seconds * SECOND))
+
+    def wait_units(self, units: int) -> None:
+        """The same, in thirds of a microsecond."""
+        self._free = 0
+        self._wire.act(_packed(_WAIT, 0, 0, 0, units))
+        self._answer()
 
 
 link = Link()

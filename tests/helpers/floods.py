@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hostile import FIND_WIRE, flood, forged
+from hostile import FIND_WIRE, flood, flood_of_acts, forged
 from sim.recording import Verdict
 
 BIG = "x" * 60_000
@@ -54,11 +54,11 @@ FLOODS = [
     _program("refusals", long('{"do":"refused","what":"@","line":1,"file":null}')),
     _program("refusals that differ in length", long('{"do":"refused","what":"@","line":null,"file":null}', 1000)),
     _program(
-        "padded waits", '{"do":"wait",@"units":0}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
+        "padded questions", '{@"do":"until_said"}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
     ),
-    _program(
-        "motor commands", long('{"do":"motor","port":"outB","polarity":"@"}'), Verdict.CPU_LIMIT, Verdict.STALLED
-    ),
+    _program("polarities", long('{"do":"polarity","port":"outB","polarity":"@"}'), Verdict.CPU_LIMIT, Verdict.STALLED),
+    Flood("motor commands", flood_of_acts(2, 0, 1, 3, 100.0), None, (Verdict.CPU_LIMIT,)),
+    Flood("readings", flood_of_acts(0, 0, 0, 0, 1.0), None, (Verdict.TIME_LIMIT, Verdict.STALLED)),
     _responder("lines of a responder", long('{"do":"print","text":"@"}')),
     _responder("calls", CALL),
     _responder("refusals of a responder", long('{"do":"refused","what":"@","line":1,"file":null}')),

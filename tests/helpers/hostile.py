@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 #: Finds the child's end of the wire, wherever our own code keeps it.
 FIND_WIRE = "import gc, os\nline = next(o for o in gc.get_objects() if type(o).__qualname__ == 'Wire')\n"
 
@@ -9,6 +11,17 @@ FIND_WIRE = "import gc, os\nline = next(o for o in gc.get_objects() if type(o)._
 def forged(frame: str) -> str:
     """A statement that writes a frame with the very number that is due."""
     return f"line._write(b''); os.write(3, b'{{\"n\":%d,' % line._sent + {frame[1:].encode()!r} + b'\\n')"
+
+
+def packed(*acts: tuple[int, int, int, int, float]) -> str:
+    """A statement that sends a packet of these acts, whatever they are."""
+    return f"line._acts += {[struct.pack('<BBBBd', *act) for act in acts]!r}; line._write(b'')"
+
+
+def flood_of_acts(*act: float) -> str:
+    """A file that does the same act for ever, thousands at a stroke."""
+    packed = struct.pack("<BBBBd", *act)
+    return f"{FIND_WIRE}while True:\n    line._acts = [{packed!r}] * 2000\n    line._write(b'')\n"
 
 
 def flood(frame: str, at_once: int = 50) -> str:

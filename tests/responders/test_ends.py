@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from command import COMMAND
-from hostile import FIND_WIRE, forged
+from hostile import FIND_WIRE, forged, packed
 from processes import children, until
 from responders.bridge import Bridge
 from responders.code import Code
@@ -165,7 +165,7 @@ def _raising(error: Exception) -> Callable[..., Any]:
 
 #: Where our own code may stumble while something of a child's is in its hands, and a program that leads there.
 _STUMBLES = [
-    pytest.param(Bridge, "_set_motor", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
+    pytest.param(Bridge, "_move", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
     pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
     pytest.param(Bridge, "_print", "print('x')", None, id="a line"),
     pytest.param(ResponderProcess, "_answer", "print('PY::x')", ECHO, id="an answer"),
@@ -196,8 +196,8 @@ def test_what_the_machine_stumbles_over_is_not(
 @pytest.mark.parametrize(
     "program",
     [
-        FIND_WIRE + forged('{"do":"motor","port":"outB","command":"run-to-rel-pos","position_sp":1e308}'),
-        FIND_WIRE + forged('{"do":"motor","port":"outB","position":-1e308,"time_sp":1e308,"command":"run-timed"}'),
+        FIND_WIRE + packed((2, 0, 2, 5, 1e308)),
+        FIND_WIRE + packed((2, 0, 3, 0, -1e308), (2, 0, 4, 4, 1e308)),
         FIND_WIRE + forged('{"do":"end","error":{"type":"\\\\ud800","text":"\\\\udfff","line":9,"file":null}}'),
         FIND_WIRE + forged('{"do":"refused","what":"\\\\ud800\\\\u0000","line":null,"file":null}'),
         "print('Light_left: ' + '9' * 400 + ' 1e999')\nprint('Gyro: nan inf')",

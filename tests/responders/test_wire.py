@@ -17,6 +17,7 @@ JSON = st.recursive(
     max_leaves=12,
 )
 KINDS = [(schema, kind) for schema in (wire.ROBOT, wire.RESPONDER) for kind in schema]
+UNTIL = b'{"do":"until","port":"outB","state":"still","timeout":%b}'
 
 
 @given(st.binary(max_size=300))
@@ -50,17 +51,16 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
         b"{}",
         b'{"do":"mark","marks":10}',
         b'{"do":"verdict","verdict":"finished"}',
-        b'{"do":"wait","units":-1}',
-        b'{"do":"wait","units":true}',
-        b'{"do":"wait","units":1.5}',
-        b'{"do":"wait","units":1e400}',
-        b'{"do":"wait","units":1,"t":99}',
-        b'{"do":"wait","units":1,"units":2}',
-        b'{"do":"motor","port":"outB","speed_sp":NaN}',
-        b'{"do":"motor","port":"outB","speed_sp":1e999}',
-        b'{"do":"motor","port":"outB","speed_sp":' + b"9" * 400 + b"}",
-        b'{"do":"motor","port":"outA","speed_sp":1}',
-        b'{"do":"motor","port":"outB","command":"fly"}',
+        b'{"do":"acts","acts":[]}',
+        UNTIL % b"-1",
+        UNTIL % b"true",
+        UNTIL % b"1.5",
+        UNTIL % b"NaN",
+        UNTIL % b"1e999",
+        UNTIL % b'1,"t":99',
+        UNTIL % b'1,"timeout":2',
+        b'{"do":"motor_state","port":"outA"}',
+        b'{"do":"polarity","port":"outB","polarity":5}',
         b'{"do":"print","text":5}',
         b'{"do":"print","text":"\xff"}',
         b'{"do":"end","error":{"type":"X","text":"y","line":1,"file":null,"verdict":"finished"}}',
@@ -68,7 +68,7 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
         b'{"do":"stuck","line":1,"file":"' + b"x" * 200 + b'.py"}',
         b"[" * 60_000,
         b'{"do":"print","text":"' + b"x" * wire.MOST + b'"}',
-        b'{"do":"wait","units":' + b"9" * 5000 + b"}",
+        UNTIL % (b"9" * 5000),
     ],
     ids=lambda line: repr(line[:40]),
 )

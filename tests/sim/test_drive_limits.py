@@ -12,7 +12,7 @@ _TELL = """
 import time
 from brick_link import link
 for port in ("outB", "outC"):
-    link.tell({"do": "motor", "port": port, %s})
+    link.set_motor(port, %s)
 time.sleep(6)
 """
 
@@ -20,11 +20,11 @@ time.sleep(6)
 @pytest.mark.parametrize(
     "words",
     [
-        '"polarity": "inversed", "speed_sp": -1e300, "command": "run-forever"',
-        '"speed_sp": 1e300, "command": "run-forever"',
-        '"speed_sp": -1e300, "time_sp": 1e300, "command": "run-timed"',
-        '"speed_sp": 1e300, "position_sp": 1e300, "command": "run-to-rel-pos"',
-        '"speed_sp": -1e300, "position_sp": -1e300, "position": 1e300, "command": "run-to-abs-pos"',
+        'polarity="inversed", speed_sp=-1e300, command="run-forever"',
+        'speed_sp=1e300, command="run-forever"',
+        'speed_sp=-1e300, time_sp=1e300, command="run-timed"',
+        'speed_sp=1e300, position_sp=1e300, command="run-to-rel-pos"',
+        'speed_sp=-1e300, position_sp=-1e300, position=1e300, command="run-to-abs-pos"',
     ],
 )
 def test_no_motor_is_faster_than_motors_are(runner: TrialRunner, words: str) -> None:

@@ -46,14 +46,14 @@ def run(wire: Wire, grants: Grants) -> None:
         return link.units
 
     def sleep(units: int) -> None:
-        link.ask({"do": "wait", "units": units})
+        link.wait_units(units)
 
     def refused(what: str) -> None:
         wire.send({"do": "refused", "what": what, **files.place(sys._getframe())})
 
     signal.signal(signal.SIGXCPU, busy)
     link.number = spec.get("number", 1)
-    link.connect(wire.send, wire.send_later, wire.receive, stuck, spec["sensors"], spec["tick"])
+    link.connect(wire, stuck, spec["sensors"], spec["tick"])
     student_code.install_output(emit)
     determinism.install_clock(now, sleep)
     determinism.install_chance(spec["seed"])

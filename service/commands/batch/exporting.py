@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from service.batch_rows import rows_of, why_not_shown
 from service.commands.batch.tables import unjudged_words
-from service.commands.shown import document, note, tell
+from service.commands.shown import note, tell
 from service.grading.grade import Grade
 from service.home import for_the_user
 from service.report_files import report_pages

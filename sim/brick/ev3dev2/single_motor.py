@@ -58,8 +58,8 @@ class Motor:
         self.address = address
         self._stop_action: str | None = None
 
-    def _tell(self, **fields: float | str) -> None:
-        link.tell_later({"do": "motor", "port": self.address, **fields})
+    def _tell(self, **fields: Any) -> None:
+        link.set_motor(self.address, **fields)
 
     def _see(self, what: str) -> Any:
         return link.ask({"do": "motor_state", "port": self.address})[what]

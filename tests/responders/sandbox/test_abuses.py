@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -9,6 +10,7 @@ from typing import Literal
 import pytest
 
 import running
+from hostile import FIND_WIRE, forged, packed
 from responders.sandbox import running_child
 from responders.sandbox.running_child import ChildLimits
 from running import run_program
@@ -33,17 +35,9 @@ def _abuses(verdicts: tuple[Verdict, ...], role: Literal["program", "responder"]
     return [Abuse(name.replace("_", " "), text, verdicts, role) for name, text in texts.items()]
 
 
-_FIND_WIRE = "import gc, os\nline = next(o for o in gc.get_objects() if type(o).__qualname__ == 'Wire')\n"
-
-
-def _forged(frame: str) -> str:
-    """Writes a frame with the very number that is due."""
-    return f"line._write(b''); os.write(3, b'{{\"n\":%d,' % line._sent + {frame[1:].encode()!r} + b'\\n')"
-
-
 def _frame(text: str) -> str:
-    write = _forged(text) if text.startswith("{") else f"os.write(3, {text.encode()!r} + b'\\n')"
-    return f"{_FIND_WIRE}{write}\nimport time; time.sleep(1)"
+    write = forged(text) if text.startswith("{") else f"os.write(3, {text.encode()!r} + b'\\n')"
+    return f"{FIND_WIRE}{write}\nimport time; time.sleep(1)"
 
 
 _IGNORE = "import signal\nfor n in (1, 2, 3, 14, 15, 24): signal.signal(n, signal.SIG_IGN)\n"
@@ -138,7 +132,7 @@ ABUSES = [
         "program",
         many_little_sleeps="import select\nwhile True: select.select([], [], [], 0.005)",
         sleeps_between_words="import select\nwhile True: select.select([], [], [], 0.005); print('x')",
-        sleeps_between_questions=_FIND_WIRE
+        sleeps_between_questions=FIND_WIRE
         + "import select\nwhile True: select.select([], [], [], 0.005); left_motor_state = tank_drive.left_motor.state",
     ),
     *_abuses(
@@ -157,17 +151,21 @@ ABUSES = [
         noise_on_the_wire=_frame("hello"),
         a_mark=_frame('{"do":"mark","marks":10}'),
         a_verdict=_frame('{"do":"end","error":null,"verdict":"finished"}'),
-        a_time=_frame('{"do":"wait","units":1,"t":99}'),
-        a_frame_without_a_number=_FIND_WIRE
+        a_time=_frame('{"do":"until_said","t":99}'),
+        a_frame_without_a_number=FIND_WIRE
         + 'line._write(b\'\'); os.write(3, b\'{"do":"print","text":"x"}\\n\'); import time; time.sleep(1)',
-        a_number_of_the_past=_FIND_WIRE + "print('x'); line._sent -= 1; print('x')",
-        a_number_of_the_future=_FIND_WIRE + "line._sent += 1; print('x')",
+        a_number_of_the_past=FIND_WIRE + "print('x'); line._sent -= 1; print('x')",
+        a_number_of_the_future=FIND_WIRE + "line._sent += 1; print('x')",
         sandbox_of_its_own=_frame('{"do":"sandbox","landlock":99,"seccomp":true,"own_user":true,"missing":null}'),
         a_responders_frame=_frame('{"do":"answer","kind":"text","text":"JSON::1"}'),
         the_same_key_twice=_frame('{"do":"print","text":"a","text":"b"}'),
-        not_a_number=_frame('{"do":"motor","port":"outB","speed_sp":NaN}'),
+        not_a_number=FIND_WIRE + packed((2, 0, 1, 3, math.nan)),
+        no_such_act=FIND_WIRE + packed((3, 0, 0, 0, 0.0)),
+        acts_as_a_line=_frame('{"do":"acts","acts":[]}'),
+        a_packet_without_acts=FIND_WIRE + "import os\nline._write(b''); os.write(3, bytes(16))",
         a_deep_frame=_frame("[" * 60_000),
-        a_wait_of_an_age=_frame('{"do":"wait","units":' + "9" * 4000 + "}"),
+        a_wait_of_an_age=FIND_WIRE + packed((1, 0, 0, 0, 1e16)),
+        a_number_without_end=_frame('{"do":"until","port":"outB","state":"still","timeout":' + "9" * 4000 + "}"),
         an_instruction_of_32_bit_code="import ctypes, mmap\np = mmap.mmap(-1, 4096, prot=7)\n"
         "p.write(b'\\xb8\\x14\\0\\0\\0\\xcd\\x80\\xc3')\n"
         "ctypes.CFUNCTYPE(ctypes.c_long)(ctypes.addressof(ctypes.c_char.from_buffer(p)))()",
@@ -175,14 +173,11 @@ ABUSES = [
     *_abuses(
         (Verdict.SANDBOX_VIOLATION,),
         "responder",
-        ready_again=_FIND_WIRE
+        ready_again=FIND_WIRE
         + "def responder(text):\n    "
-        + _forged('{"do":"ready","error":null}')
+        + forged('{"do":"ready","error":null}')
         + "\n    return text",
-        a_robots_frame=_FIND_WIRE
-        + "def responder(text):\n    "
-        + _forged('{"do":"wait","units":1}')
-        + "\n    return text",
+        a_robots_frame=FIND_WIRE + "def responder(text):\n    " + forged('{"do":"until_said"}') + "\n    return text",
     ),
 ]
 
@@ -219,8 +214,8 @@ def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: Trial
 
 
 def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: TrialRunner) -> None:
-    forged = _forged('{"do":"answer","kind":"text","text":"JSON::1"}')
-    responder = f"{_FIND_WIRE}def responder(text):\n    {forged}\n    return text\n"
+    answer = forged('{"do":"answer","kind":"text","text":"JSON::1"}')
+    responder = f"{FIND_WIRE}def responder(text):\n    {answer}\n    return text\n"
     recording = run_program(abused, 'print("PY::one")\nprint("PY::two")', responder=responder)
     assert [fault.verdict for fault in recording.faults] == [Verdict.SANDBOX_VIOLATION]
     assert "where frame" in recording.faults[0].message
@@ -233,7 +228,7 @@ def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: TrialRunner)
         ('{"do":"call","depth":0,"caller":"a","callee":"b","argument":"' + "c" * 5000 + '","result":"d"}', "responder"),
         ('{"do":"refused","what":"' + "x" * 5000 + '","line":1,"file":null}', "responder"),
         ('{"do":"refused","what":"' + "x" * 5000 + '","line":1,"file":null}', "program"),
-        ('{"do":"wait","units":0}', "program"),
+        ('{"do":"until_said"}', "program"),
     ],
     ids=lambda value: value[:20],
 )
@@ -242,7 +237,7 @@ def test_frames_without_end_are_paid_for(
 ) -> None:
     """Written thousands at a time they cost the child nothing, and the worker much; none of them grows it."""
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
-    flood = f"""{_FIND_WIRE}
+    flood = f"""{FIND_WIRE}
 def flood():
     line._write(b"")
     n = line._sent

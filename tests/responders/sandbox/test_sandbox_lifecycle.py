@@ -54,8 +54,9 @@ def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder:
     try:
         # Two zygotes, and a child of each.
         _wait_until(lambda: len(_descendants(worker.pid)) >= 4)
-        zygotes = _children(worker.pid)
+        # In this order: a zygote that starts in between is killed with the others.
         family = _descendants(worker.pid)
+        zygotes = _children(worker.pid)
         if killed == "worker":
             worker.kill()
             worker.wait()

@@ -123,7 +123,7 @@ _ASKING = {
     **{
         f"{line} --help": _HEAVY
         for line in ("run", "grade", "verify", "up", "worker", "doctor", "floors", "demo", "sandbox check",
-                     "batch submit", "batch export", "batch regrade", "batch pause", "assignments check", "db purge")
+                     "batch submit", "batch similar", "batch export", "batch regrade", "batch pause", "assignments check", "db purge")
     },
 }  # fmt: skip
 

@@ -38,6 +38,7 @@ SHOWING = {
     "batch list": "batches",
     "batch status BATCH": "batch pace jobs changes ranks unpublished_regrades statistics history",
     "batch submit new -a echo-responder": "batch queued known refusals",
+    "batch similar BATCH": "assignments",
     "batch pause BATCH": "batch changed waiting running",
     "batch resume BATCH": "batch changed waiting running",
     "batch cancel BATCH": "batch changed waiting running",

@@ -1,0 +1,140 @@
+"""How well copies are told from honest work: false alarms among the catalogue's references, copies found, and the cost.
+
+``python -m benchmarks.similar``. The catalogue is by few hands, and some of its responders were made of one another;
+so each pair that is called alike is named.
+"""
+
+from __future__ import annotations
+
+import random
+import resource
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from pathlib import Path
+
+from models.intervals import wilson
+from service.similarity.sources import given_with
+from service.similarity.writing import ALIKE, FEWEST_TOKENS, compare, source_of
+from submissions.assignment.examples import REFERENCE, examples
+from submissions.assignment.folder import catalogue
+from submissions.assignment.reader import find_assignment
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
+from copyists import COPYISTS
+
+#: Solutions of one assignment of which none was made of another, as their texts show; one of each hand and idea.
+WRITTEN_ANEW = (
+    ("coin-tosses", "responder.py", ("reference", "runs-off-the-end")),
+    ("digits-on-a-sheet", "responder.py", ("reference", "learnt-by-heart", "echoes-the-patch")),
+    ("json-queue", "robot.py", ("seed", "broken")),
+    ("rule-set", "responder.py", ("reference", "order-of-rules")),
+    ("rules-without-a-network", "responder.py", ("reference", "brings-a-network", "looks-at-the-darkness")),
+    ("shape-at-random", "responder.py", ("reference", "seed", "rules")),
+    ("shape-recognition", "responder.py", ("reference", "seed")),
+    ("shapes-off-centre", "responder.py", ("reference", "only-in-the-middle")),
+    ("shapes-on-the-move", "responder.py", ("reference", "by-the-way-driven", "echoes-the-patch")),
+)
+#: Lines of the submissions that the cost is measured on, about 250 tokens.
+_LINES = 25
+
+
+def main() -> int:
+    """Print the three tables."""
+    references = dict(_references())
+    given = {name: given_with(find_assignment(name)) for name, _ in references}
+    print(f"alike from {ALIKE} on; {FEWEST_TOKENS} own tokens or more")
+    _within(given)
+    _between(references, given)
+    _found(references, given)
+    for students in (60, 500, 2000):
+        _cost(students)
+    return 0
+
+
+def _references() -> Iterator[tuple[tuple[str, str], str]]:
+    for name in catalogue():
+        for path in sorted((examples(name) / REFERENCE).glob("*.py")):
+            yield (name, path.name), path.read_text(encoding="utf-8")
+
+
+def _within(given: Mapping[str, tuple[str, ...]]) -> None:
+    """Among the solutions of one assignment that are not edits of each other."""
+    pairs, alarms, highest = 0, [], 0.0
+    for name, file, written in WRITTEN_ANEW:
+        texts = {each: (examples(name) / each / file).read_text(encoding="utf-8") for each in written}
+        for one, other in combinations(texts, 2):
+            sources = [source_of(each, file, texts[each]) for each in (one, other)]
+            writing = compare(sources, given[name], alike=0.0)
+            if not writing.too_short:
+                pairs += 1
+                highest = max([highest, *(each.share for each in writing.alike)])
+                alarms += [f"{name}: {one}, {other}" for each in writing.alike if each.share >= ALIKE]
+    print(f"one assignment, written anew: {_rate(len(alarms), pairs)}; the highest share is {highest:.2f}")
+
+
+def _between(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
+    """Between the references of all assignments: programs with programs, responders with responders."""
+    for file in ("robot.py", "responder.py"):
+        pairs, alarms = 0, []
+        names = [name for name, which in references if which == file]
+        for one, other in combinations(names, 2):
+            sources = [source_of(name, file, references[name, file]) for name in (one, other)]
+            writing = compare(sources, [*given[one], *given[other]])
+            if not writing.too_short:
+                pairs += 1
+                alarms += [f"{one} and {other} {each.share:.2f}" for each in writing.alike]
+        print(f"references, {file}: {_rate(len(alarms), pairs)}")
+        print("".join(f"    {alarm}\n" for alarm in alarms), end="")
+
+
+def _rate(alarms: int, pairs: int) -> str:
+    low, high = wilson(alarms, pairs)
+    return f"{alarms} of {pairs} pairs are alike ({low:.0%} to {high:.0%})"
+
+
+def _found(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
+    for how, copyist in COPYISTS.items():
+        found = copies = 0
+        for (name, file), text in references.items():
+            writing = compare([source_of("one", file, text), source_of("other", file, copyist(text))], given[name])
+            if "one" not in writing.too_short:
+                copies += 1
+                found += bool(writing.alike)
+        print(f"{how}: {found} of {copies} copies found")
+
+
+def _cost(students: int) -> None:
+    texts = [_program(random.Random(number)) for number in range(students)]
+    began = time.process_time()
+    sources = [source_of(str(number), "robot.py", text) for number, text in enumerate(texts)]
+    alike = compare(sources, []).alike
+    seconds, megabytes = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{students} students, {len(sources[0].tokens)} tokens each: {seconds:.2f} s, {len(alike)} alike, ", end="")
+    print(f"{megabytes:.0f} MB at most in this process")
+
+
+def _program(chance: random.Random) -> str:
+    """Lines as students write them, each chosen of a few."""
+    lines = []
+    for _ in range(_LINES):
+        motor = chance.choice(("tank_drive", "tank_turn", "left_motor", "right_motor"))
+        move = chance.choice(("on_for_seconds", "on_for_rotations", "on_for_degrees", "on"))
+        sensor = chance.choice(("colorLeft", "colorRight", "gyro", "ultrasonic"))
+        lines.append(
+            chance.choice(
+                (
+                    f"{motor}.{move}(SpeedPercent(30), SpeedPercent(speed), 2)",
+                    f"while {sensor}.{chance.choice(('reflected_light_intensity', 'color', 'angle'))} > 40:",
+                    f"    value = {sensor}.distance {chance.choice('+-*/')} {chance.choice(('7', 'speed'))}",
+                    f"    if value {chance.choice('<>')} limit {chance.choice(('and', 'or'))} not done:",
+                    f"say({chance.choice(('str(value)', 'text', 'message[0]'))})",
+                )
+            )
+        )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

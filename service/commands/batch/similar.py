@@ -1,0 +1,28 @@
+"""``robomark batch similar``: what can be said to it. What it does is ``finding_similar.py``'s, which loads long."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.commands.batch.control import BatchId
+
+
+def similar(
+    batch: BatchId,
+    given: Annotated[
+        Path | None, typer.Option(help="A file or folder of Python that students were given besides; it is left out.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="A folder for a page with the evidence side by side.")
+    ] = None,
+) -> None:
+    """Whose submissions of a batch are alike, in what is written and in what their robots did; for staff only.
+
+    It is a reason to look and to ask, and proves nothing. No marks change, and no student is shown any of it.
+    """
+    from service.commands.batch.finding_similar import find_similar
+
+    find_similar(batch, given, output)

@@ -1,0 +1,123 @@
+"""What robots did the same in the same trials, where few others of the batch did.
+
+A trial's world is the same for everybody, its noise too, so whoever gives the same commands at the same moments has the
+same path; that alone says nothing. What a student's own ``random`` draws depends on the submission, so that a copy that
+draws may do something else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+from service.grading.grade import TrialResult
+from sim.recorded import faults_of
+from sim.recording import Fault, Recording, Verdict
+
+Aspect = Literal["path", "messages", "faults"]
+#: Students who did anything in a trial, from which on it can be told what is rare among them.
+FEWEST_STUDENTS = 8
+#: The part of them that may share what is rare; always two.
+RARE_PART = 0.1
+
+#: The machine decides how far such a trial comes.
+_CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
+
+
+@dataclass(frozen=True, slots=True)
+class TrialName:
+    """A trial of an assignment; ``noisy`` if light, motors or the channel had chance in them."""
+
+    scenario: str
+    index: int
+    noisy: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SameInTrial:
+    """A trial in which two did the same: what of it, how many students did so, of how many that did anything there."""
+
+    trial: TrialName
+    aspect: Aspect
+    sharing: int
+    students: int
+
+
+#: A digest for each thing that can be compared; what did not happen has none.
+Behaviour = Mapping[tuple[TrialName, Aspect], str]
+
+
+def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
+    """What is compared of a student's trials; those that the machine cut short are not."""
+    return {
+        (_name(trial), aspect): digest
+        for trial in trials
+        if trial.verdict not in _CUT
+        for aspect, digest in _aspects(trial.recording)
+    }
+
+
+def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
+    """For each two students what they did the same and few others did, by their names in order."""
+    sharing: dict[tuple[TrialName, Aspect], dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+    active: dict[TrialName, set[str]] = defaultdict(set)
+    for student in sorted(behaviours):
+        for (trial, aspect), digest in behaviours[student].items():
+            sharing[trial, aspect][digest].append(student)
+            active[trial].add(student)
+    found: dict[tuple[str, str], list[SameInTrial]] = defaultdict(list)
+    for (trial, aspect), groups in sorted(sharing.items(), key=lambda item: (item[0][0].scenario, item[0][0].index)):
+        students = len(active[trial])
+        most = max(2, RARE_PART * students)
+        for group in groups.values():
+            if students >= FEWEST_STUDENTS and 2 <= len(group) <= most:
+                for pair in combinations(group, 2):
+                    found[pair].append(SameInTrial(trial, aspect, len(group), students))
+    return {pair: tuple(same) for pair, same in found.items()}
+
+
+def _name(trial: TrialResult) -> TrialName:
+    return TrialName(trial.scenario, trial.index, trial.light_noise > 0 or trial.motor_noise > 0)
+
+
+def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
+    robots = [recording] if recording.partner is None else [recording, recording.partner]
+    if any(_moved(robot) for robot in robots):
+        columns = [column for robot in robots for column in (robot.ticks.x, robot.ticks.y, robot.ticks.heading)]
+        yield "path", _digest(column.tobytes() for column in columns)
+    said = [
+        f"{who}\n{text}"
+        for robot in robots
+        for who, text in (
+            *((message.sender, message.text) for message in robot.messages),
+            *(("printed", line.text) for line in robot.printed),
+            *(("spoken", line.text) for line in robot.spoken),
+        )
+    ]
+    if said:
+        yield "messages", _digest(text.encode("utf-8", "surrogatepass") for text in said)
+    faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _mistakes(recording)]
+    if faults:
+        yield "faults", _digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
+
+
+def _moved(recording: Recording) -> bool:
+    ticks = recording.ticks
+    return len(ticks) > 0 and bool((ticks.x != ticks.x[0]).any() or (ticks.heading != ticks.heading[0]).any())
+
+
+def _mistakes(recording: Recording) -> list[Fault]:
+    """A program that is stopped when its time is over has none in that: many may run for ever."""
+    return [fault for fault in faults_of(recording) if fault.verdict is not Verdict.TIME_LIMIT]
+
+
+def _digest(pieces: Iterable[bytes]) -> str:
+    made = hashlib.sha256()
+    for piece in pieces:
+        made.update(b"%d\n" % len(piece))
+        made.update(piece)
+    return made.hexdigest()

@@ -1,0 +1,63 @@
+"""What of a submission is compared: its program, its responder, its notebook's cells, and Python files beside them.
+
+Also what is not the student's own: the code that was given for the assignment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+
+from responders import library
+from sim.errors import UsageError
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.source_text import decode_source
+from submissions.submission import Submission
+
+#: Files of one submission that are read; what lies beside them is not compared.
+MOST_FILES = 20
+
+
+def sources_of(submission: Submission) -> Mapping[str, str]:
+    """The texts by their names; a notebook's code cells are one text, one below the other."""
+    found: dict[str, str] = {}
+    for part in (submission.program, submission.responder):
+        if part is not None:
+            found[part.name] = part.text
+    if submission.notebook is not None:
+        found[submission.notebook.name] = "\n\n".join(cell.source for cell in submission.notebook.cells)
+    found |= {name: text for name, text in _python_in(submission.files) if name not in found}
+    return dict(list(found.items())[:MOST_FILES])
+
+
+def given_with(assignment: Assignment, more: Path | None = None) -> tuple[str, ...]:
+    """The code that students are given: the assignment's, its starter, the library's responders, what is in ``more``.
+
+    The starter is the catalogue's: an assignment is kept without. Raises UsageError where ``more`` cannot be read.
+    """
+    texts = [*assignment.given_parts.values(), *(text for _, text in _python_in(assignment.given))]
+    texts += map(library.source, library.names())
+    folders = [] if more is None else [more]
+    if assignment.id in catalogue():
+        folders.append(assignment_folder(assignment.id) / "starter")
+    return (*texts, *(text for folder in folders for text in _python_below(folder)))
+
+
+def _python_in(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
+    for name, data in files.items():
+        if name.lower().endswith(".py"):
+            try:
+                yield name, decode_source(data, name).text
+            except UsageError:
+                continue  # no text, so nothing was written that could be like anything
+
+
+@cache
+def _python_below(path: Path) -> tuple[str, ...]:
+    paths = sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    try:
+        return tuple(decode_source(each.read_bytes(), each.name).text for each in paths)
+    except OSError as error:
+        raise UsageError(f"{error.filename}: cannot be read ({error.strerror}), expected Python files") from None

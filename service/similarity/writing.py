@@ -1,0 +1,215 @@
+"""Which sources of a batch are alike, what of them, and where: given code and code that many share is left out.
+
+Candidates come from an inverted index of fingerprints, so that no source is compared with every other; only theirs are
+then compared gram by gram. Who should be asked about it is for people to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import nlargest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.similarity.tokens import Tokens, tokens_of
+from service.similarity.winnowing import GRAM, covered, grams, varied, winnowed
+
+#: Of a source's own tokens, the part that is in another's from which on two are alike.
+ALIKE = 0.6
+#: Own tokens, about ten lines, below which everybody writes the same and nothing is said.
+FEWEST_TOKENS = 60
+#: What this part of the students has, and at least so many, is common to them: a page of the docs, a hint in class.
+COMMON_PART, FEWEST_IN_COMMON = 1 / 3, 5
+#: Pairs that are compared, those with most in common; hundreds of copies of one large file are thousands of pairs.
+MOST_PAIRS = 2000
+#: Places of the same gram that a stretch may go on from.
+_MOST_PLACES = 8
+_MOST_STRETCHES = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One file of one student's."""
+
+    student: str
+    file: str
+    tokens: Tokens
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Lines of one source, from the first to the last, that are like those of another; lines count from 1."""
+
+    lines: tuple[int, int]
+    other_lines: tuple[int, int]
+    tokens: int
+
+
+@dataclass(frozen=True, slots=True)
+class AlikeSources:
+    """Two sources of two students'. A share is the part of a source's own tokens that the other has too."""
+
+    students: tuple[str, str]
+    files: tuple[str, str]
+    shares: tuple[float, float]
+    own_tokens: tuple[int, int]
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def share(self) -> float:
+        """The larger of both: what was copied may be all of one and half of the other."""
+        return max(self.shares)
+
+
+@dataclass(frozen=True, slots=True)
+class Writing:
+    """What is alike in a batch, the most alike first.
+
+    ``too_short`` are the students with too little of their own, ``not_compared`` how many pairs were too many.
+    """
+
+    alike: tuple[AlikeSources, ...]
+    too_short: tuple[str, ...]
+    not_compared: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Indexed:
+    source: Source
+    grams: NDArray[np.uint64]
+    is_own: NDArray[np.bool_]  # of each gram: neither given nor common, and varied
+    own_tokens: NDArray[np.bool_]  # of each token: in a varied gram, and in none that is given or common
+    fingerprints: NDArray[np.uint64]
+
+    @property
+    def own(self) -> int:
+        return int(self.own_tokens.sum())
+
+
+def source_of(student: str, file: str, text: str) -> Source:
+    """The text as it is compared; it is not kept."""
+    return Source(student, file, tokens_of(text))
+
+
+def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIKE) -> Writing:
+    """All pairs of different students' sources of which one has the part ``alike`` of its own tokens in the other.
+
+    The students of a pair stand in the order of their names.
+    """
+    sources = sorted(sources, key=lambda source: source.student)
+    all_grams = [grams(source.tokens) for source in sources]
+    left_out = np.union1d(_given(given), _common(sources, all_grams))
+    indexed = [_index(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
+    long_enough = [each for each in indexed if each.own >= FEWEST_TOKENS]
+    candidates = list(_candidates(long_enough, alike))
+    chosen = nlargest(MOST_PAIRS, candidates, key=lambda candidate: candidate[0])
+    compared = (_compared(one, other) for _, one, other in chosen)
+    found = sorted(
+        (each for each in compared if each.share >= alike), key=lambda each: (-each.share, each.students, each.files)
+    )
+    heard = {each.source.student for each in long_enough}
+    too_short = sorted({source.student for source in sources} - heard)
+    return Writing(tuple(found), tuple(too_short), len(candidates) - len(chosen))
+
+
+def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
+    return np.concatenate([np.empty(0, np.uint64), *(grams(tokens_of(text)) for text in texts)])
+
+
+def _common(sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]]) -> NDArray[np.uint64]:
+    of_students: dict[str, list[NDArray[np.uint64]]] = {}
+    for source, own in zip(sources, all_grams, strict=True):
+        of_students.setdefault(source.student, []).append(own)
+    once_each = [np.unique(np.concatenate(own)) for own in of_students.values()]
+    found, counts = np.unique(np.concatenate([np.empty(0, np.uint64), *once_each]), return_counts=True)
+    return found[counts >= max(FEWEST_IN_COMMON, COMMON_PART * len(of_students))]
+
+
+def _index(source: Source, own: NDArray[np.uint64], left_out: NDArray[np.uint64]) -> _Indexed:
+    masked, telling = np.isin(own, left_out), varied(source.tokens)
+    is_own, size = telling & ~masked, len(source.tokens)
+    places = winnowed(own)
+    fingerprints = np.unique(own[places[is_own[places]]])
+    return _Indexed(source, own, is_own, covered(telling, size) & ~covered(masked, size), fingerprints)
+
+
+def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[float, _Indexed, _Indexed]]:
+    """Pairs with so many fingerprints in common that they may be alike, and what part of them that is."""
+    if not indexed:
+        return
+    numbers = np.concatenate([each.fingerprints for each in indexed])
+    owners = np.repeat(np.arange(len(indexed)), [len(each.fingerprints) for each in indexed])
+    order = np.argsort(numbers, kind="stable")
+    numbers, owners = numbers[order], owners[order]
+    for place, one in enumerate(indexed):
+        begins = np.searchsorted(numbers, one.fingerprints, "left")
+        ends = np.searchsorted(numbers, one.fingerprints, "right")
+        who = [owners[begin:end] for begin, end in zip(begins, ends, strict=True) if end - begin > 1]
+        shared = np.bincount(np.concatenate([np.empty(0, np.int64), *who]), minlength=len(indexed))
+        for number in (np.flatnonzero(shared[place + 1 :]) + place + 1).tolist():
+            other = indexed[number]
+            part = shared[number] / min(len(one.fingerprints), len(other.fingerprints))
+            # Half of what is asked for, as fingerprints are a sample.
+            if part >= alike / 2 and one.source.student != other.source.student:
+                yield float(part), one, other
+
+
+def _compared(one: _Indexed, other: _Indexed) -> AlikeSources:
+    like = np.isin(one.grams, other.grams[other.is_own]) & one.is_own
+    other_like = np.isin(other.grams, one.grams[one.is_own]) & other.is_own
+    shares = (_share(one, like), _share(other, other_like))
+    return AlikeSources(
+        (one.source.student, other.source.student),
+        (one.source.file, other.source.file),
+        shares,
+        (one.own, other.own),
+        _stretches(one, other, like),
+    )
+
+
+def _share(one: _Indexed, like: NDArray[np.bool_]) -> float:
+    return float((covered(like, len(one.source.tokens)) & one.own_tokens).sum() / one.own)
+
+
+def _stretches(one: _Indexed, other: _Indexed, like: NDArray[np.bool_]) -> tuple[Stretch, ...]:
+    """From the top of one source, each time the longest that the other has too; the longest first."""
+    own, others = _own_grams(one), _own_grams(other)
+    places: dict[int, list[int]] = {}
+    for place, number in others.items():
+        places.setdefault(number, []).append(place)
+    found: list[tuple[int, int, int]] = []
+    end = 0
+    for begin in np.flatnonzero(like).tolist():
+        if begin >= end:
+            runs = [(_run(own, others, begin, at), -at) for at in places[own[begin]][:_MOST_PLACES]]
+            length, at = max(runs)
+            found.append((begin, -at, length))
+            end = begin + length + GRAM - 1
+    longest = sorted(found, key=lambda each: (-each[2], each[0]))[:_MOST_STRETCHES]
+    return tuple(_stretch(one, other, each) for each in longest)
+
+
+def _own_grams(indexed: _Indexed) -> dict[int, int]:
+    places = np.flatnonzero(indexed.is_own)
+    return dict(zip(places.tolist(), indexed.grams[places].tolist(), strict=True))
+
+
+def _run(own: Mapping[int, int], others: Mapping[int, int], begin: int, at: int) -> int:
+    """How many grams in a row are the same from there on."""
+    length = 0
+    while (number := own.get(begin + length)) is not None and number == others.get(at + length):
+        length += 1
+    return length
+
+
+def _stretch(one: _Indexed, other: _Indexed, grams_in_row: tuple[int, int, int]) -> Stretch:
+    begin, at, count = grams_in_row
+    size = count + GRAM - 1
+    lines, other_lines = one.source.tokens.lines, other.source.tokens.lines
+    return Stretch(
+        (int(lines[begin]), int(lines[begin + size - 1])),
+        (int(other_lines[at]), int(other_lines[at + size - 1])),
+        size,
+    )

@@ -1,0 +1,117 @@
+"""Copies of Python programs as they are disguised: each takes a source and gives one that does much the same.
+
+``COPYISTS`` has them by what they do; a magic line at the top stays where it is.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import cast
+
+
+def laid_out_anew(source: str) -> str:
+    """Other comments, other spaces, other empty lines; no docstrings."""
+    lines = ast.unparse(_without_docstrings(ast.parse(source))).split("\n")
+    return "\n".join(f"{line}\n\n{line[: len(line) - len(line.lstrip())]}# now {line.strip()}" for line in lines)
+
+
+def renamed(source: str) -> str:
+    """Every name that the source binds is another; what the responder is found by stays."""
+    tree = ast.parse(source)
+    bound = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    bound |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    bound |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    new = {name: f"other_{number}" for number, name in enumerate(sorted(bound)) if not name.endswith("responder")}
+    return ast.unparse(_Renamer(new).visit(tree))
+
+
+def other_constants(source: str) -> str:
+    """Every number and every text is another."""
+    return ast.unparse(ast.fix_missing_locations(_Changer().visit(ast.parse(source))))
+
+
+def reordered(source: str) -> str:
+    """In every block each second statement changes places with the one before, whether it works or not."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        for field in ("body", "orelse"):
+            block = getattr(node, field, None)
+            if isinstance(block, list):
+                block[:-1:2], block[1::2] = block[1::2], block[: len(block) - len(block) % 2 : 2]
+    return ast.unparse(tree)
+
+
+def extracted(source: str) -> str:
+    """The bodies of loops, the first halves of functions and all that is left are functions of their own."""
+    tree = ast.parse(source)
+    defined = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom | ast.FunctionDef)]
+    rest = [node for node in tree.body if node not in defined]
+    functions: list[ast.stmt] = []
+    for node in [*defined, *rest]:
+        if isinstance(node, ast.While | ast.For) or (isinstance(node, ast.FunctionDef) and len(node.body) > 3):
+            taken = len(node.body) if not isinstance(node, ast.FunctionDef) else len(node.body) // 2
+            name = f"step_{len(functions)}"
+            functions.append(_function(name, node.body[:taken]))
+            node.body[:taken] = ast.parse(f"result = {name}()").body
+    main = [_function("main", rest), *ast.parse("main()").body] if rest else []
+    return ast.unparse(ast.fix_missing_locations(ast.Module([*functions, *defined, *main], [])))
+
+
+def all_of_it(source: str) -> str:
+    """One after the other, all of the above."""
+    return extracted(reordered(other_constants(renamed(laid_out_anew(source)))))
+
+
+def _kept_magic(copyist: Callable[[str], str]) -> Callable[[str], str]:
+    def copy(source: str) -> str:
+        if not source.startswith("%"):
+            return copyist(source)
+        magic, _, rest = source.partition("\n")
+        return f"{magic}\n{copyist(rest)}"
+
+    return copy
+
+
+COPYISTS: Mapping[str, Callable[[str], str]] = {
+    copyist.__name__.replace("_", " "): _kept_magic(copyist)
+    for copyist in (laid_out_anew, renamed, other_constants, reordered, extracted, all_of_it)
+}
+
+
+class _Renamer(ast.NodeTransformer):
+    def __init__(self, new: Mapping[str, str]) -> None:
+        self._new = new
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        for field in ("id", "arg", "name"):
+            name = getattr(node, field, None)
+            if isinstance(name, str) and not isinstance(node, ast.keyword | ast.alias):
+                setattr(node, field, self._new.get(name, name))
+        if isinstance(node, ast.Global | ast.Nonlocal):
+            node.names = [self._new.get(name, name) for name in node.names]
+        return super().generic_visit(node)
+
+
+class _Changer(ast.NodeTransformer):
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if isinstance(node.value, str):
+            return ast.Constant(f"{node.value}, changed")
+        return ast.Constant(2 * node.value + 1) if type(node.value) in (int, float) else node
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
+        return node
+
+
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and len(body) > 1 and isinstance(body[0], ast.Expr):
+            body[:1] = [] if isinstance(body[0].value, ast.Constant) else body[:1]
+    return tree
+
+
+def _function(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
+    made = cast(ast.FunctionDef, ast.parse(f"def {name}():\n    pass").body[0])
+    made.body = body
+    return made

@@ -1,0 +1,120 @@
+"""Packed acts of a robot program: whatever bytes arrive, the worker reads acts that there are or refuses."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from responders import packed
+from responders.packed import Move, Read, Wait
+from responders.wire import MOST, MOST_UNITS, WireError
+from running import run_program
+from service.grading.trial_runner import TrialRunner
+from sim.recording import SENSORS, Pose
+
+Raw = tuple[int, int, int, int, float]
+
+
+def _packet(*acts: Raw, number: int = 7) -> bytes:
+    return struct.pack("<BxHxxxxQ", 0, len(acts), number) + b"".join(struct.pack("<BBBBd", *act) for act in acts)
+
+
+def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
+    data = _packet((0, 1, 0, 0, 2.0), (2, 0, 1, 3, -25.5), (2, 1, 0, 2, 0.0), (1, 0, 0, 0, 100_000.0))
+    assert packed.packet_bytes(data) == len(data)
+    acts = [Read("right", 2), Move("outB", "speed_sp", -25.5, "run-forever"), Move("outC", "", 0.0, "reset")]
+    assert packed.unpack(data) == (7, [*acts, Wait(100_000)])
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        (0, len(SENSORS), 0, 0, 1.0),
+        (0, 0, 0, 0, 0.0),
+        (0, 0, 0, 0, 3.0),
+        (0, 0, 0, 0, 1.5),
+        (0, 0, 0, 0, math.nan),
+        (0, 0, 1, 0, 1.0),
+        (0, 0, 0, 1, 1.0),
+        (1, 0, 0, 0, -1.0),
+        (1, 0, 0, 0, 0.5),
+        (1, 0, 0, 0, math.inf),
+        (1, 0, 0, 0, math.nan),
+        (1, 0, 0, 0, 2.0 * MOST_UNITS),
+        (1, 1, 0, 0, 1.0),
+        (2, 2, 1, 0, 1.0),
+        (2, 0, 5, 0, 1.0),
+        (2, 0, 0, 8, 1.0),
+        (2, 0, 1, 0, math.nan),
+        (2, 0, 1, 0, -math.inf),
+        (3, 0, 0, 0, 0.0),
+        (255, 255, 255, 255, 0.0),
+    ],
+)
+def test_an_act_that_no_honest_program_does_is_refused(act: Raw) -> None:
+    with pytest.raises(WireError):
+        packed.unpack(_packet((0, 0, 0, 0, 1.0), act))
+
+
+@pytest.mark.parametrize("count", [0, MOST // 12 + 1, 65_535])
+def test_a_packet_is_neither_empty_nor_longer_than_a_line_may_be(count: int) -> None:
+    with pytest.raises(WireError, match=f"a packet of {count} acts"):
+        packed.packet_bytes(struct.pack("<BxHxxxxQ", 0, count, 0))
+
+
+@given(st.binary(min_size=12, max_size=240).map(lambda data: data[: len(data) // 12 * 12]))
+def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
+    try:
+        _, acts = packed.unpack(bytes(16) + data)
+    except WireError:
+        return
+    for act in acts:
+        match act:
+            case Read(what, times):
+                assert (what in SENSORS, times in (1, 2)) == (True, True)
+            case Wait(units):
+                assert (type(units), 0 <= units <= MOST_UNITS) == (int, True)
+            case Move(port, _, value, _):
+                assert (port in ("outB", "outC"), math.isfinite(value)) == (True, True)
+
+
+def test_a_motor_is_told_whatever_can_be_told(runner: TrialRunner) -> None:
+    """Every set point and command of the brick, there and back: what it reads afterwards is what it has set."""
+    program = """
+motor = tank_drive.left_motor
+motor.position_sp = 123
+motor.speed_sp = -45
+motor.position = 67
+print(motor.position_sp, motor.speed_sp, motor.position, motor.polarity)
+motor.polarity = "inversed"
+for command in ("run-direct", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "reset", "stop", "run-forever"):
+    motor.command = command
+print(motor.polarity, motor.state)
+try:
+    motor.command = "fly"
+except ValueError as error:
+    print(error)
+try:
+    motor.position_sp = 10 ** 400
+except OverflowError as error:
+    print("too large")
+"""
+    recording = run_program(runner, program, Pose(1000, 500, 0))
+    assert [line.text for line in recording.printed] == [
+        "123 -45 67 normal",
+        "inversed running",
+        "a motor has no command 'fly': expected one of reset, run-forever, run-timed, run-to-rel-pos, "
+        "run-to-abs-pos, run-direct",
+        "too large",
+    ]
+
+
+def test_thousands_of_acts_without_a_question_arrive(runner: TrialRunner) -> None:
+    program = "for n in range(9000): tank_drive.on(n % 50, 10)\nfrom time import sleep\nsleep(0.1)\nprint('there')"
+    recording = run_program(runner, program, Pose(1000, 500, 0))
+    assert [line.text for line in recording.printed] == ["there"]
+    assert recording.faults == ()

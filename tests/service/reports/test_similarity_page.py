@@ -1,0 +1,91 @@
+"""What is alike, told to staff as a page, a table and JSON, with nothing of a student's run; to students not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import typing
+
+import pytest
+from test_report_html import ATTRIBUTES, TAGS, Reader
+
+import report_builders
+from service.grading.grade import Grade
+from service.reports import view
+from service.reports.similarity import as_json, similarity_page, similarity_rows, what_it_says
+from service.reports.view import View, staff_similarity
+from service.similarity.behaviour import SameInTrial, TrialName
+from service.similarity.pairs import Similarity, SimilarPair
+from service.similarity.writing import AlikeSources, Stretch
+
+BOTH = ("<b>ada", "bob\u202e")
+ALIKE = AlikeSources(BOTH, ("robot.py", "<i>.py"), (0.75, 0.5), (80, 120), (Stretch((2, 3), (1, 4), 60),))
+TRIAL = SameInTrial(TrialName("<u>line", 0, True), "path", 2, 12)
+FOUND = Similarity("shape-recognition", 12, (SimilarPair(BOTH, (ALIKE,), (TRIAL,)),), ("cyd",))
+
+
+def text_of(assignment: str, student: str, file: str) -> str:
+    assert (assignment, student) == ("shape-recognition", BOTH[file == "<i>.py"])
+    return f"nothing\n    {report_builders.HOSTILE}\nlast of {file} {'x' * 1_000_000}\nend\n"
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return similarity_page(staff_similarity([FOUND]), text_of, "Alike in <class>", 100)
+
+
+def test_the_page_shows_both_sources_side_by_side_with_their_lines(page: str) -> None:
+    text = " ".join(Reader(page).text.split())
+    assert "for staff only" in text
+    assert "robot.py, 75% of 80 tokens" in text
+    assert "<i>.py, 50% of 120 tokens" in text
+    assert "last of robot.py" in text
+    assert "<u>line 1with noisepath2 of 12" in text
+
+
+def test_nothing_that_a_student_wrote_becomes_markup_or_is_endless(page: str) -> None:
+    reader = Reader(page)
+    assert reader.tags <= TAGS
+    assert {name for _, name, _ in reader.attributes} <= ATTRIBUTES | {"colspan"}
+    assert "script" not in reader.tags
+    assert "\u202e" not in page
+    assert len(page) < 60_000
+
+
+def test_pairs_beyond_the_most_are_counted() -> None:
+    many = dataclasses.replace(FOUND, pairs=FOUND.pairs * 5)
+    assert "And 3 pairs more." in similarity_page(staff_similarity([many]), text_of, "Alike", 2)
+
+
+def test_json_has_everything() -> None:
+    (told,) = json.loads(as_json(staff_similarity([FOUND])))["assignments"]
+    (pair,) = told["pairs"]
+    assert told["too_short"] == ["cyd"]
+    assert (pair["students"], pair["share"]) == (list(BOTH), 0.75)
+    assert pair["sources"][0]["stretches"] == [{"lines": [2, 3], "other_lines": [1, 4], "tokens": 60}]
+    assert pair["trials"][0]["trial"] == {"scenario": "<u>line", "index": 0, "noisy": True}
+
+
+def test_the_table_says_how_much_and_where() -> None:
+    assert what_it_says(FOUND).startswith("shape-recognition: 1 pair is alike among 12 students; 1 has too little code")
+    assert similarity_rows(FOUND) == [(*BOTH, "75%", "robot.py and <i>.py", "1 trial")]
+
+
+def test_no_grade_and_no_view_of_one_can_have_it_in_it() -> None:
+    """Every format, report and page is made of a grade; what is alike is in none, so no student can be shown it."""
+    assert not any(kind.__module__.startswith("service.similarity") for kind in _within(Grade) | _within(View))
+    makers = [each for each in vars(view).values() if "SimilarityView" in str(getattr(each, "__annotations__", {}))]
+    assert makers == [staff_similarity]
+
+
+def _within(kind: object) -> set[type]:
+    """All dataclasses that a value of this type can have in it."""
+    found: set[type] = set()
+    waiting = [kind]
+    while waiting:
+        each = waiting.pop()
+        waiting += typing.get_args(each)
+        if isinstance(each, type) and dataclasses.is_dataclass(each) and each not in found:
+            found.add(each)
+            waiting += typing.get_type_hints(each).values()
+    return found

@@ -1,0 +1,87 @@
+"""What robots did the same counts where few of many did, and where the machine did not cut the trial short."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+import report_builders
+from responders.code import Code
+from service.grading.grade import TrialResult
+from service.similarity.behaviour import FEWEST_STUDENTS, SameInTrial, TrialName, behaviour_of, same_in_trials
+from service.similarity.pairs import similarity
+from service.similarity.writing import source_of
+from sim.recording import Fault, Line, Message, Recording, Verdict
+from submissions.submission import Submission
+
+STILL = replace(report_builders.line_follower_recording(0), printed=(), spoken=())
+
+
+def trials(*recordings: Recording) -> list[TrialResult]:
+    return [TrialResult("line", place, place, 10.0, 0.0, "visible", each) for place, each in enumerate(recordings)]
+
+
+def said(text: str) -> Recording:
+    return replace(STILL, printed=(Line(0.1, text),), messages=(Message(0.1, "robot", text, 0.2),))
+
+
+def same(of_students: Sequence[Sequence[Recording]]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
+    return same_in_trials({f"s{number:02}": behaviour_of(trials(*each)) for number, each in enumerate(of_students)})
+
+
+def driven(ticks: int) -> Recording:
+    return replace(report_builders.line_follower_recording(ticks), printed=(), spoken=())
+
+
+def test_a_path_that_only_two_drove_is_named_with_its_trial() -> None:
+    found = same([[driven(30)], [driven(30)], *([driven(31 + number)] for number in range(8))])
+    assert found == {("s00", "s01"): (SameInTrial(TrialName("line", 0, True), "path", 2, 10),)}
+
+
+def test_a_path_that_many_drove_says_nothing() -> None:
+    assert same([[driven(30)]] * 10) == {}
+    assert same([[driven(30)]] * 3 + [[driven(31 + number)] for number in range(9)]) == {}
+
+
+def test_of_few_students_nothing_is_said() -> None:
+    alone = [[driven(31 + number)] for number in range(FEWEST_STUDENTS - 3)]
+    assert same([[driven(30)], [driven(30)], *alone]) == {}
+    assert same([[driven(30)], [driven(30)], *alone, [driven(90)]]) != {}
+
+
+def test_messages_and_faults_are_compared_by_themselves() -> None:
+    fault = Fault(0.5, Verdict.PROGRAM_ERROR, "program", "NameError: name 'mottor' is not defined", 3)
+    failed = replace(driven(20), verdict=Verdict.PROGRAM_ERROR, faults=(fault,))
+    alone = [[said(f"mine {number}")] for number in range(8)]
+    ours, theirs = replace(said("PY::1"), faults=(fault,), verdict=Verdict.PROGRAM_ERROR), failed
+    (both,) = same([[ours], [theirs], *alone]).values()
+    assert [each.aspect for each in both] == ["faults"]
+    (both,) = same([[said("PY::1")], [said("PY::1")], *alone]).values()
+    assert [each.aspect for each in both] == ["messages"]
+
+
+def test_who_did_nothing_did_nothing_the_same() -> None:
+    assert same([[STILL], [STILL], *([driven(31 + number)] for number in range(8))]) == {}
+
+
+@pytest.mark.parametrize("verdict", [Verdict.CPU_LIMIT, Verdict.STALLED])
+def test_a_trial_that_the_machine_cut_is_not_compared(verdict: Verdict) -> None:
+    cut = replace(driven(30), verdict=verdict)
+    assert same([[cut], [cut], *([driven(31 + number)] for number in range(8))]) == {}
+
+
+def test_robots_alone_make_a_pair_only_where_they_did_the_same_often() -> None:
+    submitted = {f"s{number:02}": Submission(f"s{number:02}", Code("robot.py", "x = 1\n")) for number in range(10)}
+    sources = [source_of(student, "robot.py", "x = 1\n") for student in submitted]
+
+    def pairs(*shared: int) -> list[tuple[str, str]]:
+        own = [[driven(40 + 9 * number + trial) for trial in range(4)] for number in range(10)]
+        for trial in shared:
+            own[1][trial] = own[0][trial]
+        behaviours = {student: behaviour_of(trials(*each)) for student, each in zip(submitted, own, strict=True)}
+        return [pair.students for pair in similarity("line", sources, (), behaviours).pairs]
+
+    assert pairs(0) == []
+    assert pairs(0, 2) == [("s00", "s01")]

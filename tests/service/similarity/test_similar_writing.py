@@ -1,0 +1,168 @@
+"""Which sources are called alike: copies however disguised, and not what was given, what many share, what is short."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from copyists import COPYISTS
+from service.similarity import writing
+from service.similarity.sources import given_with
+from service.similarity.tokens import MOST_TOKENS, tokens_of
+from service.similarity.writing import AlikeSources, Source, Writing, compare, source_of
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+
+
+def example(assignment: str, name: str, file: str = "responder.py") -> str:
+    return (examples(assignment) / name / file).read_text(encoding="utf-8")
+
+
+def of_two(one: str, other: str, given: tuple[str, ...] = ()) -> Writing:
+    return compare([source_of("ada", "responder.py", one), source_of("bob", "responder.py", other)], given)
+
+
+def alike(found: Writing) -> AlikeSources:
+    assert found.too_short == ()
+    (pair,) = found.alike
+    return pair
+
+
+def program(number: int, lines: int = 14) -> str:
+    """A program like no other of another number: what it calls is its own."""
+    return "\n".join(
+        f"motor_{number}.turn_{line}(speed) + sensor_{number}.read_{line}(not limit_{number})" for line in range(lines)
+    )
+
+
+@pytest.mark.parametrize("how", COPYISTS)
+@pytest.mark.parametrize(
+    ("assignment", "name"), [("rules-without-a-network", "reference"), ("shapes-on-a-track", "reference")]
+)
+def test_a_copy_is_found_however_it_is_disguised(how: str, assignment: str, name: str) -> None:
+    text = example(assignment, name)
+    pair = alike(of_two(text, COPYISTS[how](text), given_with(find_assignment(assignment))))
+    assert pair.students == ("ada", "bob")
+    assert pair.share >= writing.ALIKE
+
+
+@pytest.mark.parametrize(
+    ("assignment", "one", "other"),
+    [
+        ("digits-on-a-sheet", "reference", "learnt-by-heart"),
+        ("rules-without-a-network", "reference", "looks-at-the-darkness"),
+        ("shape-at-random", "reference", "rules"),
+        ("shapes-on-the-move", "reference", "by-the-way-driven"),
+    ],
+)
+def test_honest_solutions_of_one_assignment_are_not_alike(assignment: str, one: str, other: str) -> None:
+    found = of_two(example(assignment, one), example(assignment, other), given_with(find_assignment(assignment)))
+    assert found == Writing((), ())
+
+
+def test_a_copied_part_of_a_larger_source_is_found() -> None:
+    own = "\n".join(program(number, 12) for number in (1, 2, 3))
+    pair = alike(of_two(program(4), f"{own}\n{program(4)}"))
+    assert pair.shares[0] == 1
+    assert pair.shares[1] < 0.5
+
+
+def test_code_that_was_given_is_nobodys_copy() -> None:
+    given, one, other = program(1), program(2), program(3)
+    assert compare(
+        [source_of("ada", "a.py", f"{given}\n{one}"), source_of("bob", "a.py", f"{other}\n{given}")], [given]
+    ) == Writing((), ())
+    # With little of their own beside it there is nothing to say of either.
+    assert of_two(given, f"{given}\nspeed = 3", (given,)) == Writing((), ("ada", "bob"))
+
+
+def test_code_that_many_of_a_batch_share_is_nobodys_copy() -> None:
+    shared = program(1)
+    sources = [source_of(f"student {number}", "robot.py", f"{shared}\n{program(number)}") for number in range(2, 14)]
+    assert compare(sources, []).alike == ()
+    few = [*sources, source_of("eve", "robot.py", program(2)), source_of("ivy", "robot.py", program(3))]
+    assert {pair.students for pair in compare(few, []).alike} == {("eve", "student 2"), ("ivy", "student 3")}
+
+
+def test_two_files_of_one_student_are_not_compared() -> None:
+    sources = [source_of("ada", "robot.py", program(1)), source_of("ada", "helper.py", program(1))]
+    assert compare(sources, []).alike == ()
+
+
+def test_tables_of_numbers_are_not_alike() -> None:
+    tables = [
+        f"{program(number)}\ntable = [\n" + "".join(f"    [{number}, {row}, 7],\n" for row in range(300)) + "]\n"
+        for number in (1, 2)
+    ]
+    assert of_two(*tables) == Writing((), ())
+
+
+def test_stretches_name_the_lines_of_both() -> None:
+    text = program(1, 12)
+    copy = f'"""Mine alone."""\n\nimport time\n\n# all my own work\n{text}\n'
+    (stretch,) = alike(of_two(text, copy)).stretches
+    assert (stretch.lines, stretch.other_lines) == ((1, 12), (6, 17))
+
+
+def test_stretches_of_what_changed_places_point_crosswise() -> None:
+    first, second = program(1, 10), program(2, 10)
+    stretches = alike(of_two(f"{first}\n{second}", f"{second}\n{first}")).stretches
+    assert [(each.lines, each.other_lines) for each in stretches] == [((1, 10), (11, 20)), ((11, 20), (1, 10))]
+
+
+def test_names_numbers_texts_and_layout_do_not_count() -> None:
+    one = "total = 0\nfor place in range(9):\n    total += read(place, 'left')\n"
+    other = 't=1 # sum\nfor i in range(10) :\n\tt += read( i,\n  "right" )\n'
+    assert tokens_of(one).numbers.tolist() == tokens_of(other).numbers.tolist()
+    assert tokens_of(one).numbers.tolist() != tokens_of(one.replace("read", "write")).numbers.tolist()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "x" * 1_000_000,
+        "'" * 1_000_000,
+        '"""' + '\\"""' * 200_000,
+        "\\" * 1_000_000,
+        "(" * 300_000 + ")" * 300_000,
+        "((((" + "lambda x: " * 50_000,
+        "a=" * 300_000,
+        "1." * 500_000,
+        "def f(:\n  <<<>>> ?? $ \x00 \ud800 ÄÖÜ\r\n" * 10_000,
+        "f(a, b[1])\n" * 100_000,
+    ],
+    ids=lambda text: f"{text[:8]!r}",
+)
+def test_what_is_no_python_is_compared_too_and_nothing_hangs(text: str) -> None:
+    began = time.process_time()
+    found = of_two(text, text)
+    assert len(tokens_of(text)) <= MOST_TOKENS
+    assert all(pair.share == 1 for pair in found.alike)
+    assert time.process_time() - began < 20
+
+
+def test_only_candidates_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[str] = []
+    inner = writing._compared
+
+    def counted(one: writing._Indexed, other: writing._Indexed) -> AlikeSources:
+        compared.append(one.source.student)
+        return inner(one, other)
+
+    monkeypatch.setattr(writing, "_compared", counted)
+    sources: list[Source] = [source_of(str(number), "robot.py", program(number)) for number in range(200)]
+    found = compare([*sources, source_of("eve", "robot.py", program(7))], [])
+    assert [pair.students for pair in found.alike] == [("7", "eve")]
+    assert len(compared) == 1
+
+
+def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writing, "MOST_PAIRS", 2)
+    half = f"{program(1)}\n{program(2)}"
+    sources = [source_of("ada", "robot.py", program(1)), source_of("bob", "robot.py", half)]
+    sources += [source_of(str(number), "robot.py", program(number)) for number in range(3, 18)]
+    sources += [source_of("eve", "robot.py", program(3)), source_of("ivy", "robot.py", f"{program(4)}\n{program(5)}")]
+    found = compare(sources, [])
+    assert (len(found.alike), found.not_compared) == (2, 2)
