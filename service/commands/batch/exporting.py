@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from service.batch_rows import rows_of, why_not_shown
 from service.commands.batch.tables import unjudged_words
-from service.commands.shown import note, tell
+from service.commands.shown import document, note, tell
 from service.grading.grade import Grade
 from service.home import for_the_user
 from service.report_files import report_pages
@@ -96,10 +96,10 @@ def _write_each(chosen: Format, rows: Sequence[TableRow[Grade]], folder: Path) -
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
-    document, refusal = chosen.document, chosen.refusal
+    written, refusal = chosen.document, chosen.refusal
     graded = [row for row in rows if row.grade is not None]
     refused = [row for row in rows if row.refused]
-    texts = [document(row.grade) for row in graded if row.grade is not None] if document is not None else []
+    texts = [written(row.grade) for row in graded if row.grade is not None] if written is not None else []
     stems = file_stems([(row.student.id, row.assignment) for row in graded])
     if refusal is not None:
         texts += map(refusal, refused)

@@ -123,7 +123,8 @@ _ASKING = {
     **{
         f"{line} --help": _HEAVY
         for line in ("run", "grade", "verify", "up", "worker", "doctor", "floors", "demo", "sandbox check",
-                     "batch submit", "batch similar", "batch export", "batch regrade", "batch pause", "assignments check", "db purge")
+                     "batch submit", "batch similar", "batch export", "batch regrade", "batch pause",
+                     "assignments check", "db purge")
     },
 }  # fmt: skip
 
@@ -172,7 +173,7 @@ print(json.dumps(found))
 
 def test_the_shell_completes_commands_of_a_group() -> None:
     ended = robomark(_ROBOMARK_COMPLETE="complete_bash", COMP_WORDS="robomark batch s", COMP_CWORD="2")
-    assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status"], "")
+    assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status", "similar"], "")
 
 
 def test_run_takes_an_image_as_its_floor_and_modules_beside(tmp_path: Path) -> None:
