@@ -16,6 +16,7 @@ from sim.errors import RobomarkError
 from sim.recording import SECOND, Fault, Verdict
 
 _log = logging.getLogger(__name__)
+_LONGEST_HINT = 200
 _PYTHON_2 = (
     "Missing parentheses in call to",
     "leading zeros in decimal integer literals",
@@ -61,7 +62,7 @@ def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     verdict = Verdict.PROGRAM_ERROR if who == "program" else Verdict.RESPONDER_ERROR
     words = error["text"]
     sentence = f"{error['type']}: {words}" if words else str(error["type"])
-    hint = ""
+    hint = error.get("hint", "")[:_LONGEST_HINT]
     if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
     return _fault(now, verdict, who, sentence, error["line"], hint, file=error["file"] or "")

@@ -14,7 +14,7 @@ from responders.conversation import Answer
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import Child
+from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import ResponderSpec
 from sim.chance import Stream
 from sim.recording import SECOND, Call, Fault, Verdict
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _MOST_NOTES = 200
 #: Of the calls that are shown, and of the characters of each of their parts.
 _MOST_CALLS, _MOST_SHOWN = 10_000, 200
+_FORGOT_RETURN = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
+_MAKE_JSON = 'For an object return "JSON::" + json.dumps(the object).'
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class ResponderProcess:
         self._slept = 0  # since then
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
-        self._child: Child | None = sandboxes.spawn("responder", spec.limits, folder, meter)
+        self._child: ServedChild | None = sandboxes.spawn("responder", spec.limits, folder, meter)
         self.sandbox = self._child.sandbox
         self._seed = seed
 
@@ -131,6 +133,7 @@ class ResponderProcess:
         """What an answer's frame says; a text with ``JSON::`` brings what joins the robot's queue, if it is JSON."""
         said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
         self._spend(said, "printed and answered")
+        hint = ""
         match frame["kind"]:
             case "text" if not said.startswith(message_format.JSON):
                 return Answer(said, self._slept)
@@ -139,7 +142,7 @@ class ResponderProcess:
                     entry = message_format.queue_entry(said)
                 except ValueError as error:
                     sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
-                    return Answer(said, self._slept, self._protocol_fault(t, sentence), note="malformed")
+                    return Answer(said, self._slept, self._protocol_fault(t, sentence, _MAKE_JSON), note="malformed")
                 self._meter.keep(len(entry))
                 return Answer(said, self._slept, entry=entry)
             case "error":
@@ -148,11 +151,12 @@ class ResponderProcess:
                 what = f"an answer of {frame['length']} characters; the most is about 60000"
             case _:
                 what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
-        return Answer(fault=self._protocol_fault(t, f"the responder returned {what}"))
+                hint = _FORGOT_RETURN if frame["type"] == "NoneType" else _MAKE_JSON
+        return Answer(fault=self._protocol_fault(t, f"the responder returned {what}", hint))
 
-    def _protocol_fault(self, t: int, sentence: str) -> Fault:
+    def _protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
         agent = "" if self._who == "responder" else self._who
-        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, agent=agent)
+        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, hint=hint, agent=agent)
 
     def _until(self, last: str) -> wire.Frame:
         assert self._child is not None

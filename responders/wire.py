@@ -62,11 +62,12 @@ def _or_none(check: Check) -> Check:
 def _error(value: object) -> bool:
     return (
         isinstance(value, dict)
-        and value.keys() == {"type", "text", "line", "file"}
+        and value.keys() - {"hint"} == {"type", "text", "line", "file"}
         and isinstance(value["type"], str)
         and isinstance(value["text"], str)
         and _line(value["line"])
         and _file(value["file"])
+        and isinstance(value.get("hint", ""), str)
     )
 
 
@@ -164,7 +165,7 @@ RESPONDER: Schema = MappingProxyType(
 NOTEBOOK: Schema = MappingProxyType(
     {
         **RESPONDER,
-        "cell": ({"place": _whole(0, 10**5)}, {}),
+        "cell": ({"place": _whole(0, 10**5), "answers": _flag}, {}),
         "raised": ({"error": _error}, {}),
         "note": ({"text": _text, **_PLACE}, {}),
         "magic": (

@@ -6,12 +6,13 @@ Reading files safely is ``raw_files.py``; what a submission is marked against is
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -23,10 +24,11 @@ from submissions.agent_files import with_agents
 from submissions.assignment.definition import Parts
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
-from submissions.marked_cell import marked_site, sites
+from submissions.marked_cell import LAST, marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
+from submissions.run_choice import asked_site
 from submissions.source_text import decode_source
 from submissions.submission import Notebook, Submission
 
@@ -129,7 +131,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     # Two robots are not marked by halves.
     if files and (len(missing) == len(wanted) or asked.second_program != "none"):
         names, expected = " and ".join(files), " and ".join(needed)
-        raise UsageError(f"{where}: has no {names}, expected {expected}.")
+        raise UsageError(f"{where}: has no {names}, expected {expected}{_renamed(missing, submission.files)}.")
     for part in missing:
         others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
         beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
@@ -153,6 +155,8 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         return fit_parts(alone, asked, where=where)
     if asked.program == "student":
         marked_site(notebook, asked.cell)
+        if submission.run is not None and asked.cell == LAST:
+            asked_site(notebook, submission.run)
     files, notes = dict(submission.files), list(submission.notes)
     for source in (submission.program, submission.responder):
         if source is not None:
@@ -178,6 +182,8 @@ def pack_submission(submission: Submission) -> bytes:
     meta = [f"student = {_toml_text(submission.student)}"]
     if submission.assignment is not None:
         meta.append(f"assignment = {_toml_text(submission.assignment)}")
+    if submission.run is not None:
+        meta.append(f"run = {_toml_text(submission.run)}")
     meta.append(f"notes = [{', '.join(map(_toml_text, submission.notes))}]")
     entries = dict(submission.files)
     for part, source in (("program", submission.program), ("responder", submission.responder)):
@@ -222,6 +228,7 @@ def unpack_submission(data: bytes) -> Submission:
         assignment=assignment if isinstance(assignment, str) else None,
         notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
         notebook=notebook,
+        run=_run_of(meta, "the kept submission"),
     )
 
 
@@ -247,6 +254,9 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     named = shown_name(_text_of(meta, "student", where) or student)
     if named != student:
         notes.append(f"{_META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
+    run = _run_of(meta, where)
+    if run is not None and notebook is None:
+        notes.append(f"{_META} says run = {shown_name(run)}, which is not used: there is no notebook.")
     return Submission(
         student=student,
         program=sources.get("program"),
@@ -255,6 +265,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         assignment=shown_name(assignment or candidate) or UNNAMED,
         notes=tuple(notes),
         notebook=notebook,
+        run=run if notebook is not None else None,
     )
 
 
@@ -318,7 +329,24 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
             notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
         return found
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
-    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both.")
+    renamed = _renamed(PART_FILES, files)
+    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both{renamed}.")
+
+
+def meant_as(part: Part, names: Iterable[str]) -> str:
+    """The file that is called nearly as the part has to be; empty if none is."""
+    word = PART_FILES[part].removesuffix(".py")
+    texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
+    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
+    near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
+    return next((name for name, stem in stems.items() if word in stem or stem in near), "")
+
+
+def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str:
+    """What is to be called otherwise, of the files that are there."""
+    found = {part: meant_as(part, files) for part in missing}
+    renamed = [f"{shown(name)} to {PART_FILES[part]}" for part, name in found.items() if name]
+    return f"; rename {' and '.join(renamed)}" if renamed else ""
 
 
 def _looks_like(data: bytes, name: str) -> Part:
@@ -345,6 +373,14 @@ def _text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
     if value is not None and (not isinstance(value, str) or not value.strip()):
         raise UsageError(f'{where}: {key} in {_META} is not a text, expected {key} = "..." there.')
     return value
+
+
+def _run_of(meta: Mapping[str, object], where: str) -> str | None:
+    """Which run of a notebook is to be marked: a number, or the tag of a cell."""
+    value = meta.get("run")
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    return _text_of(meta, "run", where)
 
 
 def _toml_text(text: str) -> str:

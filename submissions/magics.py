@@ -16,6 +16,7 @@ from sim.errors import UsageError
 from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
 from sim.robot import WIDENED, usual_robot
+from submissions.nearest import did_you_mean
 
 Preamble = Literal["none", "imports", "preloaded"]
 _PREAMBLES: dict[str, Preamble] = {
@@ -164,7 +165,8 @@ def parse_flags(name: str, arguments: str) -> Flags:
     """The flags of the magic ``name``. Raises UsageError for a magic or a flag that does not exist."""
     if name not in _PREAMBLES:
         expected = ", ".join(f"%%{known}" for known in _PREAMBLES)
-        raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}")
+        near = did_you_mean(f"%%{name[:40]}", (f"%%{known}" for known in _PREAMBLES))
+        raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}{near}")
     flags = _flags(_words(name, arguments), _PREAMBLES[name])
     foreign = sorted(flags.switches & _PLAIN_ONLY)
     if name != "sim_magic" and foreign:
@@ -208,7 +210,8 @@ def _short_of(long: str) -> str:
         return _LONG[found[0]]
     if found:
         raise UsageError(f"--{long[:40]} may be {' or '.join(f'--{name}' for name in found)}")
-    raise UsageError(f"there is no flag --{long[:40]}; --help of the course's magic lists them")
+    near = did_you_mean(f"--{long[:40]}", (f"--{name}" for name in _LONG))
+    raise UsageError(f"there is no flag --{long[:40]}" + (near or "; --help of the course's magic lists them"))
 
 
 def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
@@ -221,7 +224,9 @@ def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switc
             values[letter] = rest if rest else _next(waiting, f"-{letter}")
             return
         else:
-            raise UsageError(f"there is no flag -{letter}")
+            other = letter.swapcase()
+            near = f"; did you mean -{other}?" if other in _SWITCHES or other in _VALUED else ""
+            raise UsageError(f"there is no flag -{letter}{near}")
 
 
 def _next(waiting: list[str], flag: str) -> str:
@@ -286,7 +291,8 @@ class Simulator:
 
     def _choose_robot(self, name: str) -> None:
         if name not in WIDENED:
-            self._note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator")
+            near = did_you_mean(name[:40], WIDENED)
+            self._note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{near}")
             name = "Default_Robot"
         self.robot = self._chosen = name
         self.pose = _AFTER_ROBOT
@@ -295,7 +301,8 @@ class Simulator:
 
     def _choose_background(self, name: str) -> None:
         if name not in names():
-            self._note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator")
+            near = did_you_mean(name[:40], names())
+            self._note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{near}")
             name = "Empty_Map"
         self.background = name
         self.pose, self.obstacles = start_of(name)
@@ -313,7 +320,8 @@ class Simulator:
         if name in OBSTACLE_PRESETS and name != "None":
             self.obstacles = OBSTACLE_PRESETS[name]
         elif name != "None":
-            self._note(f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator")
+            near = did_you_mean(name[:40], OBSTACLE_PRESETS)
+            self._note(f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{near}")
         elif self.obstacles:
             self._note(
                 "-o None leaves the obstacles as they are, as in the simulator; choosing a background clears them"

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
-from submissions.magics import is_program_magic, magic_place
+from submissions.magics import is_program_magic, magic_place, parse_flags, parse_magic
+from submissions.raw_files import shown
 from submissions.submission import Cell, Notebook
 
 LAST = "last"
@@ -21,6 +22,9 @@ _LINE = re.compile(
     r"""(?:%sim_magic[ \t]+|\.run_line_magic\([ \t]*['"]sim_magic['"][ \t]*,[ \t]*f?['"])(?P<flags>.*)"""
 )
 _AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
+_EXPANDED = re.compile(r"[{$]")
+#: A line that was to begin a robot program.
+NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 
 
@@ -50,7 +54,8 @@ def marked_site(notebook: Notebook, which: str) -> Site:
     found = sites(notebook)
     if not found:
         raise UsageError(
-            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded."
+            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded"
+            f"{_near_miss(notebook)}."
         )
     if which.isdecimal():
         number, cells = int(which), programs(notebook)
@@ -70,6 +75,37 @@ def program_of(notebook: Notebook, site: Site) -> Cell | None:
     return next((cell for cell in notebook.cells if before and cell.number == before[-1].cell), None)
 
 
+def named_floors(notebook: Notebook) -> dict[Site, str]:
+    """The floor that each place has by the last ``-b`` at or above it; none where it follows from running."""
+    found: dict[Site, str] = {}
+    floor: str | None = None
+    starts = set(sites(notebook))
+    for cell in notebook.cells:
+        program = _program(cell)
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            site = Site(cell.number, number)
+            named = _floor(line, site == program)
+            floor = named or floor
+            if site in starts and floor is not None and not _EXPANDED.search(floor):
+                found[site] = floor
+    return found
+
+
+def _floor(line: str, program: bool) -> str | None:
+    """The background that a magic's line names."""
+    again = _LINE.search(line)
+    try:
+        if program:
+            flags = parse_magic(line.lstrip("\ufeff").strip())
+        elif again:
+            flags = parse_flags("sim_magic", re.split(r"""['"]""", again["flags"])[0])
+        else:
+            return None
+    except UsageError:
+        return None
+    return flags.values.get("b")
+
+
 def _tagged(notebook: Notebook, tag: str) -> Site:
     tagged = [cell for cell in notebook.cells if tag in cell.tags]
     if not tagged:
@@ -84,6 +120,16 @@ def _tagged(notebook: Notebook, tag: str) -> Site:
             "%%sim_magic_preloaded as its first line."
         )
     return found[-1]
+
+
+def _near_miss(notebook: Notebook) -> str:
+    """A line that is nearly a program's magic, or is one in the wrong place."""
+    for cell in notebook.cells:
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            if NEARLY_MAGIC.match(line[:200]):
+                why = "below other code" if is_program_magic(line) else "another word"
+                return f"; line {number} of cell {cell.number} has {shown(line.split()[0])}, {why}"
+    return ""
 
 
 def _count(number: int) -> str:

@@ -19,6 +19,9 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print; a wrong one names them all.", _documents)] = "text",
+    run: Annotated[
+        str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
+    ] = None,
     link: channel_flags.LinkFlag = None,
     beacon: channel_flags.BeaconFlag = None,
     reach: channel_flags.RangeFlag = None,
@@ -54,7 +57,7 @@ def grade(
         reordering=reordering,
         corruption=corruption,
     )
-    grade_all(submissions, assignment, report, "json" if wants_json() else form, given, unsafe=unsafe)
+    grade_all(submissions, assignment, report, "json" if wants_json() else form, given, run=run, unsafe=unsafe)
 
 
 def _documents() -> tuple[str, ...]:

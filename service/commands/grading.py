@@ -41,9 +41,13 @@ def grade_all(
     form: str,
     given: Mapping[str, object],
     *,
+    run: str | None,
     unsafe: bool,
 ) -> None:
-    """Grade and print each, or all together; ``given`` are the flags of the channel. Raises for the worst of them."""
+    """Grade and print each, or all together; ``given`` are the flags of the channel, ``run`` is of a notebook.
+
+    Raises for the worst of them.
+    """
     if assignment is not None:
         # A mistake of the instructor's is no submission's.
         find_assignment(assignment)
@@ -63,6 +67,7 @@ def grade_all(
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, assignment)
+                submission = _with_run(submission, run)
                 graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
                 graded = replace(graded, notes=(*_tried(given), *graded.notes))
             except RobomarkError as error:
@@ -90,6 +95,15 @@ def grade_all(
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
         raise kind("not every submission could be graded")
+
+
+def _with_run(submission: Submission, run: str | None) -> Submission:
+    """The submission with another run to be marked. Raises UsageError for one that has no runs."""
+    if run is None:
+        return submission
+    if submission.notebook is None:
+        raise UsageError(f"{submission.student}: is no notebook and has no run {run}; leave --run out.")
+    return replace(submission, run=run)
 
 
 def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:

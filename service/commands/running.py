@@ -269,6 +269,8 @@ def _show(recording: Recording) -> None:
         print(f"{fault.t:8.2f} s  {fault.verdict}: {readable(fault.message, 400)}{where}", file=sys.stderr)
         if fault.hint:
             print(f"            {fault.hint}", file=sys.stderr)
+    for each in recording.notes:
+        note(f"note: {readable(each, 400)}")
 
 
 def _told(recording: Recording) -> dict[str, Any]:

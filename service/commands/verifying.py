@@ -5,6 +5,7 @@ from __future__ import annotations
 from service.commands.shown import document, note, show, table, tell
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
+from service.grading.trial_runner import TrialRunner
 from service.settings import load_settings
 from service.store import batches, intake, results
 from service.store.engine import open_store
@@ -28,7 +29,8 @@ def verify_grade(grade: str) -> None:
             stored = results.load(session, job.id)
             grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
-    again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret)
+    with TrialRunner(spares=False) as runner:
+        again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret, runner=runner)
     rows = list(zip(stored.trials, again.trials, strict=False))
     document(**_told(job.id, stored, again, rows))
     compared = table("scenario", "trial", "stored", "again", "")

@@ -191,6 +191,7 @@ class Grade:
     grader_version: str
     notes: tuple[str, ...] = ()
     missing: str = ""  # the file that was asked for and not submitted; what needs it has no marks
+    hints: tuple[str, ...] = ()  # what probably cost marks, the most telling first; no mark depends on them
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
     cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
 

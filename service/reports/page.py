@@ -19,7 +19,14 @@ from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
 from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
-from service.reports.words import VerdictWords, channel_words, cost_words, grade_words, verdict_words
+from service.reports.words import (
+    VerdictWords,
+    channel_words,
+    cost_words,
+    grade_words,
+    hints_of,
+    verdict_words,
+)
 from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -106,7 +113,7 @@ class Page:
     max_marks: str
     share: float
     words: VerdictWords
-    next_step: str
+    hints: tuple[str, ...]
     criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     faults_title: str
@@ -137,7 +144,7 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
         max_marks=number(grade.max_marks),
         share=_share(float(grade.marks), float(grade.max_marks)),
         words=grade_words(grade),
-        next_step=_next_step(grade),
+        hints=hints_of(grade),
         criteria=tuple(_criterion_line(grade, result) for result in grade.criteria),
         faults=faults,
         faults_title="How it ended" if time_alone else "What went wrong",
@@ -177,19 +184,6 @@ def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
 def _kind(fault: Fault) -> str:
     """Time that is up is no fault by itself."""
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
-
-
-def _next_step(grade: Grade) -> str:
-    """The verdict's advice if something went wrong, else what would gain most marks."""
-    words = grade_words(grade)
-    if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
-        return words.next_step
-    lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
-    if lost is None or lost.marks >= lost.max_marks:
-        return "Everything that was asked for is there."
-    missing = number(lost.max_marks - lost.marks)
-    title, of = one_line(lost.title, 100), number(lost.max_marks)
-    return f"Most is to be gained at “{title}”, where {missing} of {of} marks are missing."
 
 
 def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from service.grading.grade import Grade
+from service.reports.readable import number, one_line, readable
 from sim.recording import LossReason, Verdict
 
 Tone = Literal["good", "notice", "bad"]
@@ -35,7 +36,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "finished",
             "Your program ran to its end without an error.",
             "Nothing stopped it.",
-            "If marks are missing, compare what each criterion asked for with what your robot did.",
+            "Compare what each criterion asked for with what your robot did.",
             "good",
         ),
         Verdict.PROGRAM_ERROR: VerdictWords(
@@ -140,7 +141,7 @@ _NO_ROBOT = VerdictWords(
     "code checked",
     "Your functions were called and your code was read; no robot was run.",
     "What came of it is told at each criterion.",
-    "If marks are missing, call the function yourself with the values that are named there.",
+    "Call the function yourself with the values that are named there.",
     "good",
 )
 
@@ -176,7 +177,27 @@ _AGENT_ERROR = VerdictWords(
 
 
 def grade_words(grade: Grade) -> VerdictWords:
-    """The words for a grade's verdict, for what was not submitted, or that there was nothing to run."""
+    """The words for a grade's verdict, for what was not submitted, or that nothing was run; and what to do next."""
+    words = _what_happened(grade)
+    return replace(words, next_step=_next_step(grade, words))
+
+
+def _next_step(grade: Grade, words: VerdictWords) -> str:
+    """The verdict's advice if something went wrong, else what would gain most marks, if any are missing."""
+    if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
+        return words.next_step
+    lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
+    if lost is None:
+        return words.next_step
+    if lost.marks >= lost.max_marks:
+        return "Full marks: everything that was asked for is there."
+    missing, of = number(lost.max_marks - lost.marks), number(lost.max_marks)
+    verb = "is" if missing == "1" else "are"
+    most = f"Most is to be gained at “{one_line(lost.title, 100)}”, where {missing} of {of} marks {verb} missing."
+    return f"{most} {words.next_step}"
+
+
+def _what_happened(grade: Grade) -> VerdictWords:
     if not grade.missing:
         return _ended(grade) if grade.trials else _NO_ROBOT
     words = _WITHOUT[grade.missing]
@@ -195,6 +216,14 @@ def _ended(grade: Grade) -> VerdictWords:
 def _is_of_an_agent(grade: Grade) -> bool:
     faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
     return bool(faults and faults[0].agent)
+
+
+def hints_of(grade: Grade) -> tuple[str, ...]:
+    """What probably cost marks, as sentences that are fit to be shown; to be said before anything else."""
+    told = (readable(hint, 600).rstrip(".") for hint in grade.hints)
+    # The name of a file stays as it is.
+    began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
+    return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
 
 
 def accuracy_words(grade: Grade) -> str:

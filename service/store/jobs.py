@@ -182,6 +182,7 @@ def finish(
             "sandbox": grade.sandbox,
             "missing": grade.missing,
             "notes": list(grade.notes),
+            "hints": list(grade.hints),
             "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,
             "plots_due_at": at,

@@ -200,6 +200,7 @@ class Job(Base):
     grader_version: Mapped[str | None]
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
+    hints: Mapped[Any] = mapped_column(default=list)  # sentences on what probably cost marks
     missing: Mapped[str] = mapped_column(default="")  # the part that was asked for and not submitted
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 

@@ -105,6 +105,7 @@ def load(session: Session, job_id: str) -> Grade:
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
         missing=job.missing,
+        hints=tuple(job.hints),
         secret_sha256=job.secret_sha256 or PUBLIC.sha256,
         cost=None if job.cost is None else decode(Cost, job.cost),
     )

@@ -64,6 +64,7 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
         b'{"do":"print","text":5}',
         b'{"do":"print","text":"\xff"}',
         b'{"do":"end","error":{"type":"X","text":"y","line":1,"file":null,"verdict":"finished"}}',
+        b'{"do":"end","error":{"type":"X","text":"y","line":1,"file":null,"hint":1}}',
         b'{"do":"stuck","line":1,"file":"../robot.py"}',
         b'{"do":"stuck","line":1,"file":"' + b"x" * 200 + b'.py"}',
         b"[" * 60_000,

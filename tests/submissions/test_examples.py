@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,11 @@ import pytest
 
 from paths import DATA
 from service.grading.example_check import check_examples
-from service.grading.grade import Grade
+from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.grader import grade
+from service.grading.hint_clues import clues_of
+from service.grading.hints import near_misses
+from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from submissions.assignment.examples import REFERENCE, Expectation, examples, expected
@@ -23,6 +26,7 @@ from submissions.criteria import Criterion
 from submissions.criteria.common import AmongMany
 from submissions.criteria.logged import Datalog
 from submissions.criteria.texts import TextSequence
+from submissions.submission import Submission
 
 FOLDER = DATA / "failing_submissions"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
@@ -41,9 +45,22 @@ def assert_as_expected(result: Grade, wanted: Expectation) -> None:
 
 
 @pytest.mark.parametrize("assignment", catalogue())
-def test_every_example_is_marked_as_expected(assignment: str, runner: TrialRunner) -> None:
+def test_every_example_is_marked_as_expected(
+    assignment: str, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alarms: list[str] = []
+
+    def hints_whatever_the_marks(
+        submission: Submission, plan: RunPlan, trials: Sequence[TrialResult], results: Sequence[CriterionResult]
+    ) -> tuple[str, ...]:
+        if all(result.marks >= result.max_marks for result in results):
+            alarms.extend(near_misses(clues_of(submission, plan, trials, results)))
+        return ()
+
+    monkeypatch.setattr("service.grading.grader.hints_for", hints_whatever_the_marks)
     checked = check_examples(assignment, runner=runner)
     assert checked.problems == ()
+    assert alarms == []
     names = [example.name for example in checked.examples]
     full = checked.assignment.max_marks
     assert names[0] == REFERENCE

@@ -14,6 +14,7 @@ from service.reports.formats.registry import table
 from service.reports.readable import number, one_line
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
+from service.reports.words import hints_of
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 _WHO = ("student", "name", "email", "assignment")
@@ -22,18 +23,18 @@ _MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submiss
 
 @table("csv", ".csv", staff_view)
 def marks_csv(rows: Sequence[TableRow[View]]) -> str:
-    """One row a submission: who, marks, verdict, accuracy, hashes, a column a criterion, words for staff, reason."""
+    """One row a submission: who, marks, verdict, accuracy, hashes, a column a criterion, for staff, hints, reason."""
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
-    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "file", "reason"]
+    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "notes", "hints", "file", "reason"]
     return csv_text([header, *(_wide(row, criteria) for row in rows)])
 
 
 @table("csv-long", ".csv", staff_view)
 def criteria_csv(rows: Sequence[TableRow[View]]) -> str:
     """One row a criterion of a submission; one without marks where the submission has no grade."""
-    header = [*_WHO, "criterion", "title", "marks", "max_marks", "message", "file", "reason"]
+    header = [*_WHO, "criterion", "title", "marks", "max_marks", "message", "hints", "file", "reason"]
     return csv_text([header, *(cells for row in rows for cells in _long(row))])
 
 
@@ -52,7 +53,7 @@ def safe_cell(value: str) -> str:
 
 def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
     grade = None if row.grade is None else row.grade.grade
-    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 1)
+    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 3)
     return [*_who(row), *marked, row.source, row.reason]
 
 
@@ -70,16 +71,19 @@ def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
         "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
+        "; ".join(grade.notes[:20]),
+        " ".join(hints_of(grade)),
     ]
 
 
 def _long(row: TableRow[View]) -> Iterator[list[str]]:
     if row.grade is None:
-        yield [*_who(row), "", "", "", "", "", row.source, row.reason]
+        yield [*_who(row), "", "", "", "", "", "", row.source, row.reason]
         return
+    hints = " ".join(hints_of(row.grade.grade))
     for result in row.grade.grade.criteria:
         marks = [number(result.marks), number(result.max_marks)]
-        yield [*_who(row), result.id, result.title, *marks, result.message, row.source, row.reason]
+        yield [*_who(row), result.id, result.title, *marks, result.message, hints, row.source, row.reason]
 
 
 def _who(row: TableRow[View]) -> list[str]:

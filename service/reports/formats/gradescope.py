@@ -16,7 +16,7 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import grade_words
+from service.reports.words import grade_words, hints_of
 
 
 def gradescope_document(view: GradebookView) -> dict[str, Any]:
@@ -89,7 +89,8 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 def _output(view: GradebookView) -> str:
     shown = view.shown
     words = grade_words(shown)
-    lines = [words.happened, words.whose, words.next_step]
+    lines = [*hints_of(shown), words.happened, words.whose, words.next_step]
     for group in fault_groups(shown, limit=10):
         lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
+    lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]
     return "\n".join([*lines, f"sandbox: {shown.sandbox}"])

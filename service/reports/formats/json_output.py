@@ -16,6 +16,7 @@ from service.reports.readable import json_number
 from service.reports.rows import TableRow
 from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
+from service.reports.words import hints_of
 from sim.recording import Message, Recording
 
 SCHEMA = 1
@@ -30,6 +31,7 @@ def json_document(view: View) -> dict[str, Any]:
         "marks": json_number(grade.marks),
         "max_marks": json_number(grade.max_marks),
         "verdict": grade.verdict.value,
+        **({"hints": [storable(hint) for hint in hints_of(grade)]} if grade.hints else {}),
         "criteria": [
             {
                 "id": result.id,

@@ -13,6 +13,7 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
+from service.reports.words import hints_of
 from sim.recording import Verdict
 
 _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
@@ -83,7 +84,7 @@ def _begun(
 def _add_properties(suite: ElementTree.Element, told: Sequence[tuple[str, str]]) -> None:
     properties = ElementTree.SubElement(suite, "properties")
     for name, value in told:
-        ElementTree.SubElement(properties, "property", name=name, value=readable(value, 300))
+        ElementTree.SubElement(properties, "property", name=name, value=readable(value, 600))
 
 
 def _add_case(suite: ElementTree.Element, grade: Grade, result: CriterionResult, outcome: str) -> None:
@@ -101,8 +102,10 @@ def _properties(grade: Grade) -> list[tuple[str, str]]:
         ("marks", number(grade.marks)),
         ("max_marks", number(grade.max_marks)),
         ("verdict", grade.verdict.value),
+        *(("hint", hint) for hint in hints_of(grade)),
         ("assignment_version", grade.assignment_version),
         ("submission", grade.submission),
         ("sandbox", grade.sandbox),
         ("grader_version", grade.grader_version),
+        *(("note", note) for note in grade.notes[:20]),
     ]

@@ -19,6 +19,7 @@ from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
+from service.reports.words import hints_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -100,9 +101,11 @@ def _marks(row: TableRow[GradebookView]) -> str:
 def _feedback(row: TableRow[GradebookView]) -> str:
     told = [] if row.grade is None else row.grade.shown.criteria
     lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
+    lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    return one_line("; ".join(lines), _LONGEST)
+    hints = () if row.grade is None else hints_of(row.grade.shown)
+    return one_line(" ".join([*hints, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:

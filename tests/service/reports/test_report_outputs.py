@@ -61,6 +61,23 @@ def test_every_report_says_what_the_channel_lost_and_why() -> None:
     assert "The channel" not in plain_text(staff_view(build.line_follower_grade()))
 
 
+@pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document] + ["page", "terminal"])
+def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
+    made = build.shape_grade()
+    full = replace(made, criteria=tuple(replace(each, marks=each.max_marks) for each in made.criteria))
+    shown = Console(width=400, record=True, file=io.StringIO())
+    shown.print(rich_report(staff_view(full)))
+    document = FORMATS[form].document if form in FORMATS else None
+    told = document(full) if document else report(student_view(full), {}) if form == "page" else shown.export_text()
+    words = " ".join(told.split())
+    assert "missing" not in words
+    assert "to be gained" not in words
+    if form in ("text", "gradescope", "page", "terminal"):
+        assert "Full marks: everything that was asked for is there." in words
+    else:
+        assert re.search(r'"marks": 8,|name="marks" value="8"', words)
+
+
 def test_json_without_classification_and_with_half_marks() -> None:
     document = json_document(staff_view(build.line_follower_grade()))
     assert document["accuracy"] is None

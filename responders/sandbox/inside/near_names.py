@@ -1,0 +1,78 @@
+"""What was probably meant where Python has stumbled over a name: one like it, or an import that is not there.
+
+It looks at what the error itself knows and changes nothing; the worker believes none of it.
+"""
+
+from __future__ import annotations
+
+import builtins
+import difflib
+import keyword
+import os
+import re
+import sys
+from collections.abc import Iterable
+
+_LONGEST = 60
+_MOST_KNOWN = 5000
+_CANNOT_IMPORT = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
+#: How what is often used without it is imported.
+_IMPORTS = {
+    "np": "import numpy as np",
+    "pd": "import pandas as pd",
+    "sleep": "from time import sleep",
+    "randint": "from random import randint",
+    "pyState": "from ev3dev2_glue import pyState",
+    "load": "from joblib import load",
+}
+#: What of the brick a robot program may not have loaded yet.
+_BRICK = ("ev3dev2", "ev3dev2.motor", "ev3dev2.sensor", "ev3dev2.sensor.lego", "ev3dev2.sound", "ev3dev2_glue")
+
+
+def meant_by(error: BaseException) -> str:
+    """A sentence on what was probably meant; empty where nothing is near, or the error is about something else."""
+    try:
+        if isinstance(error, UnboundLocalError):
+            return ""
+        if isinstance(error, NameError):
+            return _of_name(error)
+        if isinstance(error, AttributeError) and error.name is not None:
+            return _near(error.name, dir(error.obj), 0.7)
+        if isinstance(error, ModuleNotFoundError) and str(error).startswith("No module named"):
+            brick = _BRICK if "brick_link" in sys.modules else ()
+            return _near(str(error.name), [*brick, *sys.stdlib_module_names, *sys.modules], 0.8)
+        if isinstance(error, FileNotFoundError) and isinstance(error.filename, str) and os.getcwd() != "/":
+            return _near(error.filename, os.listdir(), 0.7)
+        found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
+        return _near(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
+    except Exception:
+        # It asks objects of the student's for their names.
+        return ""
+
+
+def _of_name(error: NameError) -> str:
+    name = str(error.name)
+    statement = f"import {name}" if name in sys.stdlib_module_names else _IMPORTS.get(name)
+    if statement is not None:
+        return f"Did you forget {statement}?"
+    known: list[str] = [*dir(builtins), *keyword.kwlist]
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if trace is not None:
+        known = [*trace.tb_frame.f_locals, *trace.tb_frame.f_globals, *known]
+    return _near(name, known, 0.7)
+
+
+def _near(name: str, known: Iterable[object], least: float) -> str:
+    """``Did you mean print?``, if one of ``known`` is like ``name``, which is none of them."""
+    names = [each for each in known if type(each) is str and len(each) <= _LONGEST][:_MOST_KNOWN]
+    if name in names or len(name) > _LONGEST:
+        return ""
+    usable = {_folded(each): each for each in reversed(names) if not each.startswith("_")}
+    near = difflib.get_close_matches(_folded(name), usable, 1, least)
+    return f"Did you mean {usable[near[0]]}?" if near else ""
+
+
+def _folded(name: str) -> str:
+    return name.lower().replace("_", "")

@@ -1,0 +1,236 @@
+"""The near misses that students make: each report begins with what was found, where, and what was expected."""
+
+from __future__ import annotations
+
+import ast
+import io
+import time
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from notebook_builder import notebook
+from paths import DATA, ROOT
+from report_builders import line_follower_recording
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.hint_clues import clues_of
+from service.grading.hint_rules import PRELOADED
+from service.grading.hints import near_misses
+from service.grading.run_plan import plan_run
+from service.grading.trial_runner import TrialRunner
+from service.reports.formats import FORMATS
+from service.reports.formats.rich_text import rich_report
+from service.reports.html import report
+from service.reports.rows import TableRow
+from service.reports.view import staff_view, student_view
+from sim.errors import UsageError
+from sim.recording import Line
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import examples
+from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
+from submissions.people import Student
+
+NEAR_MISSES = tomllib.loads((DATA / "near_misses.toml").read_text("utf-8"))["near_miss"]
+IS_THAT_A = """
+id = "is-that-a"
+title = "Say it"
+[world]
+background = "Empty_Map"
+[parts]
+responder = "none"
+[[scenario]]
+id = "once"
+poses = [[100, 800, 0]]
+seconds = 5
+[[criterion]]
+title = "Asks"
+marks = 1
+check = "says"
+starts_with = "Is that a"
+"""
+
+
+def asked_in(name: str, folder: Path) -> Assignment:
+    """With one pose a scenario, for that is enough to go wrong."""
+    if name != "is-that-a":
+        whole = find_assignment(name)
+        return replace(whole, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in whole.scenarios))
+    (folder / "is-that-a").mkdir()
+    (folder / "is-that-a" / "assignment.toml").write_text(IS_THAT_A)
+    return find_assignment(str(folder / "is-that-a"))
+
+
+def written(case: Mapping[str, Any], folder: Path) -> Path:
+    """The reference with the mistake in it."""
+    own = folder / "ada"
+    own.mkdir()
+    for part in ("robot.py", "responder.py"):
+        change = case.get(part, {})
+        if "text" in change:
+            text = change["text"]
+        else:
+            reference = examples(case["assignment"]) / "reference" / part
+            text = reference.read_text("utf-8") if reference.exists() else ""
+        if "from" in change:
+            assert change["from"] in text
+            text = text.replace(change["from"], change["to"])
+        if text:
+            (own / change.get("rename", part)).write_text(text, "utf-8")
+    return own
+
+
+def graded_case(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> Grade:
+    asked = asked_in(case["assignment"], folder)
+    return grade(read_submission(written(case, folder), asked=asked.parts), asked, runner=runner)
+
+
+@pytest.mark.parametrize("case", NEAR_MISSES, ids=lambda case: case["name"])
+def test_a_near_miss_is_named_first(case: Mapping[str, Any], runner: TrialRunner, tmp_path: Path) -> None:
+    graded = graded_case(case, tmp_path, runner)
+    assert graded.marks < graded.max_marks
+    first = plain(graded).partition("→ ")[2]
+    assert first.startswith(case["hint"])
+    assert case.get("also", "") in first
+
+
+def plain(graded: Grade) -> str:
+    form = FORMATS["text"]
+    assert form.document is not None
+    return " ".join(form.document(graded).split())
+
+
+def one_like(name: str) -> Mapping[str, Any]:
+    return next(case for case in NEAR_MISSES if case["name"] == name)
+
+
+def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path) -> None:
+    graded = graded_case(one_like("py in small letters"), tmp_path, runner)
+    hint = graded.hints[0]
+    cause, criterion = 'prints "py::0"', graded.criteria[0].title
+    assert cause in hint
+    row = TableRow(Student("ada"), "ada.zip", graded.assignment, graded)
+    shown = Console(width=400, record=True, file=io.StringIO())
+    shown.print(rich_report(staff_view(graded)))
+    told = {"terminal": shown.export_text(), "page": unescape(report(student_view(graded), {}))}
+    for name, form in FORMATS.items():
+        if form.document is not None:
+            told[f"{name} document"] = unescape(form.document(graded)).replace('\\"', '"')
+        if form.table is not None:
+            told[f"{name} table"] = unescape(form.table([row])).replace('\\"', '"').replace('""', '"')
+    for name, text in told.items():
+        assert cause in text, name
+        if name not in ("csv table", "csv-long table"):
+            # A table says everything in columns.
+            assert text.index(cause) < text.index(criterion), name
+
+
+def test_a_hint_tells_nothing_of_hidden_trials_and_criteria(runner: TrialRunner, tmp_path: Path) -> None:
+    case = one_like("py in small letters")
+    asked = asked_in(case["assignment"], tmp_path)
+    submission = read_submission(written(case, tmp_path), asked=asked.parts)
+    hidden_trials = replace(asked, scenarios=tuple(replace(each, visibility="hidden") for each in asked.scenarios))
+    assert grade(submission, hidden_trials, runner=runner).hints == ()
+    criteria = tuple(each.model_copy(update={"visibility": "hidden"}) for each in asked.criteria)
+    assert grade(submission, replace(asked, criteria=criteria), runner=runner).hints == ()
+
+
+def test_what_costs_nothing_is_no_cause(runner: TrialRunner, tmp_path: Path) -> None:
+    case = {
+        "assignment": "echo-responder",
+        "robot.py": {"from": "import time", "to": 'import time\nprint("py: here we go")'},
+    }
+    graded = graded_case(case, tmp_path, runner)
+    assert (graded.marks, graded.hints) == (graded.max_marks, ())
+
+
+CELLS = {
+    "PY with one colon": (
+        ["def responder(text):\n    return 'Python saw >> 0 << that...'", "%%sim_magic_preloaded\nprint('PY:0')"],
+        'line 2 of cell 2 prints "PY:0", which is not sent as a message',
+    ),
+    "a misspelt name": (
+        ["def responder(text):\n    return 'hello'", "%%sim_magic_preloaded\nimport time\npritn('PY::0')"],
+        "line 3 of cell 2: NameError: name 'pritn' is not defined. Did you mean print?",
+    ),
+    "a forgotten return": (
+        ["def responder(text):\n    print('Python saw >> 0')", "%%sim_magic_preloaded\nprint('PY::0')"],
+        "line 2 of cell 1, \"print('Python saw >> 0')\", prints the answer and nothing returns it; expected return",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_path: Path) -> None:
+    cells, hint = CELLS[name]
+    asked = find_assignment("echo-responder")
+    submission = read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts)
+    assert grade(submission, asked, runner=runner).hints[0].startswith(hint)
+
+
+@pytest.mark.parametrize(
+    ("cell", "found"),
+    [
+        ("%%sim_magic_preload\nprint(1)", "line 1 of cell 1 has %%sim_magic_preload, another word."),
+        (
+            "import time\n%%sim_magic_preloaded\nprint(1)",
+            "; line 2 of cell 1 has %%sim_magic_preloaded, below other code.",
+        ),
+        ("print(1)", "begins with %%sim_magic_preloaded."),
+    ],
+)
+def test_a_notebook_without_a_robot_program_is_told_what_was_nearly_one(cell: str, found: str, tmp_path: Path) -> None:
+    asked = find_assignment("echo-responder")
+    with pytest.raises(UsageError) as refusal:
+        read_submission(notebook(tmp_path / "ada.ipynb", [cell]), asked=asked.parts)
+    assert str(refusal.value).endswith(found)
+
+
+def test_files_with_other_names_are_to_be_renamed(tmp_path: Path) -> None:
+    for name in ("my_robot.py", "responders.py", "helper.py"):
+        (tmp_path / name).write_text("x = 1\n")
+    with pytest.raises(UsageError, match=r"; rename my_robot[.]py to robot[.]py and responders[.]py to responder[.]py"):
+        read_submission(tmp_path, asked=find_assignment("echo-responder").parts)
+
+
+def test_what_the_preloaded_magic_brings_is_known() -> None:
+    given: dict[str, Any] = {}
+    exec((ROOT / "sim/brick/brick_preambles.py").read_text("utf-8"), given)
+    preloaded, imports = ({*bound_by(given["PREAMBLES"][name])} for name in ("preloaded", "imports"))
+    assert preloaded - imports == PRELOADED
+
+
+def bound_by(text: str) -> Iterator[str]:
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.FunctionDef):
+            yield node.name
+        elif isinstance(node, ast.Assign):
+            yield from (target.id for target in node.targets if isinstance(target, ast.Name))
+
+
+def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Path) -> None:
+    def cost(lines: int) -> float:
+        text = "".join(f"print('P Y : :{number}' * 2)  # {'x(' * 40}\n" for number in range(lines))
+        (tmp_path / "robot.py").write_text(text)
+        (tmp_path / "responder.py").write_text("def responder(text):\n" + "    print(text)\n" * lines)
+        asked = find_assignment("echo-responder")
+        submission = read_submission(tmp_path, asked=asked.parts)
+        clues = clues_of(submission, plan_run(submission, asked), (), ())
+        said = tuple(Line(0.0, f"P Y : :{number}") for number in range(lines))
+        recording = replace(line_follower_recording(1), printed=said, spoken=said)
+        lost = tuple(each for each in asked.criteria)
+        began = time.process_time()
+        near_misses(replace(clues, recordings=(recording,), lost=lost))
+        return time.process_time() - began
+
+    short = max(cost(250), 0.002)
+    assert cost(4 * 250) < 20 * 4 * short
