@@ -16,7 +16,7 @@ from responders.faults import error_fault, refusal, stopped, surprise
 from responders.link import link_of
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import Child
+from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
@@ -51,7 +51,7 @@ class Bridge:
         spec: TrialSpec,
         arena: Arena,
         camera: LightCamera,
-        child: Child,
+        child: ServedChild,
         responder: ResponderProcess | None,
         meter: JobMeter,
     ) -> None:

@@ -51,13 +51,15 @@ class Returned:
 class Called:
     """What all calls gave, in their order. ``fault`` is what kept the module from being loaded.
 
-    ``printed`` has what the module printed while it was loaded, and then what it printed in each call.
+    ``printed`` has what the module printed while it was loaded, and then what it printed in each call; ``notes`` what
+    had been noted by the end of each of these.
     """
 
     returned: tuple[Returned, ...]
     fault: Fault | None
     sandbox: str
     printed: tuple[tuple[str, ...], ...] = ()
+    notes: tuple[tuple[str, ...], ...] = ()
 
 
 def call_functions(
@@ -82,12 +84,13 @@ def call_functions(
         try:
             sandbox = caller.sandbox
             fault = caller.load()
-            printed = [caller.taken()]
+            printed, notes = [caller.taken()], [tuple(caller.notes)]
             gave = []
             for call in calls if fault is None else ():
                 gave.append(caller.call(call))
                 printed.append(caller.taken())
-            return Called(tuple(gave), fault, sandbox, tuple(printed))
+                notes.append(tuple(caller.notes))
+            return Called(tuple(gave), fault, sandbox, tuple(printed), tuple(notes))
         finally:
             caller.close()
 

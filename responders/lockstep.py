@@ -16,7 +16,7 @@ from responders.conversation import Sent
 from responders.link import InfraredLink
 from responders.responder_process import Collected, ResponderProcess
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.running_child import Child
+from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import TrialSpec
 from sim.camera import LightCamera
 from sim.recording import SECOND, Call, Fault, Verdict
@@ -38,7 +38,9 @@ class PairedBridge(Bridge):
     none, it goes to the other robot.
     """
 
-    def __init__(self, spec: TrialSpec, arena: SharedArena, camera: LightCamera, child: Child, meter: JobMeter) -> None:
+    def __init__(
+        self, spec: TrialSpec, arena: SharedArena, camera: LightCamera, child: ServedChild, meter: JobMeter
+    ) -> None:
         super().__init__(spec, arena, camera, child, None, meter)
         self.arena = arena
         self.number = spec.number

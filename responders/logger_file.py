@@ -13,7 +13,7 @@ from responders.faults import stopped
 from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.recording import Fault
 
-_LOG_FILE = "logger.txt"
+LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
 
 
@@ -21,7 +21,7 @@ def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str
     """The logger.txt in a process's folder, read when it is gone: a regular file only, no link, capped and paid for."""
     directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        fd = os.open(_LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
+        fd = os.open(LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
     except OSError:
         return "", None
     finally:

@@ -174,6 +174,7 @@ class _Execution:
         self._sandboxes = sandboxes
         self._meter = meter
         self._unmarked_cpu = self._unmarked_seconds = 0.0
+        self._missing: str | None = None  # why nothing answered the run that needs it
         self.runs: list[Run] = []
 
     def perform(self, frame: wire.Frame) -> dict[str, Any]:
@@ -202,7 +203,10 @@ class _Execution:
         return robot_state(world_of(standing.spec, *ground, Chain()), standing.spec)
 
     def finish(self) -> None:
-        """Run what the planner has for the end."""
+        """Run what the planner has for the end; a responder that came too late for its robot is told of."""
+        since, missing = self._process.answers_since, self._missing
+        if since is not None and missing is not None:
+            self.runs = [_told_too_late(run, missing, since) if run.marked else run for run in self.runs]
         planned = self._planner.last()
         if planned.spec is not None:
             self._run(None, planned, planned.spec)
@@ -219,10 +223,12 @@ class _Execution:
 
     def _run(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
         process = self._process
+        if planned.needs_responder:
+            self._missing = process.missing
         answers = spec.collaborative and (process.missing is None or planned.needs_responder)
         first_call = len(process.calls)
         arena, camera = self._ground(spec, planned.obstacles)
-        program = self._sandboxes.spawn("robot", spec.program.limits, meter=self._meter)
+        program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
         try:
             bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()
@@ -254,6 +260,17 @@ class _Execution:
             return ""
         first = self._process.raised[0]
         return f"In {first.place}: {first.message}"
+
+
+def _told_too_late(run: Run, missing: str, since: int) -> Run:
+    """The run, with the cell that defines what would have answered it in the place of what was ``missing`` then."""
+    message = f"the responder is defined in cell {since}, after the robot of cell {run.cell} has run"
+    hint = f"Move cell {since} above cell {run.cell}."
+    faults = tuple(
+        replace(fault, message=message, hint=hint) if fault.who == "responder" and missing in fault.message else fault
+        for fault in run.recording.faults
+    )
+    return replace(run, recording=replace(run.recording, faults=faults))
 
 
 def _done(

@@ -55,6 +55,8 @@ class NotebookProcess(ResponderProcess):
         self._magics = 0
         #: Why nothing would answer the robot, if so; as of the last time that the cells told.
         self.missing: str | None = None
+        #: The cell by which something answers, if it does; None while nothing would.
+        self.answers_since: int | None = None
         #: What ended single cells, in their order, and what ended the process before its time.
         self.raised: list[Fault] = []
         self.stopped: Fault | None = None
@@ -75,6 +77,7 @@ class NotebookProcess(ResponderProcess):
                 frame = self._child.receive(self._schema)
                 if frame["do"] == "executed":
                     self.missing = frame["missing"]
+                    self._note_answering(self.missing is None)
                     return
                 self._take_cell(frame, perform)
                 if self._child is None:
@@ -117,6 +120,7 @@ class NotebookProcess(ResponderProcess):
         self._spend("", "sent")
         match frame["do"]:
             case "cell":
+                self._note_answering(frame["answers"])
                 self._cell = min(frame["place"] + 1, len(self._notebook.cells))
             case "raised":
                 fault = self.placed(error_fault(frame["error"], 0, "responder"))
@@ -135,6 +139,13 @@ class NotebookProcess(ResponderProcess):
                     self._child.send(reply)
             case _:
                 self._take(frame)
+
+    def _note_answering(self, answers: bool) -> None:
+        """What the cell that has just been executed has made of the responder."""
+        if not answers:
+            self.answers_since = None
+        elif self.answers_since is None:
+            self.answers_since = self._cell
 
     def _take(self, frame: wire.Frame) -> None:
         match frame["do"]:

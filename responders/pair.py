@@ -45,7 +45,7 @@ def run_pair(
                 children.callback(responder.close)
             bridges, layers = [], []
             for each, arena in zip(specs, arenas, strict=True):
-                program = sandboxes.spawn("robot", each.program.limits, meter=meter)
+                program = sandboxes.spawn(each.program.role, each.program.limits, meter=meter)
                 children.callback(program.close)
                 bridges.append(PairedBridge(each, arena, camera, program, meter))
                 layers.append(program.sandbox)

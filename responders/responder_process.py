@@ -14,7 +14,7 @@ from responders.conversation import Answer
 from responders.faults import error_fault, refusal, stopped, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import Child
+from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import ResponderSpec
 from sim.chance import Stream
 from sim.recording import SECOND, Call, Fault, Verdict
@@ -71,7 +71,7 @@ class ResponderProcess:
         self._slept = 0  # since then
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
-        self._child: Child | None = sandboxes.spawn("responder", spec.limits, folder, meter)
+        self._child: ServedChild | None = sandboxes.spawn("responder", spec.limits, folder, meter)
         self.sandbox = self._child.sandbox
         self._seed = seed
 

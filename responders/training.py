@@ -50,12 +50,13 @@ class TrainingSpec:
 class Named:
     """What the model called each image of a group, None where it gave no name.
 
-    ``fault`` is what had gone wrong by then, ``output`` all that had been printed.
+    ``fault`` is what had gone wrong by then, ``output`` all that had been printed, ``notes`` all that had been noted.
     """
 
     names: tuple[str | None, ...]
     fault: Fault | None
     output: str
+    notes: tuple[str, ...] = ()
 
 
 def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
@@ -95,7 +96,8 @@ def _named(called: Called, groups: Sequence[Sequence[Images]], spec: TrainingSpe
         end += len(group)
         missing = sum(map(len, group)) - len(names)
         output = "\n".join(itertools.chain.from_iterable(called.printed[: end + 1]))
-        yield Named((*names, *[None] * missing), _in_their_file(fault, spec), output)
+        notes = called.notes[: end + 1][-1]
+        yield Named((*names, *[None] * missing), _in_their_file(fault, spec), output, notes)
 
 
 def _names(returned: Returned, count: int) -> list[str | None] | None:

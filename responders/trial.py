@@ -38,7 +38,7 @@ def run_trial(
         if spec.responder is not None:
             responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter, agents)
         try:
-            program = sandboxes.spawn("robot", spec.program.limits, meter=meter)
+            program = sandboxes.spawn(spec.program.role, spec.program.limits, meter=meter)
             try:
                 unloadable = responder.load() if responder is not None else None
                 bridge = Bridge(spec, arena, camera, program, responder, meter)

@@ -5,6 +5,7 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -12,7 +13,9 @@ from typing import Literal
 
 from responders.channel import Channel
 from responders.code import Code
+from responders.sandbox.inside.libraries import LIBRARIES
 from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.zygote import Role
 from sim.chance import Stream
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
@@ -20,6 +23,7 @@ from sim.recording import TICK, Pose
 from sim.robot import Robot
 from sim.world import Noise
 
+_A_LIBRARY = re.compile(rf"\b(?:{'|'.join(LIBRARIES)})\b")
 Preamble = Literal["none", "imports", "preloaded"]
 
 
@@ -32,6 +36,13 @@ class ProgramSpec:
     limits: ChildLimits
     output_bytes: int
     modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def role(self) -> Role:
+        """Its process has the libraries loaded where one is named on a line with an import."""
+        texts = (self.code.text, *self.modules.values())
+        lines = (line for text in texts for line in text.splitlines() if "import" in line)
+        return "robot with libraries" if any(map(_A_LIBRARY.search, lines)) else "robot"
 
 
 @dataclass(frozen=True, slots=True)

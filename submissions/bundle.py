@@ -24,10 +24,11 @@ from submissions.agent_files import with_agents
 from submissions.assignment.definition import Parts
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
-from submissions.marked_cell import marked_site, sites
+from submissions.marked_cell import LAST, marked_site, sites
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
+from submissions.run_choice import asked_site
 from submissions.source_text import decode_source
 from submissions.submission import Notebook, Submission
 
@@ -154,6 +155,8 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         return fit_parts(alone, asked, where=where)
     if asked.program == "student":
         marked_site(notebook, asked.cell)
+        if submission.run is not None and asked.cell == LAST:
+            asked_site(notebook, submission.run)
     files, notes = dict(submission.files), list(submission.notes)
     for source in (submission.program, submission.responder):
         if source is not None:
@@ -179,6 +182,8 @@ def pack_submission(submission: Submission) -> bytes:
     meta = [f"student = {_toml_text(submission.student)}"]
     if submission.assignment is not None:
         meta.append(f"assignment = {_toml_text(submission.assignment)}")
+    if submission.run is not None:
+        meta.append(f"run = {_toml_text(submission.run)}")
     meta.append(f"notes = [{', '.join(map(_toml_text, submission.notes))}]")
     entries = dict(submission.files)
     for part, source in (("program", submission.program), ("responder", submission.responder)):
@@ -223,6 +228,7 @@ def unpack_submission(data: bytes) -> Submission:
         assignment=assignment if isinstance(assignment, str) else None,
         notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
         notebook=notebook,
+        run=_run_of(meta, "the kept submission"),
     )
 
 
@@ -248,6 +254,9 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     named = shown_name(_text_of(meta, "student", where) or student)
     if named != student:
         notes.append(f"{_META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
+    run = _run_of(meta, where)
+    if run is not None and notebook is None:
+        notes.append(f"{_META} says run = {shown_name(run)}, which is not used: there is no notebook.")
     return Submission(
         student=student,
         program=sources.get("program"),
@@ -256,6 +265,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         assignment=shown_name(assignment or candidate) or UNNAMED,
         notes=tuple(notes),
         notebook=notebook,
+        run=run if notebook is not None else None,
     )
 
 
@@ -363,6 +373,14 @@ def _text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
     if value is not None and (not isinstance(value, str) or not value.strip()):
         raise UsageError(f'{where}: {key} in {_META} is not a text, expected {key} = "..." there.')
     return value
+
+
+def _run_of(meta: Mapping[str, object], where: str) -> str | None:
+    """Which run of a notebook is to be marked: a number, or the tag of a cell."""
+    value = meta.get("run")
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    return _text_of(meta, "run", where)
 
 
 def _toml_text(text: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
-from submissions.magics import is_program_magic, magic_place
+from submissions.magics import is_program_magic, magic_place, parse_flags, parse_magic
 from submissions.raw_files import shown
 from submissions.submission import Cell, Notebook
 
@@ -22,6 +22,7 @@ _LINE = re.compile(
     r"""(?:%sim_magic[ \t]+|\.run_line_magic\([ \t]*['"]sim_magic['"][ \t]*,[ \t]*f?['"])(?P<flags>.*)"""
 )
 _AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
+_EXPANDED = re.compile(r"[{$]")
 #: A line that was to begin a robot program.
 NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
@@ -72,6 +73,37 @@ def program_of(notebook: Notebook, site: Site) -> Cell | None:
     """The cell with the program that is run at ``site``: itself, or the last one loaded before it."""
     before = [each for each in programs(notebook) if (each.cell, each.line) <= (site.cell, site.line)]
     return next((cell for cell in notebook.cells if before and cell.number == before[-1].cell), None)
+
+
+def named_floors(notebook: Notebook) -> dict[Site, str]:
+    """The floor that each place has by the last ``-b`` at or above it; none where it follows from running."""
+    found: dict[Site, str] = {}
+    floor: str | None = None
+    starts = set(sites(notebook))
+    for cell in notebook.cells:
+        program = _program(cell)
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            site = Site(cell.number, number)
+            named = _floor(line, site == program)
+            floor = named or floor
+            if site in starts and floor is not None and not _EXPANDED.search(floor):
+                found[site] = floor
+    return found
+
+
+def _floor(line: str, program: bool) -> str | None:
+    """The background that a magic's line names."""
+    again = _LINE.search(line)
+    try:
+        if program:
+            flags = parse_magic(line.lstrip("\ufeff").strip())
+        elif again:
+            flags = parse_flags("sim_magic", re.split(r"""['"]""", again["flags"])[0])
+        else:
+            return None
+    except UsageError:
+        return None
+    return flags.values.get("b")
 
 
 def _tagged(notebook: Notebook, tag: str) -> Site:

@@ -41,6 +41,7 @@ class Submission:
     assignment: str | None = None  # named by the submission's submission.toml or its parent folder
     notes: tuple[str, ...] = ()  # what was ignored, stepped into or renamed while reading
     notebook: Notebook | None = None
+    run: str | None = None  # of the notebook: the number or the tag of the one to be marked, where anybody says so
 
     @property
     def sha256(self) -> str:
@@ -71,5 +72,7 @@ class Submission:
             yield "notebook", self.notebook.name
             for cell in self.notebook.cells:
                 yield "cell", str(cell.number), cell.source, *cell.tags
+            if self.run is not None:
+                yield "run", self.run
         for name in sorted(self.files):
             yield "file", name, self.files[name]

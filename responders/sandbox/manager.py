@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -17,8 +17,11 @@ from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.inside import grants
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import PrivateFolders
-from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.running_child import Child, ChildLimits, ServedChild
 from responders.sandbox.zygote import FULL, ROLES, Isolation, Role, Zygote, own_modules
+
+#: Of a role, its folder, its job's meter and what makes a child: the child, or what stands for it.
+StandIn = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]
 
 
 class Sandboxes:
@@ -31,16 +34,22 @@ class Sandboxes:
         self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
+        self._stand_in: StandIn | None = None
         self._forgets_until = 0.0
         self._cpu_of_closed = 0.0
 
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
-    ) -> Child:
+    ) -> ServedChild:
         """A fresh child for a robot program or a responder, in a ``private_folder`` or without one.
 
         What it costs is counted by ``meter``, that of its job.
         """
+        if self._stand_in is not None:
+            return self._stand_in(role, folder, meter, lambda: self._fork(role, limits, folder, meter))
+        return self._fork(role, limits, folder, meter)
+
+    def _fork(self, role: Role, limits: ChildLimits, folder: Path | None, meter: JobMeter | None) -> Child:
         if self._group is not None:
             self._living = [(child, allowed) for child, allowed in self._living if not child.closed]
             self._group.make_room(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
@@ -57,6 +66,15 @@ class Sandboxes:
             yield
         finally:
             self._blamed = False
+
+    @contextlib.contextmanager
+    def standing_in(self, stand_in: StandIn) -> Iterator[None]:
+        """Meanwhile ``stand_in`` says whether a child is needed, or what stands for it."""
+        self._stand_in = stand_in
+        try:
+            yield
+        finally:
+            self._stand_in = None
 
     def check(self, role: Role = "robot") -> str:
         """Let a child try to get out of its sandbox; say which layers hold. Raises SandboxMissing if any does not."""

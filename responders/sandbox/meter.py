@@ -13,7 +13,7 @@ from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 #: What an object that is kept costs beside its text.
-_OBJECT_BYTES = 256
+OBJECT_BYTES = 256
 #: What each child may sleep before it counts: answers are not fetched in no time, least of all on a busy machine.
 _FREE_SLEEP_SECONDS = 0.5
 
@@ -77,7 +77,7 @@ class JobMeter:
 
     def keep(self, size: int) -> None:
         """Pay for an object with ``size`` bytes of text, before it is kept. Raises ChildStopped."""
-        self._kept += size + _OBJECT_BYTES
+        self._kept += size + OBJECT_BYTES
         if self._kept > self._limits.kept_bytes:
             raise ChildStopped(
                 Verdict.OUTPUT_LIMIT,

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from responders import packed, wire
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -60,6 +60,27 @@ class ChildLimits:
 
 class KilledFromOutside(HostError):
     """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
+
+
+class ServedChild(Protocol):
+    """What a bridge, a responder's process or a notebook's needs of a child."""
+
+    sandbox: str
+
+    def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
+        """Send one frame, with what has ``arrived`` as JSON."""
+
+    def send_readings(self, units: int, values: Sequence[float]) -> None:
+        """Answer a reading to which nothing has arrived."""
+
+    def receive(self, schema: wire.Schema) -> wire.Frame:
+        """The next frame. Raises ChildStopped."""
+
+    def cpu_seconds(self) -> float:
+        """What the child has used so far."""
+
+    def close(self) -> None:
+        """End the child."""
 
 
 class Child:
@@ -306,9 +327,11 @@ class Child:
             if not more:
                 break
             data += more
-        for line in reversed(data.splitlines()):
+        for line in reversed(data.split(b"\n")):
+            # Packed acts may stand before it.
+            start = max(line.rfind(wire.BEGINNING), 0)
             with contextlib.suppress(wire.WireError):
-                frame = wire.parse(wire.unnumbered(line)[1], {"busy": wire.ROBOT["busy"]})
+                frame = wire.parse(wire.unnumbered(line[start:])[1], {"busy": wire.ROBOT["busy"]})
                 return frame
         return _NOWHERE
 

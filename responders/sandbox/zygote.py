@@ -30,7 +30,7 @@ from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from sim.errors import HostError
 
-Role = Literal["robot", "responder"]
+Role = Literal["robot", "robot with libraries", "responder"]
 Work = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
@@ -40,7 +40,11 @@ _RECYCLE_AFTER = 1000
 #: How a zygote tells that a child has ended: the wait status, seconds and microseconds of the user's and the system's.
 _ENDED = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
-_FOLDERS: dict[Role, tuple[str, str]] = {"robot": ("sim", "brick"), "responder": ("responders", "kit")}
+_FOLDERS: dict[Role, tuple[str, str]] = {
+    "robot": ("sim", "brick"),
+    "robot with libraries": ("sim", "brick"),
+    "responder": ("responders", "kit"),
+}
 ROLES: tuple[Role, ...] = tuple(_FOLDERS)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from responders.repeated_faults import SPARED, Diverged, RepeatedFaults
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
@@ -25,7 +26,7 @@ from sim.chance import Stream
 from sim.errors import AssignmentError
 from sim.floors import Floor, floor, floor_from_image
 from sim.motion import Physics
-from sim.recording import BROWSER_TICK, TICK
+from sim.recording import BROWSER_TICK, TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
@@ -92,7 +93,13 @@ def grade(
         trials=tuple(results),
         sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code was run",
         grader_version=GRADER_VERSION,
-        notes=(*submission.notes, *plan.notes, *plan.trial.notes_on_all(results), *_unjudged_notes(criteria)),
+        notes=(
+            *submission.notes,
+            *plan.notes,
+            *plan.trial.notes_on_all(results),
+            *_spared_notes(results),
+            *_unjudged_notes(criteria),
+        ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
         hints=hints_for(submission, plan, results, criteria),
         secret_sha256=secret.sha256,
@@ -107,6 +114,7 @@ def _run_trials(
     if any(trial.scenario.visibility != "visible" for trial in trials):
         runner.check_forgetting()
     run: dict[int, TrialResult] = {}
+    repeats = RepeatedFaults()
     for number in _run_order(trials, plan.child_seed):
         trial = trials[number]
         run[number] = TrialResult(
@@ -116,12 +124,24 @@ def _run_trials(
             trial.light_noise,
             trial.motor_noise,
             trial.scenario.visibility,
-            plan.trial.run(_spec(trial, plan), plan.assignment.world.obstacles, runner, meter),
+            _recorded(trial, plan, runner, meter, repeats),
             trial.sweep,
             trial.place,
         )
         watch.finished_one()
     return [run[number] for number in range(len(trials))]
+
+
+def _recorded(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: RepeatedFaults) -> Recording:
+    """One trial, without the children that would only do again what they did before."""
+    spec, obstacles, before = _spec(trial, plan), plan.assignment.world.obstacles, meter.spent
+    with runner.sparing(repeats):
+        try:
+            return repeats.ran(plan.trial.run(spec, obstacles, runner, meter))
+        except Diverged:
+            meter.give_back(before)
+            repeats.again()
+            return repeats.ran(plan.trial.run(spec, obstacles, runner, meter))
 
 
 def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
@@ -134,6 +154,18 @@ def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
     return sorted(
         range(len(trials)),
         key=lambda number: (trials[number].scenario.visibility != "visible", chance.integer(number)),
+    )
+
+
+def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
+    """By which rule trials have been spared a child; how many hidden ones were is not told."""
+    shown = [result.recording.notes for result in results if result.visibility == "visible"]
+    counts = [(note, sum(note in notes for notes in shown)) for note in SPARED.values()]
+    return tuple(
+        f"{note.replace('this trial', f'{count} of {len(shown)} trials')}: two trials had ended in the same fault, it "
+        "uses no chance, and it was told nothing else, so it would have done the same"
+        for note, count in counts
+        if count
     )
 
 

@@ -18,34 +18,38 @@ from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
 from submissions.magics import Flags, Setup
-from submissions.marked_cell import LAST, Site
+from submissions.marked_cell import Site
+from submissions.run_choice import RunChoice
 
 
 @dataclass(frozen=True, slots=True)
 class NotebookTrial:
     """How each trial executes the notebook, and which run in it is marked.
 
-    ``which`` is the assignment's word for the cell at ``site``; both are None when the program is the assignment's.
+    ``choice`` is None when the program is the assignment's.
     With ``as_read`` the text of the trial's spec is what is run: its rules were held against that, and a notebook can
     hand over another. The seed in ``notebook`` is set for each trial.
     """
 
     notebook: NotebookSpec
-    site: Site | None
-    which: str | None
+    choice: RunChoice | None
     as_read: bool = False
 
     def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
         """The recording of the marked run, with what the whole notebook told.
 
-        Where the last robot program is marked and was never come to, the last that did run is marked instead.
+        Where it was never come to, another that did run is marked instead, if the choice has others.
         Raises HostError when the machine fails, and whatever the meter's heartbeat raises.
         """
-        site = self.site
+        site = self.choice.site if self.choice is not None else None
         executed, started = self._execute(spec, obstacles, site, runner, meter)
-        if executed.marked is None and self.which == LAST and started:
-            site = started[-1]
-            executed, _ = self._execute(spec, obstacles, site, runner, meter)
+        instead = self._instead(started) if executed.marked is None else None
+        if instead is not None:
+            assert site is not None
+            never = f"the run of cell {site.cell} was never come to, so that of cell {instead.cell} is marked"
+            executed, _ = self._execute(spec, obstacles, instead, runner, meter)
+            executed = replace(executed, notes=(never, *executed.notes))
+            site = instead
         if executed.marked is None:
             return executed.told(runner.never_ran(spec, obstacles, _why_not(executed, site), executed.sandbox))
         recording = executed.marked.recording
@@ -55,6 +59,12 @@ class NotebookTrial:
             faults = (*faults, replace(executed.stopped, t=recording.end_t))
         verdict = faults[0].verdict if faults else Verdict.FINISHED
         return executed.told(replace(recording, faults=faults, verdict=verdict))
+
+    def _instead(self, started: Sequence[Site]) -> Site | None:
+        """What is marked for a run that no cell came to; None where just that one is asked for."""
+        if self.choice is None or self.choice.only or not started:
+            return None
+        return next((site for site in self.choice.others if site in started), started[-1])
 
     def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
         """What the cells could not do is much the same in every trial, and told once.
@@ -93,7 +103,7 @@ class NotebookTrial:
         notebook = replace(self.notebook, seed=spec.child_seed)
 
         def execute() -> tuple[ExecutedNotebook, list[Site]]:
-            planner = NotebookRuns(site, marked_run, unmarked, planned if self.which is None else PlannedRun())
+            planner = NotebookRuns(site, marked_run, unmarked, planned if self.choice is None else PlannedRun())
             return runner.execute_notebook(notebook, planner, meter), planner.started
 
         return runner.undisturbed(execute, meter)

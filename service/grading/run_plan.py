@@ -29,8 +29,9 @@ from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program, without_magic
-from submissions.marked_cell import marked_site, program_of
+from submissions.marked_cell import program_of
 from submissions.plain_cells import python_of
+from submissions.run_choice import RunChoice, choose_run
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
 from submissions.submission import Notebook, Submission
 
@@ -161,7 +162,8 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     if asked.program != "student":
         flags, text, notes = _flags(assignment.given_parts[asked.program], assignment)
         return _executed(submission, notebook, assignment, Code(asked.program, text), flags, notes)
-    site = marked_site(notebook, asked.cell)
+    choice = choose_run(notebook, assignment, submission.run)
+    site = choice.site
     cell = program_of(notebook, site)
     flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
@@ -169,15 +171,16 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
         notes = tuple(note for note in notes if not note.startswith(_IGNORED))
         if cell is not None:
             again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
-            notes = (f"the robot program in cell {cell.number} of {notebook.name} is marked{again}", *notes)
-        return _executed(submission, notebook, assignment, Code(notebook.name, text), flags, notes)
+            marked = f"the robot program in cell {cell.number} of {notebook.name} is marked{again}"
+            notes = (marked, *choice.notes, *notes)
+        return _executed(submission, notebook, assignment, Code(notebook.name, text), flags, notes, choice)
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
     responder = _part("responder", "responder.py", asked.responder, None, assignment)
     files = _files(submission, assignment, asked.program)
     program = _program(Code(f"cell {cell.number}", text), flags, files, assignment)
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
-    notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run",)
+    notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
     return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
 
 
@@ -212,6 +215,7 @@ def _executed(
     program: Code | None,
     flags: Flags,
     notes: tuple[str, ...],
+    choice: RunChoice | None = None,
 ) -> RunPlan:
     """A notebook from top to bottom; what in it is no robot program stands for the responder."""
     files = _files(submission, assignment, "student")
@@ -219,9 +223,7 @@ def _executed(
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, sources, files, functions.limits, functions.output_bytes, 0)
-    asked = assignment.parts
-    which = asked.cell if asked.program == "student" else None
-    as_read = which is not None and any(
+    as_read = choice is not None and any(
         isinstance(each, SourceRules) and each.part == "program" for each in assignment.criteria
     )
     read_as: dict[Part, Mapping[str, Any]] = {
@@ -231,8 +233,10 @@ def _executed(
         read_as["program"] = {"text": program.text}
     return RunPlan(
         assignment,
-        NotebookTrial(spec, marked_site(notebook, which) if which is not None else None, which, as_read),
-        _program(program, flags, _files(submission, assignment, asked.program), assignment) if program else None,
+        NotebookTrial(spec, choice, as_read),
+        _program(program, flags, _files(submission, assignment, assignment.parts.program), assignment)
+        if program
+        else None,
         None,
         functions,
         True,

@@ -112,6 +112,7 @@ def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str |
         faults=faults,
         verdict=faults[0].verdict if faults else Verdict.FINISHED,
         responder_output=gave.output,
+        notes=(*recording.notes, *gave.notes),
         sha256=hashlib.sha256(proof.encode()).hexdigest(),
     )
 

@@ -16,6 +16,7 @@ from responders.function_calls import Called, FunctionCall, call_functions
 from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
 from responders.notebook_process import NotebookSpec
 from responders.pair import run_pair
+from responders.repeated_faults import RepeatedFaults
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
@@ -45,15 +46,21 @@ class TrialRunner:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
 
     ``slots`` are those of the machine's graders; without them there is no other. A ``meter`` counts what one job costs.
-    All student code runs in ``group``, where there is one, which is closed with the runner.
+    All student code runs in ``group``, where there is one, which is closed with the runner. Unless it ``spares``
+    children that would only do again what they did before, every child is run.
     """
 
     def __init__(
-        self, isolation: Isolation = FULL, slots: Slots | None = None, group: ControlGroup | None = None
+        self,
+        isolation: Isolation = FULL,
+        slots: Slots | None = None,
+        group: ControlGroup | None = None,
+        spares: bool = True,
     ) -> None:
         remove_left_overs()
         self._slots = slots
         self._sandboxes = Sandboxes(isolation, group)
+        self._spares = spares
         self._forgets = isolation.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
@@ -107,6 +114,10 @@ class TrialRunner:
             ),
             meter,
         )
+
+    def sparing(self, repeats: RepeatedFaults) -> AbstractContextManager[None]:
+        """Meanwhile children are not run of whom ``repeats`` knows what they would do."""
+        return self._sandboxes.standing_in(repeats.child) if self._spares else nullcontext()
 
     def check_sandbox(self) -> str:
         """Which layers stand round student code here. Raises SandboxMissing when one cannot be put up."""

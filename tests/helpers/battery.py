@@ -326,7 +326,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
         child.send(
             job
             | (
-                {"preamble": "none", "sensors": [], "modules": {}, "tick": TICK}
+                {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK}
                 if role == "robot"
                 else {"function": None}
             )

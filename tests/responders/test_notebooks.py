@@ -195,7 +195,7 @@ def test_marked_by_tag_by_number_or_the_last(tmp_path: Path, runner: TrialRunner
 
 
 def test_a_program_without_autorun_is_run_when_it_is_the_marked_one(tmp_path: Path, runner: TrialRunner) -> None:
-    cells = [RESPONDER, two_programs("one"), '%%sim_magic_preloaded -b Loop\nsay("two")']
+    cells = [RESPONDER, two_programs("one"), '%%sim_magic_preloaded\nsay("two")']
     assert spoken(recorded(tmp_path, runner, cells)) == ["two"]
 
 
@@ -208,6 +208,24 @@ def test_a_last_program_that_is_never_come_to_gives_way_to_the_last_that_ran(
     recording = recorded(tmp_path, runner, [RESPONDER, two_programs("one"), cell])
     assert (spoken(recording), recording.verdict) == (["one"], Verdict.FINISHED)
     assert recording.start.x == 300
+
+
+def test_what_is_marked_instead_is_told(tmp_path: Path, runner: TrialRunner) -> None:
+    cells = [RESPONDER, PROGRAM, two_programs("two"), "if False:\n    %sim_magic -R -b Simple_Shapes"]
+    result = graded(tmp_path, runner, [*cells[:1], PROGRAM.replace("Loop", "Simple_Shapes"), *cells[2:]])
+    assert spoken(result.trials[0].recording) == ["done"]
+    assert any("that is run 1 of 3, the last that fits" in note for note in result.notes)
+    never = graded(tmp_path, runner, [RESPONDER, two_programs("one"), cells[3]])
+    assert "the run of cell 3 was never come to, so that of cell 2 is marked" in never.notes
+
+
+def test_a_responder_that_comes_too_late_is_told_with_its_cell(tmp_path: Path, runner: TrialRunner) -> None:
+    recording = recorded(tmp_path, runner, [PROGRAM, "x = 1", RESPONDER, "y = 2"])
+    told = {(fault.message, fault.hint) for fault in recording.faults}
+    assert told == {
+        ("the responder is defined in cell 3, after the robot of cell 1 has run", "Move cell 3 above cell 1.")
+    }
+    assert "there is no responder" in recorded(tmp_path, runner, [PROGRAM, "x = 1"]).faults[0].message
 
 
 def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, runner: TrialRunner) -> None:
@@ -442,7 +460,7 @@ def test_no_responder_is_a_fault_with_the_cell_that_may_be_why(tmp_path: Path, r
     (fault,) = recording.faults
     assert fault.verdict is Verdict.RESPONDER_ERROR
     assert "there is no responder" in fault.message
-    assert fault.hint == "In cell 1, line 1: ModuleNotFoundError: No module named 'torch'"
+    assert fault.hint.startswith("In cell 1, line 1: ModuleNotFoundError: No module named 'torch': numpy, pandas,")
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ class NotebookRole(ResponderRole):
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
         above = 0
         for place, source in enumerate(self._spec["cells"]):
-            self._wire.send({"do": "cell", "place": place})
+            self._wire.send({"do": "cell", "place": place, "answers": self._missing() is None})
             error = self._execute(source, above)
             if error is not None:
                 self._wire.send({"do": "raised", "error": error})

@@ -13,9 +13,10 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
+from .libraries import WORDS
 from .student_code import StudentFiles, compile_source, is_module_file
 
 Source = Callable[[str], str | None]
@@ -59,6 +60,14 @@ def _is_taken(name: str) -> bool:
     return False
 
 
+def _importer() -> CodeType:
+    """The code that has the import statement, or calls for it."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith((__file__, "<frozen ")):
+        frame = frame.f_back
+    return frame.f_code
+
+
 class _OwnModules(MetaPathFinder, Loader):
     def __init__(self, source: Source, files: StudentFiles) -> None:
         self._source = source
@@ -68,6 +77,8 @@ class _OwnModules(MetaPathFinder, Loader):
         if not fullname.isidentifier():
             return None
         text = self._source(fullname)
+        if text is None and self._files.has(_importer().co_filename):
+            raise ModuleNotFoundError(f"No module named {fullname!r}: {WORDS} are there", name=fullname)
         if text is None:
             return None
         file = f"{fullname}.py"

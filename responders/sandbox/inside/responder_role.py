@@ -51,6 +51,7 @@ class ResponderRole:
 
         signal.signal(signal.SIGXCPU, self._busy)
         student_code.install_output(self._emit)
+        student_code.install_warnings(self._refused)
         determinism.install_clock(lambda: self._units, self._sleep)
         determinism.install_chance(self._spec["seed"])
         refusals.install(self._grants, self._files, self._refused)

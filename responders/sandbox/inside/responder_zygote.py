@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 
-from . import model_files, source_reader  # noqa: F401
+from . import libraries, model_files, source_reader  # noqa: F401
 from .agent_role import AgentRole
 from .frames import Wire
 from .lockdown import Grants
@@ -18,21 +18,6 @@ from .responder_role import ResponderRole
 #: What answering takes.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
 _PRELOADED = (
-    "joblib",
-    "numpy",
-    "numpy.random",
-    "pandas",
-    "PIL.Image",
-    "sklearn.ensemble",
-    "sklearn.linear_model",
-    "sklearn.metrics",
-    "sklearn.model_selection",
-    "sklearn.neighbors",
-    "sklearn.neural_network",
-    "sklearn.pipeline",
-    "sklearn.preprocessing",
-    "sklearn.svm",
-    "sklearn.tree",
     "json",
     "math",
     "re",
@@ -45,6 +30,7 @@ _PRELOADED = (
 
 def preload(without: list[str]) -> None:
     """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
+    libraries.preload(without)
     missing = (ImportError,) if without else ()
     for name in _PRELOADED:
         with contextlib.suppress(*missing):
@@ -52,16 +38,6 @@ def preload(without: list[str]) -> None:
     model_files.preload_runtimes()
     with contextlib.suppress(*missing):
         model_files.explain_joblib()
-        _ask_the_machine()
-
-
-def _ask_the_machine() -> None:
-    """What scikit-learn asks once about libraries and processors, where it may still open files: neighbours need it."""
-    import joblib
-    from sklearn.utils.parallel import _get_threadpool_controller
-
-    _get_threadpool_controller()
-    joblib.cpu_count(only_physical_cores=True)
 
 
 def run(wire: Wire, grants: Grants) -> None:

@@ -48,17 +48,18 @@ def run(wire: Wire, grants: Grants) -> None:
     def sleep(units: int) -> None:
         link.wait_units(units)
 
-    def refused(what: str) -> None:
+    def told(what: str) -> None:
         wire.send({"do": "refused", "what": what, **files.place(sys._getframe())})
 
     signal.signal(signal.SIGXCPU, busy)
     link.number = spec.get("number", 1)
     link.connect(wire, stuck, spec["sensors"], spec["tick"])
     student_code.install_output(emit)
+    student_code.install_warnings(told)
     determinism.install_clock(now, sleep)
     determinism.install_chance(spec["seed"])
-    refusals.install(grants, files, refused)
-    own_modules.install(own_modules.given(spec["modules"]), spec["modules"], files, refused)
+    refusals.install(grants, files, told)
+    own_modules.install(own_modules.given(spec["modules"]), spec["modules"], files, told)
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
     wire.send({"do": "end", "error": _execute(spec, PREAMBLES[spec["preamble"]], module.__dict__, files)})

@@ -10,7 +10,7 @@ import shlex
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from . import refusals
+from . import libraries, refusals
 from .cell_source import LINE_WRAPPERS, WRAPPERS, wrapped
 
 _ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
@@ -30,9 +30,7 @@ _PROGRAMS = frozenset(
     ("bash", "sh", "script", "sx", "system", "cmd", "perl", "ruby", "python", "python2", "python3", "pypy", "R")
 )
 _PACKAGES = frozenset(("pip", "pip3", "conda", "mamba"))
-_NO_PACKAGES = (
-    "packages cannot be installed here; numpy, pandas, scikit-learn, joblib, Pillow and the course's modules are there"
-)
+_NO_PACKAGES = f"packages cannot be installed here; {libraries.WORDS} are there"
 
 
 class RunRequester(Protocol):

@@ -18,6 +18,7 @@ from typing import Any
 from .frames import Frame, clip
 from .near_names import meant_by
 
+_MOST_WARNINGS, _LONGEST_WARNING = 20, 180
 Namespace = dict[str, Any]
 
 
@@ -152,7 +153,6 @@ def install_output(emit: Callable[[str], None]) -> None:
     stream = Output(emit)
     sys.stdout = sys.stderr = stream
     sys.stdin = None
-    warnings.formatwarning = _without_its_folder
     real_print = builtins.print
 
     def one_text(
@@ -173,6 +173,19 @@ def install_output(emit: Callable[[str], None]) -> None:
     builtins.input = no_input
 
 
-def _without_its_folder(message: Any, category: type[Warning], filename: str, lineno: int, line: Any = None) -> str:
-    """As Python has it, but for the folder of the file, which is another on each machine."""
-    return f"{os.path.basename(filename)}:{lineno}: {category.__name__}: {message}\n"
+def install_warnings(tell: Callable[[str], None]) -> None:
+    """Let a warning be no text of the student's, whoever it comes from: ``tell(sentence)``, once for each of the first.
+
+    It is told from within what has warned.
+    """
+    told: set[str] = set()
+
+    def show(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
+    ) -> None:
+        sentence = f"{category.__name__}: {message}"
+        if sentence not in told and len(told) < _MOST_WARNINGS:
+            told.add(sentence)
+            tell(clip(sentence, _LONGEST_WARNING))
+
+    warnings.showwarning = show

@@ -39,6 +39,8 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     control = socket.socket(fileno=3)
     if role_name == "robot":
         from . import robot_role as role
+    elif role_name == "robot with libraries":
+        from . import robot_with_libraries as role  # type: ignore[no-redef]
     else:
         from . import responder_zygote as role  # type: ignore[no-redef]
     for name in role.NEEDED:

@@ -27,7 +27,7 @@ def marks_csv(rows: Sequence[TableRow[View]]) -> str:
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
-    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "hints", "file", "reason"]
+    header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "notes", "hints", "file", "reason"]
     return csv_text([header, *(_wide(row, criteria) for row in rows)])
 
 
@@ -53,7 +53,7 @@ def safe_cell(value: str) -> str:
 
 def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
     grade = None if row.grade is None else row.grade.grade
-    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 2)
+    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 3)
     return [*_who(row), *marked, row.source, row.reason]
 
 
@@ -71,6 +71,7 @@ def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
         "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
+        "; ".join(grade.notes[:20]),
         " ".join(hints_of(grade)),
     ]
 

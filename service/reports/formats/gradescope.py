@@ -92,4 +92,5 @@ def _output(view: GradebookView) -> str:
     lines = [*hints_of(shown), words.happened, words.whose, words.next_step]
     for group in fault_groups(shown, limit=10):
         lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
+    lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]
     return "\n".join([*lines, f"sandbox: {shown.sandbox}"])

@@ -107,4 +107,5 @@ def _properties(grade: Grade) -> list[tuple[str, str]]:
         ("submission", grade.submission),
         ("sandbox", grade.sandbox),
         ("grader_version", grade.grader_version),
+        *(("note", note) for note in grade.notes[:20]),
     ]

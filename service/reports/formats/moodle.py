@@ -101,6 +101,7 @@ def _marks(row: TableRow[GradebookView]) -> str:
 def _feedback(row: TableRow[GradebookView]) -> str:
     told = [] if row.grade is None else row.grade.shown.criteria
     lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
+    lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
     hints = () if row.grade is None else hints_of(row.grade.shown)

@@ -1,0 +1,139 @@
+"""Trials that are spared a child: their recordings and marks are those of running it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from responders.repeated_faults import SPARED
+from service.grading.example_check import example_names
+from service.grading.grade import Grade
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+from sim.recording import Recording, Ticks, Verdict
+from submissions.assignment.examples import examples, expected
+from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.bundle import read_submission
+
+TOML = """
+id = "fails"
+title = "Fails"
+[[scenario]]
+id = "one"
+poses = [[300, 700, 0], [500, 500, 90]]
+trials = 2
+seconds = 5
+light_noise = 20
+motor_noise = 20
+[limits]
+program_cpu = 0.2
+responder_cpu = 0.2
+[[criterion]]
+title = "Ends"
+marks = 1
+check = "finishes"
+"""
+ECHO = "def responder(text):\n    return text\n"
+ASKS = 'import time\nprint("PY::hi")\ntime.sleep(1)\nspeed = colorLeft.reflected_light_intensity\n'
+BUSY = "def responder(text):\n    while True:\n        pass\n"
+_NO_TICKS = Ticks(*[np.empty(0)] * 9)  # the same object in both
+
+
+@pytest.fixture(scope="module")
+def runs_all() -> Iterator[TrialRunner]:
+    with TrialRunner(spares=False) as every:
+        yield every
+
+
+def all_but_ticks(recording: Recording) -> Recording:
+    """What is left to compare once the chain has told of the ticks; a loop that is cut is in another line each time."""
+    faults = (replace(each, line=None) if each.verdict is Verdict.CPU_LIMIT else each for each in recording.faults)
+    notes = (note for note in recording.notes if note not in SPARED.values())
+    return replace(recording, faults=tuple(faults), notes=tuple(notes), ticks=_NO_TICKS)
+
+
+def spared(graded: Grade, role: str) -> list[int]:
+    return [number for number, each in enumerate(graded.trials) if SPARED[role] in each.recording.notes]
+
+
+@pytest.mark.parametrize(
+    ("files", "role", "count"),
+    [
+        ({"robot.py": "print(wheel)"}, "robot", 2),
+        ({"robot.py": "tank_drive.on_for_seconds(30, 30, 1)\nwhile True:\n    x = 1\n    y = 2\n"}, "robot", 2),
+        ({"robot.py": "print('PY::hi')\nimport time\ntime.sleep(1)\n1/0\n"}, "robot", 2),
+        ({"robot.py": "import helper\nhelper.fail()\n", "helper.py": "def fail():\n    1/0\n"}, "robot", 2),
+        # What the world tells it differs.
+        ({"robot.py": "speed = colorLeft.reflected_light_intensity\n1/0\n"}, "robot", 0),
+        # It may use chance.
+        ({"robot.py": "import random\nif random.random() < 2:\n    1/0\n"}, "robot", 0),
+        ({"robot.py": "import ｒandom\n1/0\n"}, "robot", 0),
+        ({"robot.py": "import helper\n1/0\n", "helper.py": "from random import random\n"}, "robot", 0),
+        ({"robot.py": "__import__('ran' + 'dom').random()\n1/0\n"}, "robot", 0),
+        ({"robot.py": "import \\\n random\n1/0\n"}, "robot", 0),
+        ({"robot.py": ASKS, "responder.py": BUSY}, "responder", 2),
+        ({"robot.py": ASKS, "responder.py": "import numpy\n" + BUSY}, "responder", 0),
+        ({"robot.py": ASKS, "responder.py": "open('logger.txt', 'w').write('x')\n" + BUSY}, "responder", 0),
+        # An error in a responder costs nothing.
+        ({"robot.py": ASKS, "responder.py": "1/0\n"}, "responder", 0),
+    ],
+)
+def test_a_spared_trial_is_what_running_it_gives(
+    tmp_path: Path, runner: TrialRunner, runs_all: TrialRunner, files: Mapping[str, str], role: str, count: int
+) -> None:
+    (tmp_path / "assignment.toml").write_text(TOML)
+    asked = read_assignment(tmp_path)
+    (tmp_path / "ada").mkdir()
+    for name, text in {"responder.py": ECHO, **files}.items():
+        (tmp_path / "ada" / name).write_text(text)
+    submission = read_submission(tmp_path / "ada", asked=asked.parts)
+    found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
+    assert (len(spared(found, role)), len(spared(wanted, role))) == (count, 0)
+    for one, other in zip(found.trials, wanted.trials, strict=True):
+        assert one.recording.sha256 == other.recording.sha256
+        assert all_but_ticks(one.recording) == all_but_ticks(other.recording)
+    assert [each.marks for each in found.criteria] == [each.marks for each in wanted.criteria]
+    told = [note for note in found.notes if "it would have done the same" in note]
+    assert [f"in {count} of 4 trials" in note for note in told] == ([True] if count else [])
+
+
+def test_how_many_hidden_trials_were_spared_is_not_told(tmp_path: Path, runner: TrialRunner) -> None:
+    hidden = 'seconds = 5\n[[scenario]]\nid = "two"\nvisibility = "hidden"\nposes = [[300, 700, 0], [400, 700, 0]]\n'
+    (tmp_path / "assignment.toml").write_text(TOML.replace("seconds = 5\n", hidden + "seconds = 5\n"))
+    asked = read_assignment(tmp_path)
+    (tmp_path / "ada").mkdir()
+    (tmp_path / "ada" / "robot.py").write_text("print(wheel)")
+    (tmp_path / "ada" / "responder.py").write_text(ECHO)
+    graded = grade(read_submission(tmp_path / "ada", asked=asked.parts), asked, runner=runner)
+    assert len(spared(graded, "robot")) == len(graded.trials) - 2
+    visible = [each for each in graded.trials if each.visibility == "visible"]
+    assert any(f"in {len(visible) - 2} of {len(visible)} trials" in note for note in graded.notes)
+
+
+def _faulty() -> list[tuple[str, str]]:
+    catalogue = Path(find_assignment.__code__.co_filename).parents[1] / "catalogue"
+    names = sorted(path.name for path in catalogue.iterdir() if (path / "assignment.toml").is_file())
+    return [
+        (name, example)
+        for name in names
+        for example in example_names(name)
+        if (wanted := expected(name).examples.get(example)) is not None and wanted.verdict is not Verdict.FINISHED
+    ]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "example"), _faulty())
+def test_faulty_examples_get_the_same_with_every_trial_run(
+    runner: TrialRunner, runs_all: TrialRunner, name: str, example: str
+) -> None:
+    asked = find_assignment(name)
+    submission = read_submission(examples(name) / example, asked=asked.parts)
+    found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
+    assert [(each.id, each.marks) for each in found.criteria] == [(each.id, each.marks) for each in wanted.criteria]
+    assert [each.verdict for each in found.trials] == [each.verdict for each in wanted.trials]
+    pairs = zip(found.trials, wanted.trials, strict=True)
+    assert all(one.recording.sha256 == other.recording.sha256 for one, other in pairs)
