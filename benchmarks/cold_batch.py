@@ -46,6 +46,6 @@ def _cold() -> float:
             shutil.copytree(examples(_ASSIGNMENT) / REFERENCE, own)
             # A text of its own, or it would be a copy of the one before, which is not run again.
             (own / "robot.py").write_text(f"# {number}\n" + (own / "robot.py").read_text())
-        command = [*ROBOMARK, "batch", "submit", str(batch), "-a", _ASSIGNMENT, "--report", str(reports)]
+        command = [*ROBOMARK, "batch", "submit", str(batch), "-a", _ASSIGNMENT, "--output", str(reports)]
         environment = os.environ | {"ROBOMARK_HOME": str(home)}
         return wall_seconds(lambda: subprocess.run(command, env=environment, check=True, capture_output=True))

@@ -57,7 +57,7 @@ def measure(times: int) -> list[Measurement]:
         cached.close()
         arena.close()
     with TrialRunner() as runner:
-        both = median_of(times, lambda: through_processes(runner, spec(FOLLOWER)))
+        both = median_of(max(times, 5), lambda: through_processes(runner, spec(FOLLOWER)))
         ready = median_of(4 * times, lambda: wall_seconds(lambda: runner.run(spec("pass"))))
     return [
         Measurement(f"{_ALONE}, sensor table", SECONDS / table, SPEED, 400, 800, f"{table:.3f} s"),
