@@ -14,6 +14,7 @@ from typing import Any
 from responders import wire
 from responders.code import Code
 from responders.faults import error_fault, surprise
+from responders.libraries_needed import notebook_source
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -44,7 +45,7 @@ class NotebookProcess(ResponderProcess):
     _schema = wire.NOTEBOOK
 
     def __init__(self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
-        parts = ResponderSpec(Code(spec.name, ""), spec.files, spec.limits, spec.output_bytes)
+        parts = ResponderSpec(Code(spec.name, notebook_source(spec.cells)), spec.files, spec.limits, spec.output_bytes)
         super().__init__(parts, sandboxes, folder, spec.seed, meter)
         self._notebook = spec
         self._first_lines = [1]

@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 from responders import packed, wire
 from responders.sandbox.meter import ChildStopped, JobMeter
-from sim.errors import HostError
+from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
@@ -60,6 +60,10 @@ class ChildLimits:
 
 class KilledFromOutside(HostError):
     """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
+
+
+class LibrariesNeeded(RobomarkError):
+    """A child that was forked without libraries has imported one: what it takes part in is to be done again with them."""
 
 
 class ServedChild(Protocol):
@@ -105,7 +109,7 @@ class Child:
         self._socket = connection
         self._limits = limits
         self._meter = JobMeter()
-        self._blamed = False
+        self._blamed = self._has_libraries = False
         self._overran: Callable[[], bool] | None = None
         self._pending = b""
         self._sent = self._received = 0  # frames
@@ -121,13 +125,16 @@ class Child:
         for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             connection.setsockopt(socket.SOL_SOCKET, limit, _POLL_TIME)
 
-    def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
+    def begin(
+        self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
+    ) -> None:
         """From now on student code may run in it, and what it costs is counted by ``meter``.
 
         With ``blamed`` being killed is its own fault, as it runs alone on this machine and was killed before.
-        ``overran`` says whether it, with the other processes of its submission, has taken more than they may have.
+        Unless it ``has_libraries`` it may ask for them. ``overran`` says whether it, with the other processes of its
+        submission, has taken more than they may have.
         """
-        self._meter, self._blamed, self._overran = meter, blamed, overran
+        self._meter, self._blamed, self._has_libraries, self._overran = meter, blamed, has_libraries, overran
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
         """Send one frame, with what has ``arrived`` as JSON; a child that is deaf shows at the next ``receive``."""
@@ -153,7 +160,7 @@ class Child:
         self._waited += time.monotonic() - began
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
-        """The next frame, paid for if anything of it may be kept. Raises ChildStopped, or KilledFromOutside."""
+        """The next frame, paid for if anything of it may be kept. Raises as it ends, or LibrariesNeeded."""
         data = self._pending or self._more()
         try:
             if data[0] == packed.MARK and "acts" in schema:
@@ -173,6 +180,10 @@ class Child:
             ) from None
         if frame["do"] == "busy":
             raise self._too_busy(frame)
+        if frame["do"] == "libraries":
+            if self._has_libraries:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "its process asked for libraries that it has")
+            raise LibrariesNeeded("student code imports a library at run time")
         if frame["do"] not in wire.NOTHING_KEPT:
             self._meter.keep(len(line))
         elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:

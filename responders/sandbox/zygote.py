@@ -18,8 +18,10 @@ import socket
 import struct
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
@@ -30,7 +32,7 @@ from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from sim.errors import HostError
 
-Role = Literal["robot", "robot with libraries", "responder"]
+Role = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
 Work = Literal["role", "battery"]
 
 _START_SECONDS = 60.0
@@ -44,8 +46,18 @@ _FOLDERS: dict[Role, tuple[str, str]] = {
     "robot": ("sim", "brick"),
     "robot with libraries": ("sim", "brick"),
     "responder": ("responders", "kit"),
+    "responder with libraries": ("responders", "kit"),
 }
 ROLES: tuple[Role, ...] = tuple(_FOLDERS)
+#: Of each role, the one that has the libraries loaded too.
+WITH_LIBRARIES: Mapping[Role, Role] = MappingProxyType(
+    {
+        "robot": "robot with libraries",
+        "robot with libraries": "robot with libraries",
+        "responder": "responder with libraries",
+        "responder with libraries": "responder with libraries",
+    }
+)
 
 
 class SandboxMissing(HostError):
@@ -225,7 +237,8 @@ class Zygote:
         except BaseException:
             child.close()
             raise
-        child.begin(meter, blamed, self._group.watch() if self._group is not None else None)
+        watch = self._group.watch() if self._group is not None else None
+        child.begin(meter, blamed, self._role in WITH_LIBRARIES.values(), watch)
         return child
 
     def _check_isolation(self, child: Child) -> None:

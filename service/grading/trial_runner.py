@@ -21,7 +21,7 @@ from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
-from responders.sandbox.running_child import KilledFromOutside
+from responders.sandbox.running_child import KilledFromOutside, LibrariesNeeded
 from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
@@ -152,6 +152,19 @@ class TrialRunner:
         self.close()
 
     def undisturbed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
+        """Do ``work``, and anew where it ends for a reason that is not the submission's fault.
+
+        Where a child has imported a library that it was not expected to, all is as if it had been expected.
+        """
+        before = meter.spent
+        try:
+            return self._unless_killed(work, meter)
+        except LibrariesNeeded:
+            meter.give_back(before)
+            self._sandboxes.give_libraries(meter)
+        return self._unless_killed(work, meter)
+
+    def _unless_killed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
         """Do ``work``; where a child in it is killed by neither us nor itself, again, and with nothing else running.
 
         Other people's children may have taken the memory; one that is killed alone twice is itself to blame.
