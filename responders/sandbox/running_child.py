@@ -63,7 +63,7 @@ class KilledFromOutside(HostError):
 
 
 class LibrariesNeeded(RobomarkError):
-    """A child that was forked without libraries has imported one: what it takes part in is to be done again with them."""
+    """A child that was forked without libraries has imported one: all has to be done again with them."""
 
 
 class ServedChild(Protocol):
