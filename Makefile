@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
-.PHONY: setup demo test test-fast test-long test-all lint format bench lock wheel image clean
+.PHONY: setup demo test test-fast test-long test-all lint format bench pictures lock wheel image clean
 
 setup: $(VENV)/.ready
 
@@ -56,6 +56,10 @@ format: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+# The documents' pictures; needs Chromium, and minutes for the digits. `make pictures PICTURES=report` draws one.
+pictures: setup
+	$(BIN)/python docs/draw_pictures.py $(PICTURES)
 
 wheel: setup
 	$(BIN)/python -m hatchling build -t wheel

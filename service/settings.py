@@ -1,6 +1,7 @@
 """What an operator can set, read once from the environment (``ROBOMARK_...``) and handed down as a frozen value.
 
-Nothing else in Robomark reads the environment; nothing here opens a file or a connection.
+What the environment should not show may lie in files instead. Nothing else in Robomark reads the environment; nothing
+here opens a connection.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Self
 
 from pydantic import Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings.exceptions import SettingsError
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
 
@@ -18,6 +20,8 @@ from sim.errors import UsageError
 from submissions.seeds import Secret
 
 PREFIX = "ROBOMARK_"
+#: A folder with files that are named as settings; it is called so by systemd, too.
+SECRET_FILES = "CREDENTIALS_DIRECTORY"
 _SHORTEST_SECRET = 16
 
 
@@ -128,13 +132,18 @@ class Settings(BaseSettings):
 
 
 def load_settings(**overrides: object) -> Settings:
-    """Settings from the environment; ``overrides`` win.
+    """Settings from the environment, else from secret files; ``overrides`` win.
 
     Raises:
         UsageError: naming the variable, its value and what was expected.
     """
+    folder = os.environ.get(SECRET_FILES) or None
+    if folder is not None and not Path(folder).is_dir():
+        raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with files named as the settings")
     try:
-        return Settings(**overrides)  # type: ignore[arg-type]
+        return Settings(_secrets_dir=folder, **overrides)  # type: ignore[arg-type, call-arg]
+    except SettingsError as error:
+        raise UsageError(f"{SECRET_FILES}: a file in it cannot be read: {error.__cause__ or error}") from None
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"]).upper()

@@ -31,6 +31,9 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
         # A file may come and go, or not be for us to read: then it is not for a child of ours either.
         with contextlib.suppress(OSError):
             mode = os.lstat(path).st_mode
+            # A device's driver dates nothing, however it is mounted: containers have /dev with strictatime.
+            if stat.S_ISCHR(mode):
+                continue
             if rule is None or stat.S_ISDIR(mode):
                 rule = os.statvfs(path).f_flag
             if not rule & (_NEVER_DATED | os.ST_RELATIME):

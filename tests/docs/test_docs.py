@@ -18,6 +18,8 @@ from pydantic import BaseModel
 
 from notebook_builder import MESSAGING
 from paths import ROOT
+from responders.code import Code
+from service.grading.grader import grade
 from service.reports.formats import FORMATS
 from service.settings import Settings
 from sim.floors import OBSTACLE_PRESETS
@@ -35,6 +37,7 @@ from submissions.assignment.schema import (
 )
 from submissions.criteria import SCHEMAS
 from submissions.criteria.common import AmongMany
+from submissions.submission import Submission
 
 EXAMPLE = examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
@@ -55,6 +58,11 @@ def commands(document: Path) -> Iterator[list[str]]:
                 yield words[1:]
 
 
+def files_shown(document: Path) -> list[tuple[str, str]]:
+    """The files that are to be copied from a document: a name, then what is in it."""
+    return re.findall(r"^`(\w+\.py)`:\n\n```python\n(.*?)```", document.read_text(), re.DOTALL | re.MULTILINE)
+
+
 _SHOWING = [
     pytest.param(document, marks=[pytest.mark.long] * (document.stem == "instructors"), id=document.stem)
     for document in DOCUMENTS
@@ -65,6 +73,8 @@ _SHOWING = [
 @pytest.mark.parametrize("document", _SHOWING)
 def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")
+    for name, text in files_shown(document):
+        (tmp_path / "my-work" / name).write_text(text)
     shutil.copytree(EXAMPLE, tmp_path / "submissions" / "ada")
     shutil.copy(MESSAGING, tmp_path)
     (tmp_path / "my-robots").mkdir()
@@ -102,6 +112,14 @@ def _download_from_moodle(folder: Path) -> None:
         "Last modified (submission),Last modified (grade),Feedback comments\n"
         "Participant 500000,Ada Lovelace,ada,ada@example.org,Submitted for grading,,12.00,Yes,-,-,\n"
     )
+
+
+def test_the_pair_for_students_gets_full_marks() -> None:
+    files = dict(files_shown(ROOT / "docs" / "students.md"))
+    assert files.keys() == {"robot.py", "responder.py"}
+    robot, responder = (Code(name, files[name]) for name in ("robot.py", "responder.py"))
+    grade_given = grade(Submission("ada", robot, responder), find_assignment("shape-recognition"))
+    assert (grade_given.marks, grade_given.verdict) == (12, "finished")
 
 
 def test_the_assignment_shown_is_in_order(tmp_path: Path) -> None:

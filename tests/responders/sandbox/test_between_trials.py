@@ -47,6 +47,16 @@ with Sandboxes() as sandboxes:
     print(sandboxes.check())
     print(sandboxes.remembers())
 """
+#: What a container has: devices where everything else is dated. No way to read one dates it.
+_USE_A_DEVICE = """
+import os, sys
+from responders.sandbox import reading_dates
+device = sys.argv[1] + "/null"
+os.utime(device, (0, 0))
+with open(device, "r+b", buffering=0) as file:
+    file.read(1), file.write(b"x"), os.pread(file.fileno(), 1, 0)
+print(os.stat(device).st_atime_ns, reading_dates.read_beforehand([device]))
+"""
 _READ = """
 import sys
 from responders.sandbox import reading_dates
@@ -110,11 +120,22 @@ def test_a_file_from_the_future_is_dated_at_each_reading(readable: Path) -> None
     [("strictatime", "neither relatime nor noatime"), ("noatime", "None"), ("relatime", "None"), ("ro", "None")],
 )
 def test_how_it_is_mounted_decides(option: str, said: str, tmp_path: Path) -> None:
-    script = f"mount -t tmpfs -o {option} none {tmp_path} && exec {sys.executable} -c '{_READ}' {tmp_path}"
+    assert said in _in_a_mount(option, _READ, tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
+def test_a_device_is_not_dated_however_it_is_mounted(tmp_path: Path) -> None:
+    assert _in_a_mount("strictatime", _USE_A_DEVICE, tmp_path, f"mknod {tmp_path}/null c 1 3") == "0 None\n"
+
+
+def _in_a_mount(option: str, code: str, folder: Path, first: str = "true") -> str:
+    """What Python code prints about a folder that is mounted so."""
+    script = f"mount -t tmpfs -o {option} none {folder} && {first} && exec {sys.executable} -c '{code}' {folder}"
     ran = subprocess.run(["unshare", "--mount", "sh", "-c", script], capture_output=True, text=True, check=False)
-    if "unshare" in ran.stderr or "mount" in ran.stderr:
+    if any(name in ran.stderr for name in ("unshare", "mount", "mknod")):
         pytest.skip(f"this machine lets root mount nothing: {ran.stderr}")
-    assert said in ran.stdout, ran.stderr
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout
 
 
 def test_this_machine_forgets(tmp_path: Path) -> None:

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from service.settings import Settings, load_settings
+from service.settings import SECRET_FILES, Settings, load_settings
 from sim.errors import UsageError
 
 
 @pytest.fixture(autouse=True)
 def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(SECRET_FILES, raising=False)
     for name in Settings.model_fields:
         monkeypatch.delenv(f"ROBOMARK_{name.upper()}", raising=False)
 
@@ -56,4 +57,29 @@ def test_a_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPat
     monkeypatch.delenv("XDG_DATA_HOME", raising=False)
     monkeypatch.setattr("os.getuid", lambda: 4_000_000)  # as in a container that runs as nobody in particular
     with pytest.raises(UsageError, match="set ROBOMARK_HOME"):
+        load_settings()
+
+
+def test_what_the_environment_should_not_show_lies_in_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "ROBOMARK_DATABASE_URL").write_text("postgresql+psycopg://robomark:word@host/name\n")
+    (tmp_path / "ROBOMARK_CONCURRENCY").write_text("3")
+    (tmp_path / "another").write_text("not ours")
+    monkeypatch.setenv(SECRET_FILES, str(tmp_path))
+    monkeypatch.setenv("ROBOMARK_CONCURRENCY", "4")
+    settings = load_settings()
+    assert settings.database == "postgresql+psycopg://robomark:word@host/name"
+    assert settings.concurrency == 4
+
+
+def test_secret_files_that_are_not_there_or_wrong_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv(SECRET_FILES, str(tmp_path / "nowhere"))
+    with pytest.raises(UsageError, match=r"CREDENTIALS_DIRECTORY is '.*nowhere': expected a folder"):
+        load_settings()
+    (tmp_path / "ROBOMARK_SECRET").write_text("short")
+    monkeypatch.setenv(SECRET_FILES, str(tmp_path))
+    with pytest.raises(UsageError, match=r"^ROBOMARK_SECRET is not usable: expected at least 16"):
+        load_settings()
+    (tmp_path / "ROBOMARK_SECRET").unlink()
+    (tmp_path / "ROBOMARK_DATABASE_URL").symlink_to("ROBOMARK_DATABASE_URL")
+    with pytest.raises(UsageError, match=r"a file in it cannot be read: .*ROBOMARK_DATABASE_URL"):
         load_settings()
