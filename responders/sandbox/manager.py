@@ -39,6 +39,11 @@ class Sandboxes:
         self._cpu_of_closed = 0.0
         self._given_libraries: JobMeter | None = None  # the meter of the last job that had to have them
 
+    def begin(self, role: Role, without: tuple[str, ...]) -> None:
+        """Start what children of this role will come from, and wait for nothing; what is wrong with it shows then."""
+        with contextlib.suppress(OSError):
+            self._zygote(role, without).begin()
+
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
     ) -> ServedChild:

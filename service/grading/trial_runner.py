@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
@@ -25,7 +25,7 @@ from responders.sandbox.running_child import KilledFromOutside, LibrariesNeeded
 from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
-from responders.trial_spec import ResponderSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
@@ -118,6 +118,11 @@ class TrialRunner:
     def sparing(self, repeats: RepeatedFaults) -> AbstractContextManager[None]:
         """Meanwhile children are not run of whom ``repeats`` knows what they would do."""
         return self._sandboxes.standing_in(repeats.child) if self._spares else nullcontext()
+
+    def begin(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
+        """Start all that these will need, beside each other, and wait for nothing."""
+        for role, without in dict.fromkeys((each.role, each.limits.without) for each in processes):
+            self._sandboxes.begin(role, without)
 
     def check_sandbox(self) -> str:
         """Which layers stand round student code here. Raises SandboxMissing when one cannot be put up."""
