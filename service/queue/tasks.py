@@ -23,7 +23,7 @@ from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK
 from service.queue.grading_job import JobOutcome, grade_next, plot_next
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
-from service.queue.self_test import Watch
+from service.queue.self_test import Watch, right_answer
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
 
@@ -73,8 +73,8 @@ class _Children:
         unsafe = current_app.conf.get(NO_SANDBOX)
         group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
         store, runner = open_store(settings), TrialRunner(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
-        watch = Watch(store, runner, worker_name(), settings.self_test_seconds)
-        watch.keep_looking()
+        right = right_answer(settings.home / "run")
+        watch = Watch(store, runner, worker_name(), settings.self_test_seconds, right)
         return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
@@ -91,6 +91,7 @@ _children = _Children()
 def grade_notice(task: WarmTask) -> None:
     """Grade the job whose turn it is, then ask for its plots."""
     child = task.child
+    child.watch.keep_looking()
     with child.watch.busy():
         outcome = grade_next(child.store, child.settings, child.runner, worker_name())
     if outcome is JobOutcome.GRADED:
@@ -124,7 +125,8 @@ def _begin(**_: object) -> None:
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
         _children.child.runner.check_sandbox()
-        _children.child.watch.look()
+        _children.child.watch.begin()
+        _children.child.watch.keep_looking()
     except Exception:
         _log.exception("pool_child.cold")
 
