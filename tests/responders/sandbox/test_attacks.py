@@ -36,8 +36,13 @@ from responders.sandbox.zygote import Isolation, Role
 
 ATTACKS = attacks()
 MEMORIES = memories()
-ENCLOSED: list[tuple[str, Role]] = [("full", "robot"), ("full", "responder"), ("full-1", "robot")]
-OLD_KERNEL_LONG = [pytest.param(*each, marks=pytest.mark.long if each == ENCLOSED[2] else ()) for each in ENCLOSED]
+ENCLOSED: list[tuple[str, Role]] = [
+    ("full", "robot"),
+    ("full", "responder with libraries"),
+    ("full-1", "robot"),
+    ("full", "responder"),
+]
+OLD_KERNEL_LONG = [pytest.param(*each, marks=pytest.mark.long if each in ENCLOSED[2:] else ()) for each in ENCLOSED]
 
 #: The machine's name is one that bubblewrap makes up.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
