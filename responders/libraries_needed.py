@@ -26,9 +26,9 @@ _LEADING_AWAY = re.compile(
     r"|_getframe|_current_frames|__(?!(?:name|main|init|str|repr|doc|class|len|call)__$)\w+"
 )
 _WORD = re.compile(r"\w+")
-#: In a notebook: what starts a robot, whose program is run elsewhere.
+#: In a notebook: what starts a robot, whose program is run elsewhere, and what does nothing here.
 _ROBOT_CELL = re.compile(r"\s*%%sim_magic")
-_ROBOT_LINE = re.compile(r"^[ \t]*%sim_magic[^{$\n]*$", re.MULTILINE)
+_HARMLESS_LINE = re.compile(r"^[ \t]*%(?:sim_magic|(?:re)?load_ext |matplotlib |config )[^{$\n]*$", re.MULTILINE)
 
 
 def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
@@ -46,8 +46,8 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
 
 
 def notebook_source(cells: tuple[str, ...]) -> str:
-    """What of a notebook is run as Python in its own process; other magics than the robot's stay, and are no Python."""
-    return "\n".join(_ROBOT_LINE.sub("", cell) for cell in cells if not _ROBOT_CELL.match(cell))
+    """What of a notebook is run as Python in its own process; most magics stay in it, and are no Python."""
+    return "\n".join(_HARMLESS_LINE.sub("pass", cell) for cell in cells if not _ROBOT_CELL.match(cell))
 
 
 @functools.lru_cache(maxsize=64)

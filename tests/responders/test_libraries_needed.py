@@ -50,7 +50,7 @@ MAY_NEED = {
     "no Python": "def responder(text)\n",
     "endless": "x = " + "-" * 20_000 + "1",
     "too long to read": "x = 1\n" * 20_000,
-    "a magic": "%matplotlib inline",
+    "a magic": "%sim_data",
 }
 FILES = {"helper.py": b"def double(x):\n    return 2 * x\n", "numbers.csv": b"1,2\n"}
 #: What is imported is written only when it is run.
@@ -95,7 +95,7 @@ def test_the_files_beside_it_count(files: dict[str, bytes]) -> None:
 
 
 def test_the_robots_of_a_notebook_do_not_count() -> None:
-    cells = ("%%sim_magic_preloaded\nimport numpy", "%sim_magic -R\nimport json", "a = 1")
+    cells = ("%%sim_magic_preloaded\nimport numpy", "%sim_magic -R\nimport json", "%load_ext nbev3devsim", "a = 1")
     assert not may_need_libraries(notebook_source(cells), {})
     assert may_need_libraries(notebook_source((*cells, "%sim_magic {a}")), {})
     assert may_need_libraries(notebook_source((*cells, "%%capture\nimport numpy")), {})
