@@ -152,10 +152,10 @@ def test_without_its_layer_it_gets_through(
     attack: Attack, setting: str, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     with decoys(tmp_path, victim) as targets:
-        outcome = run(sandboxes[setting], "robot", attack, targets.targets())
+        outcome = run(sandboxes[setting], "robot with libraries", attack, targets.targets())
     if not outcome.startswith("LEAK"):
         with decoys(tmp_path, victim) as targets:
-            bare = run(sandboxes["none"], "robot", attack, targets.targets())
+            bare = run(sandboxes["none"], "robot with libraries", attack, targets.targets())
         if not bare.startswith("LEAK"):
             pytest.skip(f"this machine refuses it to everybody: {bare}")
     assert outcome.startswith("LEAK"), outcome
