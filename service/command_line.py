@@ -11,17 +11,17 @@ import signal
 import sys
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
-from typer.main import get_command, get_group
+from typer.main import get_command
 
+from service.command_table import COMMANDS, Command, CommandGroup
+from service.commands.shown import want_json, want_quiet
 from service.home import keep_private
 from service.reports.readable import readable
 from sim.errors import Cancelled, RobomarkError, UsageError
@@ -30,74 +30,81 @@ _CALLER, _OURS, _STOPPED = 2, 3, 130
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """A command: ``module:name`` below ``service.commands``, and what the list of commands says of it."""
-
-    where: str
-    summary: str
-
-
-#: In the order in which help lists them; a name that ends in ``_app`` is a group of commands.
-_COMMANDS: Mapping[str, _Entry] = MappingProxyType(
-    {
-        "run": _Entry("run:run", "Run a robot program or a notebook in the simulator."),
-        "grade": _Entry("grade:grade", "Grade submissions now."),
-        "batch": _Entry("batch.app:batch_app", "Grade many submissions through the queue."),
-        "assignments": _Entry("assignments:assignments_app", "List, show, check, make and export assignments."),
-        "models": _Entry("models:models_app", "List, train and evaluate classifiers."),
-        "floors": _Entry("floors:floors", "Draw every floor with its scale."),
-        "show": _Entry("operator:show", "Show a grade that is stored."),
-        "verify": _Entry("verify:verify", "Run a stored grading again and compare."),
-        "course": _Entry("course:course_app", "Say when and how often students may submit."),
-        "up": _Entry("up:up", "Bring up broker, workers and web server."),
-        "serve": _Entry("up:serve", "Answer on the web: health and metrics."),
-        "worker": _Entry("operator:worker", "Grade what is queued until told to stop."),
-        "doctor": _Entry("operator:doctor", "Look at everything that grading needs on this machine."),
-        "db": _Entry("database:database_app", "Look after the database."),
-        "sandbox": _Entry("sandbox:sandbox_app", "Show the sandbox round student code."),
-        "demo": _Entry("demo:demo", "Grade sample submissions through a real worker."),
-    }
-)
-
-
 class _Commands(TyperGroup):
-    """All commands by name and summary. One is imported when it is to run, which takes a while, and no other."""
+    """Commands by name and summary. One is imported when it is to run, which takes a while, and no other."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """The name, the command itself, and the words after it."""
         name, listed, rest = super().resolve_command(ctx, args)
-        return name, listed if name is None else load_command(name), rest
+        if name is None or isinstance(listed, _Commands):
+            return name, listed, rest
+        return name, load_command(*ctx.command_path.split()[1:], name), rest
 
 
-def load_command(name: str) -> Any:
-    """The command or group called ``name``, imported, as Typer runs it."""
-    module, _, attribute = _COMMANDS[name].where.partition(":")
-    found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
-    # Not before they are imported: what Python keeps of its modules is for the users that children run as, too.
+def load_command(*path: str) -> Any:
+    """The command that is called by these words, imported, as Typer runs it."""
+    *groups, name = path
+    listed: Any = COMMANDS
+    for group in groups:
+        listed = listed[group].commands
+    command: Command = listed[name]
     keep_private()
+    module, _, attribute = command.where.partition(":")
+    found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
     app = typer.Typer(context_settings=_CONTEXT, rich_markup_mode=None, add_completion=False)
-    if attribute.endswith("_app"):
-        app.add_typer(found, name=name)
-        app.callback()(_nothing)
-        return get_group(app).commands[name]
     app.command(name)(found)
-    return get_command(app)
+    loaded = get_command(app)
+    if not command.serves:
+        loaded.params += _shared_options()
+    return loaded
+
+
+def _shared_options() -> list[Any]:
+    """The options that every command has which shows something and ends."""
+    app = typer.Typer(add_completion=False)
+    app.command()(_shared)
+    return get_command(app).params
+
+
+def _shared(
+    _as_json: Annotated[
+        bool,
+        typer.Option("--json", is_eager=True, callback=want_json, expose_value=False, help="One JSON document."),
+    ] = False,
+    _quietly: Annotated[
+        bool,
+        typer.Option(
+            "-q", "--quiet", is_eager=True, callback=want_quiet, expose_value=False, help="Only results and mistakes."
+        ),
+    ] = False,
+) -> None:
+    """Stands for any command."""
 
 
 def _command_line() -> Any:
     app = typer.Typer(
         name="robomark",
-        cls=_Commands,
         help="Grades robot programs and responders of the RoboLab activities, without a screen.",
-        no_args_is_help=True,
-        rich_markup_mode=None,
-        context_settings=_CONTEXT,
+        **_of_group(),
     )
     app.callback()(_root)
-    for name, entry in _COMMANDS.items():
-        app.command(name, help=entry.summary)(_nothing)
+    _list(app, COMMANDS)
     return get_command(app)
+
+
+def _of_group() -> dict[str, Any]:
+    return {"cls": _Commands, "no_args_is_help": True, "rich_markup_mode": None, "context_settings": _CONTEXT}
+
+
+def _list(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> None:
+    for name, listed in commands.items():
+        if isinstance(listed, Command):
+            app.command(name, short_help=listed.summary)(_nothing)
+        else:
+            group = typer.Typer(help=listed.summary, **_of_group())
+            group.callback()(_nothing)
+            _list(group, listed.commands)
+            app.add_typer(group, name=name, short_help=listed.summary)
 
 
 def _print_version(asked: bool) -> None:

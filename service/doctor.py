@@ -29,8 +29,8 @@ from service.store import workers
 from service.store.engine import Store, now, open_engine
 from service.store.installation import secret_of
 from service.store.metrics import collect
-from service.store.migrate import current_revision, newest_revision
 from service.store.models import Job
+from service.store.revision import current_revision, newest_revision
 from service.store.states import JobState
 from sim.errors import RobomarkError
 from submissions.seeds import name_of

@@ -9,12 +9,26 @@ import logging
 import os
 import pwd
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from importlib.machinery import (
+    BYTECODE_SUFFIXES,
+    EXTENSION_SUFFIXES,
+    SOURCE_SUFFIXES,
+    ExtensionFileLoader,
+    FileFinder,
+    SourceFileLoader,
+    SourcelessFileLoader,
+)
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from sim.errors import HostError, UsageError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 _log = logging.getLogger(__name__)
 #: What in the home is Robomark's; another's files beside it are left as they are, and out of reach all the same.
@@ -29,6 +43,18 @@ def keep_private() -> None:
     """From now on this process makes what nobody but this user can read; but for what is made ``for_the_user``."""
     if _users_umask.get(None) is None:
         _users_umask.set(os.umask(_OF_OTHERS))
+        # Searched first; the loader is Python's own in all but this.
+        sys.path_hooks.insert(0, FileFinder.path_hook(*_LOADERS))
+        sys.path_importer_cache.clear()
+
+
+class _SharedBytecode(SourceFileLoader):
+    """What Python keeps of a module lies beside it, for every user that reads it, a sandbox's child among them."""
+
+    def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
+        """Keep it as any Python does."""
+        with for_the_user():
+            super().set_data(path, data, _mode=_mode)
 
 
 @contextmanager
@@ -43,6 +69,13 @@ def for_the_user() -> Iterator[None]:
         yield
     finally:
         os.umask(private)
+
+
+_LOADERS: tuple[tuple[type[Any], list[str]], ...] = (
+    (ExtensionFileLoader, EXTENSION_SUFFIXES),
+    (_SharedBytecode, SOURCE_SUFFIXES),
+    (SourcelessFileLoader, BYTECODE_SUFFIXES),
+)
 
 
 def open_home(home: Path) -> None:

@@ -16,7 +16,7 @@ from sim.errors import UsageError
 from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
 from sim.robot import WIDENED, usual_robot
-from submissions.assignment.schema import did_you_mean
+from submissions.nearest import did_you_mean
 
 Preamble = Literal["none", "imports", "preloaded"]
 _PREAMBLES: dict[str, Preamble] = {

@@ -13,9 +13,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from sim.errors import UsageError
-from submissions.assignment.schema import did_you_mean
 from submissions.csv_table import CsvRow, read_csv
 from submissions.names import shown_name
+from submissions.nearest import did_you_mean
 from submissions.raw_files import shown
 
 #: What the columns of a table of people are called, here and in Moodle and Gradescope.

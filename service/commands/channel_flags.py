@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from responders.channel import Channel
 from sim.errors import UsageError
-from submissions.assignment.schema import ChannelTable, read_table
+
+if TYPE_CHECKING:
+    from responders.channel import Channel
 
 _INFRARED = ("beacon", "range", "facing", "blocked_by")
 
@@ -51,6 +52,9 @@ def changed(channel: Channel, given: Mapping[str, object]) -> Channel:
     """The channel with what the flags say. Raises UsageError where it cannot be so."""
     if not given:
         return channel
+    from responders.channel import Channel
+    from submissions.assignment.schema import ChannelTable, read_table
+
     values = {each.name: getattr(channel, each.name) for each in fields(Channel)}
     needless = _INFRARED if given.get("link", channel.link) == "cable" else ()
     table = {name: value for name, value in values.items() if name not in needless}

@@ -5,27 +5,24 @@ What follows for a submission stands in ``store/policies.py``.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
+from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
 from service.store import audit, policies
 from service.store.engine import Store, now, open_store
-from service.store.intake import DEFAULT_COURSE, course_of
 from service.store.policies import PolicyLimits
-from service.store.students import Students
+from service.store.students import DEFAULT_COURSE, Students, course_of
 from service.store.versions import check_assignment
 from sim.errors import UsageError
 from submissions.names import shown_name
 from submissions.people import read_people, students_of
 from submissions.roster import moment
-
-course_app = typer.Typer(help="When and how often students may submit.", no_args_is_help=True)
 
 Assignment = Annotated[
     str,
@@ -34,7 +31,6 @@ Assignment = Annotated[
 Due = Annotated[str | None, typer.Option(help="A date (its end), or a date and time: 2026-11-30T17:00.")]
 
 
-@course_app.command()
 def policy(
     assignment: Assignment = "",
     due: Due = None,
@@ -56,7 +52,6 @@ def policy(
         _show(store)
 
 
-@course_app.command()
 def extend(
     student: Annotated[str, typer.Argument(help="The student's name, as submitted.")],
     assignment: Assignment = "",
@@ -81,10 +76,10 @@ def extend(
         audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} times more" if more_attempts else ""
-    print(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
+    document(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
+    tell(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
 
 
-@course_app.command()
 def enrol(
     people: Annotated[Path, typer.Argument(help="A .csv with id, name, email; Moodle's grading worksheet is one.")],
 ) -> None:
@@ -97,7 +92,8 @@ def enrol(
         for student in listed:
             students.enrol(student, at)
         audit.note(session, audit.this_user(), "enrol", "course", str(course_id), students=len(listed))
-    print(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
+    document(students=len(listed))
+    tell(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
 
 
 def _due(text: str | None) -> datetime | None:
@@ -117,13 +113,14 @@ def _told(assignment: str, allowed: PolicyLimits) -> dict[str, object]:
 def _show(store: Store) -> None:
     with store.transaction() as session:
         found = policies.policies(session, course_of(session, DEFAULT_COURSE, now(session)))
+    document(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
     if not found:
-        print("no policy: everything that is submitted is marked, whenever it comes")
+        tell("no policy: everything that is submitted is marked, whenever it comes")
         return
-    table = Table("assignment", "due", "late days", "attempts", "cool-down", box=None, pad_edge=False)
+    listed = table("assignment", "due", "late days", "attempts", "cool-down")
     for assignment, allowed in found.items():
         due = "" if allowed.due_at is None else allowed.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
         attempts = "" if allowed.attempts is None else str(allowed.attempts)
         cool_down = f"{allowed.cool_down_seconds / 60:g} min" if allowed.cool_down_seconds else ""
-        table.add_row(assignment or "all others", due, str(allowed.late_days), attempts, cool_down)
-    Console().print(table)
+        listed.add_row(assignment or "all others", due, str(allowed.late_days), attempts, cool_down)
+    show(listed)

@@ -1,40 +1,15 @@
-"""``robomark grade``: grades submissions here and now, without queue or database."""
+"""``robomark grade``: what can be said to it. What it does is ``grading.py``'s, which takes long to load."""
 
 from __future__ import annotations
 
-import hashlib
-import sys
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from responders.sandbox.zygote import FULL, NONE
 from service.commands import channel_flags
 from service.commands.format_option import format_option
-from service.grading.grade import Grade
-from service.grading.grader import grade as grade_submission
-from service.grading.trial_runner import TrialRunner
-from service.home_secret import secret_here
-from service.reports.formats import FORMATS, Format
-from service.reports.rows import TableRow, missing_words
-from service.reports.written import prepare_folder, write_report
-from service.settings import load_settings
-from sim.errors import HostError, RobomarkError, UsageError
-from submissions.assignment.definition import Assignment
-from submissions.assignment.reader import find_assignment, find_in_catalogue
-from submissions.bundle import fit_parts, named_by, read_submission
-from submissions.names import alike, cannot_be_told, shown_name
-from submissions.people import Student
-from submissions.raw_files import shown
-from submissions.submission import Submission
-
-#: The formats that have a document for one grade.
-_DOCUMENTS = tuple(name for name, form in FORMATS.items() if form.document is not None)
+from service.commands.shown import wants_json
 
 
 def grade(
@@ -43,7 +18,7 @@ def grade(
         str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
-    form: Annotated[str, format_option("What to print.", _DOCUMENTS)] = "text",
+    form: Annotated[str, format_option("What to print; a wrong one names them all.", _documents)] = "text",
     run: Annotated[
         str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
     ] = None,
@@ -66,15 +41,10 @@ def grade(
 
     Several are one document in every format but text, also those that could not be graded, with the reason.
     """
-    if assignment is not None:
-        # A mistake of the instructor's is no submission's.
-        find_assignment(assignment)
-    chosen = FORMATS[form]
-    together = chosen.table if len(submissions) > 1 else None
-    rows: list[TableRow[Grade]] = []
-    if report is not None:
-        prepare_folder(report)
-    given = channel_flags.given_flags(
+    from service.commands.channel_flags import given_flags
+    from service.commands.grading import grade_all
+
+    given = given_flags(
         link=link,
         beacon=beacon,
         range=reach,
@@ -87,111 +57,11 @@ def grade(
         reordering=reordering,
         corruption=corruption,
     )
-    near = _like_others(submissions) if report is not None else {}
-    secret = secret_here(load_settings())
-    worst: RobomarkError | None = None
-    if unsafe:
-        warn_of_no_sandbox()
-    with TrialRunner(NONE if unsafe else FULL) as runner:
-        for path in submissions:
-            try:
-                if path in near:
-                    raise UsageError(near[path])
-                submission, asked = read_with_assignment(path, assignment)
-                submission = _with_run(submission, run)
-                graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
-                graded = replace(graded, notes=(*_tried(given), *graded.notes))
-            except RobomarkError as error:
-                refused = isinstance(error, UsageError)
-                who = Student(shown_name(named_by(path)))
-                reason = str(error).removeprefix(f"{shown(path.name)}: ")
-                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
-                if len(submissions) == 1:
-                    if refused and chosen.refusal is not None:
-                        sys.stdout.write(chosen.refusal(row))
-                    raise
-                rows.append(row)
-                print(f"robomark: {error}", file=sys.stderr)
-                worst = worst if worst is not None and not isinstance(worst, UsageError) else error
-                continue
-            if together is None:
-                _print(chosen, graded)
-            missing = missing_words(graded.missing)
-            rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
-            if report is not None:
-                written = write_report(report, graded, submission, named_by(path))
-                print(f"report: {written}", file=sys.stderr)
-    if together is not None:
-        sys.stdout.write(together(rows))
-    if worst is not None:
-        kind = UsageError if isinstance(worst, UsageError) else HostError
-        raise kind("not every submission could be graded")
+    grade_all(submissions, assignment, report, "json" if wants_json() else form, given, run=run, unsafe=unsafe)
 
 
-def _with_run(submission: Submission, run: str | None) -> Submission:
-    """The submission with another run to be marked. Raises UsageError for one that has no runs."""
-    if run is None:
-        return submission
-    if submission.notebook is None:
-        raise UsageError(f"{submission.student}: is no notebook and has no run {run}; leave --run out.")
-    return replace(submission, run=run)
+def _documents() -> tuple[str, ...]:
+    """The formats that have a document for one grade."""
+    from service.reports.formats import FORMATS
 
-
-def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
-    """The assignment with the channel of the flags in every scenario: another one, for it marks otherwise."""
-    if not given:
-        return asked
-    scenarios = tuple(replace(each, channel=channel_flags.changed(each.channel, given)) for each in asked.scenarios)
-    version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
-    return replace(asked, scenarios=scenarios, version=version)
-
-
-def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
-    """What a grade must say of itself when flags have changed what it was made with."""
-    words = ", ".join(f"{name} {value}" for name, value in given.items())
-    return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
-
-
-def _print(form: Format, graded: Grade) -> None:
-    console = Console()
-    if form.on_terminal is not None and console.is_terminal:
-        console.print(form.on_terminal(graded))
-    elif form.document is not None:
-        sys.stdout.write(form.document(graded))
-
-
-def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
-    """The submissions whose reports would take each other's place in one folder, each with a sentence."""
-    names = {path: named_by(path) for path in paths}
-    near = alike(names.values())
-    times = Counter(map(named_by, paths))
-    found = {path: f"{path}: its student {cannot_be_told(near[names[path]])}" for path in paths if names[path] in near}
-    for path in paths:
-        if times[names[path]] > 1:
-            found.setdefault(path, f"{path}: {shown(names[path])} is named more than once")
-    return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
-
-
-def warn_of_no_sandbox() -> None:
-    """Said whenever student code is let loose."""
-    print("robomark: NO SANDBOX: these submissions can read and change everything that you can", file=sys.stderr)
-
-
-def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission, Assignment]:
-    """A submission and what it is marked against: the assignment named, or else the one that the submission names.
-
-    Raises UsageError when either cannot be used.
-    """
-    if assignment is not None:
-        asked = find_assignment(assignment)
-        return read_submission(path, asked=asked.parts), asked
-    submission = read_submission(path)
-    if submission.assignment is None:
-        raise UsageError(
-            f"{path}: which assignment is this for? name it with -a, or in the submission's submission.toml"
-        )
-    try:
-        asked = find_in_catalogue(submission.assignment)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error} Name the assignment with -a.") from None
-    return fit_parts(submission, asked.parts), asked
+    return tuple(name for name, form in FORMATS.items() if form.document is not None)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import typer
 
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
@@ -14,6 +13,7 @@ from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import TrialSpec
+from service.commands.shown import note, tell
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.diagram_parts import Highlights
@@ -94,27 +94,28 @@ def run_notebook(
 def show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
     """What the cells printed, every run by ``show``, and what was left out."""
     for line in executed.output.split("\n") if executed.output else ():
-        typer.echo(readable(line, 400))
+        tell(readable(line, 400))
     for run in executed.runs:
-        typer.echo(f"--- the robot, started by cell {run.cell} ---")
+        tell(f"--- the robot, started by cell {run.cell} ---")
         show(run.recording)
-    for note in executed.notes:
-        typer.echo(f"note: {readable(note, 400)}", err=True)
+    for each in executed.notes:
+        note(f"note: {readable(each, 400)}")
     if executed.stopped is not None:
-        typer.echo(f"{executed.stopped.place}: {executed.stopped.verdict}: {executed.stopped.message}", err=True)
+        stopped = executed.stopped
+        print(f"{stopped.place}: {stopped.verdict}: {stopped.message}", file=sys.stderr)
     if not executed.runs:
-        typer.echo("note: no robot was started: no cell begins with %%sim_magic_preloaded", err=True)
+        note("note: no robot was started: no cell begins with %%sim_magic_preloaded")
 
 
 def show_diagrams(notebook: Notebook, folder: Path | None) -> None:
     """The diagrams of the notebook's cells as files, if there is a folder for them, and which cannot be drawn."""
     found = diagrams_in(notebook)
     for problem in found.problems:
-        typer.echo(f"note: {readable(problem, 400)}", err=True)
+        note(f"note: {readable(problem, 400)}")
     if folder is None:
         if found.cells:
-            typer.echo("note: the notebook has diagrams; --diagrams FOLDER draws them", err=True)
+            note("note: the notebook has diagrams; --diagrams FOLDER draws them")
         return
     for cell in found.cells:
         figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())
-        typer.echo(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', png(figure))}", err=True)
+        note(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', png(figure))}")

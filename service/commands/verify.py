@@ -1,80 +1,16 @@
-"""``robomark verify``: runs a stored grading again, here, and compares every recording's hash and the marks."""
+"""``robomark verify``: what can be said to it. What it does is ``verifying.py``'s, which takes long to load."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
-from service.grading.grade import Grade, TrialResult
-from service.grading.grader import grade as grade_submission
-from service.grading.trial_runner import TrialRunner
-from service.settings import load_settings
-from service.store import batches, intake, results
-from service.store.engine import open_store
-from service.store.installation import secret_of
-from service.store.models import Job
-from service.version import GRADER_VERSION, grader_sha256
-from sim.errors import HostError
-from sim.recording import Verdict
-from submissions.seeds import PUBLIC, Secret, name_of
-
-#: How far such a trial came is decided by the machine and its load, so no hash is promised for it.
-_CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
 
 def verify(
     grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
 ) -> None:
     """Run a stored grading again, every trial of it, and compare; exit status 3 if anything differs that must not."""
-    with open_store(load_settings()) as store:
-        own = secret_of(store)
-        with store.reading() as session:
-            job = session.get_one(Job, batches.find_job(session, grade))
-            stored = results.load(session, job.id)
-            grading_request = intake.load_grading_request(session, job.id)
-    secret = _secret_of(job, own)
-    with TrialRunner(spares=False) as runner:
-        again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret, runner=runner)
-    rows = list(zip(stored.trials, again.trials, strict=False))
-    table = Table("scenario", "trial", "stored", "again", "", box=None, pad_edge=False)
-    for before, after in rows:
-        hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
-        table.add_row(Text(before.scenario), str(before.index), *hashes, _compared(before, after))
-    Console().print(table)
-    print(f"marks: {stored.marks} stored, {again.marks} again")
-    if job.grader_sha256 != grader_sha256():
-        print(f"graded by Robomark {stored.grader_version}, again by {GRADER_VERSION}; their code or libraries differ")
-    if not _same(stored, again, rows):
-        raise HostError(f"grade {job.id} is not what grading it again gives")
-    print(f"grade {job.id} is what grading it again gives")
+    from service.commands.verifying import verify_grade
 
-
-def _secret_of(job: Job, own: Secret) -> Secret:
-    """The secret that the grade was given with. Raises HostError when it is not the one that is at hand."""
-    if job.secret_sha256 is None:
-        print("graded before this installation had a secret: again in the worlds of then")
-        return PUBLIC
-    if job.secret_sha256 != own.sha256:
-        raise HostError(
-            f"grade {job.id} cannot be verified with this secret: its worlds are of {name_of(job.secret_sha256)}, "
-            f"and the secret here is {own.name}; set ROBOMARK_SECRET to the one that it was graded with"
-        )
-    print(f"secret: {own.name}")
-    return own
-
-
-def _same(stored: Grade, again: Grade, rows: list[tuple[TrialResult, TrialResult]]) -> bool:
-    cut = any(before.verdict in _CUT or after.verdict in _CUT for before, after in rows)
-    same_marks = cut or [r.marks for r in stored.criteria] == [r.marks for r in again.criteria]
-    whole = len(stored.trials) == len(again.trials)
-    return whole and same_marks and all(_compared(before, after) != "differs" for before, after in rows)
-
-
-def _compared(before: TrialResult, after: TrialResult) -> str:
-    if before.recording.sha256 == after.recording.sha256:
-        return "same"
-    return "cut by a limit" if before.verdict in _CUT or after.verdict in _CUT else "differs"
+    verify_grade(grade)

@@ -14,6 +14,7 @@ from decimal import Decimal
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.words import fault_words
+from service.grading.statistics import MarkedSubmission, marked_of
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recorded import faults_of
@@ -36,6 +37,7 @@ class ExampleResult:
     seconds: float  # of real time
     problems: tuple[str, ...]
     unwritten: Expectation | None = None
+    marked: MarkedSubmission | None = None  # for statistics; None when it was refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +134,8 @@ def _check_example(
     if wanted is None and name != REFERENCE:
         problems.append(_no_table(name))
     unwritten = _found(graded, lost) if wanted is None else None
-    return ExampleResult(name, graded.marks, lost, seconds, tuple(problems), unwritten), graded
+    marked = replace(marked_of(graded), who=name)
+    return ExampleResult(name, graded.marks, lost, seconds, tuple(problems), unwritten, marked), graded
 
 
 def _no_table(name: str) -> str:

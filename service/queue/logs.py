@@ -1,19 +1,22 @@
-"""Log lines of services: one JSON object a line on standard error, with the job's id where there is one.
+"""Log lines of services, with the job's id where there is one: for a person in front of a terminal, else JSON.
 
 Commands that people run do not log; they print.
 """
 
 from __future__ import annotations
 
+import json
 import logging
+import os
 import sys
+from datetime import UTC, datetime
 
 import structlog
 from structlog.typing import Processor
 
 
 def configure_logging(level: str) -> None:
-    """Everything from ``level`` on, our own and the libraries', as JSON lines."""
+    """Everything from ``level`` on, our own and the libraries', on standard error: a JSON object a line, or words."""
     number = logging.getLevelNamesMapping()[level]
     shared: list[Processor] = [
         structlog.contextvars.merge_contextvars,
@@ -25,11 +28,7 @@ def configure_logging(level: str) -> None:
     handler.setFormatter(
         structlog.stdlib.ProcessorFormatter(
             foreign_pre_chain=shared,
-            processors=[
-                structlog.stdlib.ProcessorFormatter.remove_processors_meta,
-                structlog.processors.format_exc_info,
-                structlog.processors.JSONRenderer(),
-            ],
+            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *_renderers()],
         )
     )
     logging.basicConfig(level=number, handlers=[handler], force=True)
@@ -39,3 +38,18 @@ def configure_logging(level: str) -> None:
         wrapper_class=structlog.stdlib.BoundLogger,
         cache_logger_on_first_use=False,
     )
+
+
+def announce(event: str, sentence: str) -> None:
+    """What a service says of itself at any level, on standard output: a sentence for a person, else a JSON object."""
+    if sys.stdout.isatty():
+        print(sentence, flush=True)
+    else:
+        told = {"event": event, "message": sentence, "timestamp": datetime.now(UTC).isoformat()}
+        print(json.dumps(told), flush=True)
+
+
+def _renderers() -> list[Processor]:
+    if sys.stderr.isatty():
+        return [structlog.dev.ConsoleRenderer(colors="NO_COLOR" not in os.environ)]
+    return [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]

@@ -5,10 +5,10 @@ What is alike was decided before; who may see it is ``view.py``'s. What students
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import zip_longest
+from typing import Any
 
 from service.reports.html import render
 from service.reports.readable import one_line
@@ -43,13 +43,12 @@ def similarity_rows(found: Similarity) -> list[tuple[str, ...]]:
     ]
 
 
-def as_json(view: SimilarityView) -> str:
-    """Everything that was found."""
-    assignments = [
+def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
+    """Everything that was found, an assignment each, as JSON has it."""
+    return [
         {**asdict(found), "pairs": [{**asdict(pair), "share": pair.share} for pair in found.pairs]}
         for found in view.found
     ]
-    return json.dumps({"schema": 1, "assignments": assignments}, indent=1)
 
 
 def similarity_page(view: SimilarityView, texts: Texts, title: str, most: int) -> str:

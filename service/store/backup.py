@@ -18,8 +18,9 @@ from sqlalchemy.engine import Connection
 from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
-from service.store.migrate import current_revision, upgrade
+from service.store.migrate import upgrade
 from service.store.models import Base, Course, Installation, Job
+from service.store.revision import current_revision
 from sim.errors import HostError, UsageError
 
 #: Some of them hold a recording each.

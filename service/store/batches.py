@@ -23,7 +23,7 @@ from service.store.models import (
 )
 from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
 from sim.errors import UsageError
-from submissions.assignment.schema import did_you_mean
+from submissions.nearest import did_you_mean
 from submissions.people import Refusal
 
 #: The newest of which one may have been meant by an id that there is not.

@@ -15,7 +15,6 @@ from enum import Enum
 from functools import cache
 from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 T = TypeVar("T")
@@ -27,8 +26,6 @@ def encode(value: object) -> Json:
 
     Bytes become base64, floats that JSON has no word for their names. Raises TypeError for anything else.
     """
-    if isinstance(value, np.generic):
-        value = value.item()
     match value:
         case Enum():
             return cast(Json, value.value)
@@ -48,6 +45,11 @@ def encode(value: object) -> Json:
             return [encode(item) for item in value]
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: encode(getattr(value, field.name)) for field in fields(value)}
+    # Most of what reads the database has no arrays, and need not wait for numpy.
+    import numpy as np
+
+    if isinstance(value, np.generic):
+        return encode(value.item())
     raise TypeError(f"{type(value).__name__} has no plain form")
 
 

@@ -22,6 +22,8 @@ from sqlalchemy.pool import NullPool
 
 from service.home import open_home
 from service.settings import Settings
+from service.store.migrate import upgrade
+from service.store.revision import current_revision, newest_revision
 from sim.errors import HostError
 from submissions.seeds import Secret
 
@@ -107,8 +109,6 @@ def open_store(settings: Settings) -> Store:
 
     Raises HostError when it cannot be reached or is newer than this Robomark, UsageError for a home that others share.
     """
-    from service.store.migrate import upgrade
-
     parsed = make_url(settings.database)
     file = Path(str(parsed.database)).absolute() if parsed.get_backend_name() == "sqlite" else None
     if file is not None and settings.home in file.parents:
@@ -119,7 +119,8 @@ def open_store(settings: Settings) -> Store:
         with suppress(OSError):
             os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
-        upgrade(engine)
+        if current_revision(engine.execution_options(**{_ONLY_READS: True})) != newest_revision():
+            upgrade(engine)
     except OperationalError as error:
         engine.dispose()
         where = engine.url.render_as_string(hide_password=True)

@@ -18,11 +18,11 @@ from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.ids import new_id
 from service.store.installation import secret_of
-from service.store.models import AssignmentVersion, Batch, Course, Job, SubmissionRow
+from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.policies import Ruling, rule
 from service.store.states import BatchState, JobState, Lane, Standing
-from service.store.students import Students
-from service.store.versions import Frozen, assignment_from_bytes, freeze, insert_if_new, keep
+from service.store.students import DEFAULT_COURSE, Students, course_of
+from service.store.versions import Frozen, assignment_from_bytes, freeze, keep
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
 from submissions.assignment.definition import Assignment
@@ -31,7 +31,6 @@ from submissions.grading_request import GradingRequest
 from submissions.people import Refusal
 from submissions.submission import Submission
 
-DEFAULT_COURSE = "default"
 Read = TypeVar("Read")
 
 
@@ -331,9 +330,3 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     if source is not None:
         jobs.copy(session, job_id, source, at)
     return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
-
-
-def course_of(session: Session, name: str, at: datetime) -> int:
-    """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
-    insert_if_new(session, Course, name=name, created_at=at)
-    return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()

@@ -11,12 +11,12 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from sqlalchemy import ColumnElement, CursorResult, Select, select, update
 from sqlalchemy.orm import Session
 
-from service.store import phases, plots, result_cache, results, workers
+from service.store import phases, plots, result_cache, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
@@ -25,6 +25,9 @@ from service.store.scheduling import next_job
 from service.store.states import JobState, PlotState
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
+
+if TYPE_CHECKING:
+    from service.store import results
 
 _LONGEST_BACKOFF = timedelta(hours=1)
 #: Clocks are corrected all the time by less than this.
@@ -152,6 +155,9 @@ def finish(
     ``trials_at`` and ``graded_at`` are when the last trial had been run and when all was marked. Raises Fenced, and
     stores nothing, when the job is no longer this worker's.
     """
+    # Whoever only enqueues, holds or cancels jobs need not wait for what reads recordings.
+    from service.store import results
+
     grade = prepared.grade
     with store.transaction() as session:
         at = now(session)

@@ -6,15 +6,16 @@ There is no way down: an older Robomark refuses a newer database.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from sqlalchemy import Engine, text
 from sqlalchemy.engine import Connection
 
+from service.store.revision import newest_revision
 from sim.errors import HostError
+
+if TYPE_CHECKING:
+    from alembic.config import Config
 
 #: An arbitrary number that all Robomarks share: PostgreSQL's advisory lock for migrations.
 _LOCK = 0x526F626F
@@ -22,25 +23,13 @@ _LOCK = 0x526F626F
 
 def configuration(connection: Connection) -> Config:
     """Alembic's configuration for the scripts inside this package, on an open connection."""
+    # It takes as long to load as all that a command which only asks needs.
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
     config.attributes["connection"] = connection
     return config
-
-
-def newest_revision() -> str:
-    """The revision that this release needs."""
-    config = Config()
-    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
-    head = ScriptDirectory.from_config(config).get_current_head()
-    assert head is not None
-    return head
-
-
-def current_revision(engine: Engine) -> str | None:
-    """The revision the database is at; None for an empty one."""
-    with engine.begin() as connection:
-        return MigrationContext.configure(connection).get_current_revision()
 
 
 def refuse_downgrade() -> None:
@@ -53,6 +42,10 @@ def upgrade(engine: Engine) -> None:
 
     Raises HostError if the database was made by a newer Robomark.
     """
+    from alembic import command
+    from alembic.runtime.migration import MigrationContext
+    from alembic.script import ScriptDirectory
+
     with engine.begin() as connection:
         # SQLite holds its write lock since BEGIN IMMEDIATE.
         if engine.dialect.name == "postgresql":

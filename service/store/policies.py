@@ -15,10 +15,9 @@ from sqlalchemy.orm import Session
 from service.store.engine import now
 from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRow
 from service.store.states import JobState
-from sim.recording import Verdict
 
 _ALWAYS = frozenset({"visible"})
-_NOT_THE_STUDENTS = (Verdict.ASSIGNMENT_ERROR.value, Verdict.HOST_ERROR.value)
+_NOT_THE_STUDENTS = ("assignment_error", "host_error")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.grading.grade import Evidence
 from service.grading.ranks import RankTable, StudentMeasures, ranked
 from service.store.batches import JobLine
 from service.store.codec import decode
 from service.store.models import AssignmentVersion, CriterionResultRow, Job
 from service.store.states import JobState
 from service.store.versions import assignment_from_bytes
-from submissions.criteria.timing import Ranking
+
+if TYPE_CHECKING:
+    from submissions.criteria.timing import Ranking
 
 #: How many jobs are asked for at once: databases take so many values, and not every number of them.
 _AT_ONCE = 1000
@@ -31,6 +33,8 @@ def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
     for content in _contents(session, graded):
         # Most assignments rank nothing, and reading one whole takes longer than everything else here.
         if b'"ranking"' in zlib.decompress(content):
+            from submissions.criteria.timing import Ranking
+
             assignment = assignment_from_bytes(content)
             rankings = (each for each in assignment.criteria if isinstance(each, Ranking))
             asked |= {(assignment.id, ranking.id): ranking for ranking in rankings}
@@ -55,6 +59,8 @@ def _contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
 
 
 def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[JobLine]) -> RankTable:
+    from service.grading.grade import Evidence
+
     measures, unit = [], ""
     for jobs in _portions(lines):
         rows = session.execute(

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
@@ -19,7 +20,9 @@ from service.store.models import AssignmentVersion, Batch, CriterionResultRow, E
 from service.store.states import UNFINISHED, JobState, Lane, Standing
 from service.store.versions import freeze, keep
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,11 +15,9 @@ from sqlalchemy.orm import Session
 from service.store import phases
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
 from service.store.states import JobState, PlotState
-from sim.recording import Verdict
-from submissions.bundle import unpack_submission
 
 #: How far such a trial came depends on the machine and its load, so another run may differ.
-_NOT_REPEATABLE = (Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR)
+_NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
 
 
 def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
@@ -40,9 +38,7 @@ def find(session: Session, key: str) -> str | None:
     Never one without the sandbox, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
     """
     distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
-    cut = exists().where(
-        TrialRow.job_id == Job.id, TrialRow.verdict.in_([verdict.value for verdict in _NOT_REPEATABLE])
-    )
+    cut = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
     unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
     query = (
         select(Job.id)
@@ -93,6 +89,8 @@ def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[
 
 def _notes(session: Session, source: Job, job_id: str) -> list[str]:
     """What was noted when this submission was read, then by the grading: another's folder may have their name."""
+    from submissions.bundle import unpack_submission
+
     packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     theirs, own = (
         unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)

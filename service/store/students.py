@@ -11,13 +11,23 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.models import Enrolment, Person
+from service.store.inserting import insert_if_new
+from service.store.models import Course, Enrolment, Person
 from service.store.states import Role
 from sim.errors import UsageError
-from submissions.assignment.schema import did_you_mean
 from submissions.names import cannot_be_told, forms, shown_name
+from submissions.nearest import did_you_mean
 from submissions.people import Student
 from submissions.raw_files import shown
+
+#: The course of an installation that has only one.
+DEFAULT_COURSE = "default"
+
+
+def course_of(session: Session, name: str, at: datetime) -> int:
+    """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
+    insert_if_new(session, Course, name=name, created_at=at)
+    return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()
 
 
 class Students:

@@ -10,19 +10,20 @@ import json
 import zlib
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import select
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from service.store import models
 from service.store.codec import decode, encode
+from service.store.inserting import insert_if_new
 from service.store.models import AssignmentVersion
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import catalogue
-from submissions.assignment.schema import did_you_mean
+from submissions.nearest import did_you_mean
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
 
 #: What keys are called in assignments that earlier releases kept.
 _FORMERLY = {"picture": "image", "pictures": "images"}
@@ -83,6 +84,9 @@ def assignment_to_bytes(assignment: Assignment) -> bytes:
 
 def assignment_from_bytes(content: bytes) -> Assignment:
     """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
+    # With all kinds of criteria; what only keeps or names an assignment need not wait for them.
+    from submissions.assignment.definition import Assignment
+
     try:
         return decode(Assignment, _in_todays_words(json.loads(zlib.decompress(content))))
     except zlib.error as error:
@@ -97,9 +101,3 @@ def _in_todays_words(content: dict[str, Any]) -> dict[str, Any]:
 
 def _renamed(table: dict[str, Any]) -> dict[str, Any]:
     return {_FORMERLY.get(key, key): value for key, value in table.items()}
-
-
-def insert_if_new(session: Session, table: type[models.Base], **values: object) -> None:
-    """Insert a row, unless one with the same unique values is there."""
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    session.execute(insert(table).values(**values).on_conflict_do_nothing())

@@ -31,13 +31,12 @@ from submissions.assignment.schema import (
     ScenarioTable,
     TrainingTable,
     WorldTable,
-    did_you_mean,
-    listed,
 )
 from submissions.assignment.second_robot import SAME, check_robots, second_poses_of
 from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria.common import Surroundings
 from submissions.document import checked_table, no_double, tables_of, texts_in
+from submissions.nearest import did_you_mean, listed
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep
 

@@ -12,11 +12,11 @@ from typing import Any
 
 from sim.errors import UsageError
 from submissions.assignment.problems import Problems
-from submissions.assignment.schema import did_you_mean, listed
 from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Misfit, Surroundings
 from submissions.document import checked_table, list_of_tables, no_double, tables_of, texts_in
+from submissions.nearest import did_you_mean, listed
 from submissions.source_text import decode_source
 
 _WITHOUT_ROBOT = tuple(check for check, schema in SCHEMAS.items() if not schema.judges_runs)

@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.schema import did_you_mean
+from submissions.nearest import did_you_mean
 
 FILE_NAME = "assignment.toml"
 
@@ -26,17 +26,17 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     Raises UsageError if there is neither.
     """
     name = os.fspath(name_or_path)
-    ids = catalogue()
-    if name in ids:
-        return _catalogue_folder() / name
     path = Path(name)
+    own = _catalogue_folder() / name
+    if path.name == name and (own / FILE_NAME).is_file():
+        return own
     if path.name == FILE_NAME and path.is_file():
         path = path.parent
     if path.is_dir():
         return path
     if path.is_file():
         raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
-    hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
+    hint = did_you_mean(name, catalogue()) or "; robomark assignments list shows the catalogue"
     raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
 
 

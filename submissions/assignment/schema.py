@@ -5,10 +5,9 @@ A table by itself; what has to fit between tables, and the files beside them, is
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
@@ -19,6 +18,7 @@ from pydantic_core import ErrorDetails
 from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
+from submissions.nearest import did_you_mean, listed
 from submissions.strict_table import Shape, StrictTable
 from submissions.sweep import CONDITIONS
 
@@ -241,19 +241,6 @@ def _follows(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool
     return details["type"] == "too_short" and any(
         len(other) > len(place) and other[: len(place)] == place for other in places
     )
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean "x"?`` if there is a name like it."""
-    by_lower = {k.lower(): k for k in known}
-    near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
-    return f'; did you mean "{by_lower[near[0]]}"?' if near else ""
-
-
-def listed(names: Iterable[str]) -> str:
-    """``"a", "b" or "c"``."""
-    quoted = [f'"{name}"' for name in names]
-    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} or {quoted[-1]}"
 
 
 def _as_tuples(value: object) -> object:

@@ -11,9 +11,9 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.assignment.schema import did_you_mean, listed
 from submissions.criteria.common import Criterion, Misfit, Surroundings, Texts
 from submissions.criteria.places import Range
+from submissions.nearest import did_you_mean, listed
 from submissions.strict_table import Shape
 
 

@@ -10,17 +10,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from typer.testing import CliRunner
 
+from command import robomark
 from models import card
 from models.cards import Measured, Tally
 from models.evaluation import Answered, Evaluation
 from models.families import shapes
 from models.images import Photographer, Shift
-from service.commands.models import models_app
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
-from sim.errors import UsageError
 
 
 @pytest.fixture(scope="module")
@@ -100,19 +98,19 @@ def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
 
 
 def test_the_list_has_every_model_with_its_interval() -> None:
-    done = CliRunner().invoke(models_app, ["list"])
-    assert done.exit_code == 0
+    done = robomark("models", "list")
+    assert done.returncode == 0
     accuracy = card("digits").measured.accuracy
     low, high = accuracy.interval
-    (line,) = [line for line in done.output.splitlines() if line.startswith("digits ")]
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("digits ")]
     for part in (f"{accuracy.share:.3f}", f"{low:.3f} to {high:.3f}", str(accuracy.n)):
         assert part in line
 
 
 def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
-    done = CliRunner().invoke(models_app, ["compare", "digits", "digits-cnn", "--report", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    (line,) = [line for line in done.output.splitlines() if line.strip().startswith("accuracy")]
+    done = robomark("models", "compare", "digits", "digits-cnn", "--output", tmp_path)
+    assert done.returncode == 0, done.stderr
+    (line,) = [line for line in done.stdout.splitlines() if line.strip().startswith("accuracy")]
     for name in ("digits", "digits-cnn"):
         accuracy = card(name).measured.accuracy
         low, high = accuracy.interval
@@ -122,6 +120,6 @@ def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
 
 
 def test_classifiers_of_different_things_are_not_compared() -> None:
-    done = CliRunner().invoke(models_app, ["compare", "digits", "shapes"])
-    assert isinstance(done.exception, UsageError)
-    assert str(done.exception) == "digits, shapes cannot be compared; expected two or more models of the same things"
+    done = robomark("models", "compare", "digits", "shapes")
+    assert done.returncode == 2
+    assert "digits, shapes cannot be compared; expected two or more models of the same things" in done.stderr

@@ -13,7 +13,8 @@ from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected
 from submissions.assignment.export import export_for_students, export_whole, write_new
-from submissions.assignment.folder import catalogue
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.overview import overview
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment, read_assignment
 
@@ -195,3 +196,10 @@ def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner)
     assert (dict(checked.unwritten), len(checked.problems)) == ({}, 2)
     with pytest.raises(UsageError, match=r"stops-short has a table in expected\.toml already"):
         add_expected(str(tmp_path / "task"), {"stops-short": Expectation(marks="3")})
+
+
+def test_a_list_says_what_the_assignments_say() -> None:
+    for name in catalogue():
+        found, listed = find_assignment(name), overview(assignment_folder(name))
+        assert (listed.section, listed.id, listed.title) == (found.section, found.id, found.title)
+        assert (listed.marks, listed.trials) == (found.max_marks, sum(1 for _ in found.trials())), name

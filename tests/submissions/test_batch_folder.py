@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.commands.grade import read_with_assignment
+from service.commands.grading import read_with_assignment
 from sim.errors import UsageError
 from submissions.assignment.folder import assignment_folder
 from submissions.batch_folder import read_batch

@@ -19,7 +19,7 @@ from service.store import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Person
 from service.store.states import Role
-from service.store.students import Students
+from service.store.students import Students, course_of
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission
@@ -221,7 +221,7 @@ def test_a_report_made_later_does_not_take_the_place_of_anothers(tmp_path: Path)
 def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> None:
     intake.accept(store, grading_request("ada"), max_attempts=3)
     with store.transaction() as session:
-        students = Students(session, intake.course_of(session, "default", now(session)))
+        students = Students(session, course_of(session, "default", now(session)))
         known = students.enrol(Student("ada"), now(session))
         assert known == session.scalar(select(Enrolment.id))
         for name in (" ada", "Ada", "\u0430da", "\u200b"):
@@ -234,7 +234,7 @@ def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> No
 def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_comes(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, intake.course_of(session, "default", at))
+        students = Students(session, course_of(session, "default", at))
         known = students.enrol(Student("ada "), at)
         assert students.enrol(Student("ada "), at) == known
         assert students.enrol(Student("ada"), at) == known
@@ -245,7 +245,7 @@ def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_c
 def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, intake.course_of(session, "default", at))
+        students = Students(session, course_of(session, "default", at))
         known = students.enrol(Student("s1"), at)
         for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
             assert students.enrol(told, at) == known
@@ -256,7 +256,7 @@ def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
 def test_only_who_is_there_is_found(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, intake.course_of(session, "default", at))
+        students = Students(session, course_of(session, "default", at))
         known = students.enrol(Student("Ada Lovelace"), at)
         assert students.find(" Ada  Lovelace") == known
         with pytest.raises(UsageError, match='did you mean "Ada Lovelace"'):
@@ -269,7 +269,7 @@ def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> 
     """Two whom today's rules would not tell apart, and one enrolled with blanks by an extension."""
     with store.transaction() as session:
         at = now(session)
-        course_id = intake.course_of(session, "default", at)
+        course_id = course_of(session, "default", at)
         for number, name in enumerate(("Ada", "ada", " bob")):
             session.execute(insert(Person).values(id=number + 1, created_at=at))
             row = {"id": number + 1, "course_id": course_id, "person_id": number + 1, "student": name, "written": name}

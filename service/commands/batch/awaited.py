@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
-from rich.console import Console
-
 from responders.sandbox.manager import Sandboxes
 from service.commands.batch.waiting import Waiting
+from service.commands.shown import note, progress
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
@@ -22,11 +21,9 @@ from service.store.states import BatchState, Lane
 
 
 @contextmanager
-def marks_awaited(
-    store: Store, settings: Settings, batch_ids: Sequence[str], new: int, console: Console
-) -> Iterator[None]:
+def marks_awaited(store: Store, settings: Settings, batch_ids: Sequence[str], new: int) -> Iterator[None]:
     """All marks are there when the ``with`` begins, all plots when it ends; ``new`` jobs were queued just now."""
-    unfinished = _unfinished(store, batch_ids, console)
+    unfinished = _unfinished(store, batch_ids)
     if not unfinished:
         yield
         return
@@ -41,7 +38,7 @@ def marks_awaited(
             broker, keep_up = embedded.settings, embedded.ensure
         notifier = Notifier(make_celery(broker), store, broker)
         notifier.grade(Lane.BATCH, new)
-        waiting = [Waiting(store, notifier, batch_id, console, keep_up) for batch_id in unfinished]
+        waiting = [Waiting(store, notifier, batch_id, progress(), keep_up) for batch_id in unfinished]
         for each in waiting:
             each.for_marks()
         yield
@@ -49,7 +46,7 @@ def marks_awaited(
             each.for_plots()
 
 
-def _unfinished(store: Store, batch_ids: Sequence[str], console: Console) -> list[str]:
+def _unfinished(store: Store, batch_ids: Sequence[str]) -> list[str]:
     """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
     unfinished = []
     with store.reading() as session:
@@ -60,7 +57,7 @@ def _unfinished(store: Store, batch_ids: Sequence[str], console: Console) -> lis
             if batches.batch(session, batch_id).state is BatchState.OPEN:
                 unfinished.append(batch_id)
             else:
-                console.print(f"batch {batch_id} is paused: robomark batch resume {batch_id}", highlight=False)
+                note(f"batch {batch_id} is paused: robomark batch resume {batch_id}")
     return unfinished
 
 

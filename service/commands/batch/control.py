@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from service.commands.shown import document, tell
 from service.settings import load_settings
 from service.store import audit, batch_control, batches
 from service.store.engine import Store, open_store
@@ -23,7 +24,8 @@ def pause(batch: BatchId) -> None:
         batch_id = _find(store, batch)
         held = batch_control.pause(store, batch_id, actor=audit.this_user())
     was = "is paused" if held.changed else "was paused already"
-    print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} graded to their end")
+    document(batch=batch_id, changed=held.changed, waiting=held.waiting, running=held.running)
+    tell(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} graded to their end")
 
 
 def resume(batch: BatchId) -> None:
@@ -32,7 +34,8 @@ def resume(batch: BatchId) -> None:
         batch_id = _find(store, batch)
         held = batch_control.resume(store, batch_id, actor=audit.this_user())
     was = "goes on" if held.changed else "was not paused"
-    print(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} being graded")
+    document(batch=batch_id, changed=held.changed, waiting=held.waiting, running=held.running)
+    tell(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} being graded")
 
 
 def cancel(batch: BatchId) -> None:
@@ -40,10 +43,11 @@ def cancel(batch: BatchId) -> None:
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
         ended = batch_control.cancel(store, batch_id, actor=audit.this_user())
+    document(batch=batch_id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
     if ended.changed:
-        print(f"batch {batch_id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
+        tell(f"batch {batch_id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
     else:
-        print(f"batch {batch_id}: nothing changed, all of it has ended already")
+        tell(f"batch {batch_id}: nothing changed, all of it has ended already")
 
 
 def retry(
@@ -57,11 +61,12 @@ def retry(
         batch_id = None if batch is None else _find(store, batch)
         retried = batch_control.retry(store, batch_id, actor=audit.this_user())
     where = "all batches" if batch_id is None else f"batch {batch_id}"
+    document(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
     if retried.queued + retried.outdated == 0:
-        print(f"{where}: nothing changed, no submission is dead")
+        tell(f"{where}: nothing changed, no submission is dead")
         return
     outdated = f"; {retried.outdated} left, because a newer submission came" if retried.outdated else ""
-    print(f"{where}: {retried.queued} queued again{outdated}")
+    tell(f"{where}: {retried.queued} queued again{outdated}")
 
 
 def _find(store: Store, start: str) -> str:

@@ -8,21 +8,16 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from service.commands.batch.awaited import marks_awaited
 from service.commands.batch.control import BatchId
 from service.commands.batch.tables import changes_table
-from service.queue.celery_app import make_celery
-from service.queue.logs import configure_logging
-from service.queue.notifier import Notifier
+from service.commands.shown import document, note, show, tell
 from service.settings import load_settings
 from service.store import audit, batches, regrades
 from service.store.engine import Store, open_store
 from service.store.regrades import Regraded
 from service.store.states import JobState, Lane
 from sim.errors import HostError
-from submissions.assignment.reader import find_assignment
 
 
 def regrade(
@@ -33,24 +28,32 @@ def regrade(
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
+    # The queue takes long to load, which whoever publishes need not wait for.
+    from service.commands.batch.awaited import marks_awaited
+    from service.queue.celery_app import make_celery
+    from service.queue.logs import configure_logging
+    from service.queue.notifier import Notifier
+    from submissions.assignment.reader import find_assignment
+
     settings = load_settings()
     configure_logging(settings.log_level)
-    console = Console()
     changed = None if assignment is None else find_assignment(assignment)
     with open_store(settings) as store:
         batch_id = _find(store, batch)
         made = regrades.regrade(store, batch_id, changed, max_attempts=settings.max_attempts, actor=audit.this_user())
-        console.print(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}", highlight=False)
+        tell(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}")
         if not wait:
             if settings.broker_url:
                 Notifier(make_celery(settings), store, settings).grade(Lane.BATCH, made.jobs)
-            console.print(f"what changes, and why: robomark batch status {made.batch_id}", highlight=False)
+            note(f"what changes, and why: robomark batch status {made.batch_id}")
+            document(batch=made.batch_id, regraded=made)
             return
-        with marks_awaited(store, settings, [made.batch_id], made.jobs, console):
+        with marks_awaited(store, settings, [made.batch_id], made.jobs):
             with store.reading() as session:
                 changes = regrades.changes(session, made.batch_id)
-            console.print(changes_table(changes))
-            console.print(f"to let the new grades stand: robomark batch publish {made.batch_id}", highlight=False)
+            show(changes_table(changes))
+            note(f"to let the new grades stand: robomark batch publish {made.batch_id}")
+    document(batch=made.batch_id, regraded=made, changes=changes)
     dead = [change for change in changes if change.state is JobState.DEAD]
     if dead:
         raise HostError(f"{len(dead)} of {len(changes)} could not be graded; {dead[0].student}: {dead[0].reason}")
@@ -77,7 +80,8 @@ def publish(
         if count
     ]
     replaced = f", {done.replaced} of them regrades" if done.replaced else ""
-    print(f"batch {batch_id}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
+    document(batch=batch_id, published=done)
+    tell(f"batch {batch_id}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
 
 
 def _left_out(made: Regraded) -> str:

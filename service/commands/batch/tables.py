@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from decimal import Decimal
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from rich.console import Group, RenderableType
-from rich.table import Table
+from rich.console import Group
 from rich.text import Text
 
-from service.grading.ranks import RankTable
-from service.store.audit import AuditEntry
-from service.store.batches import BatchLine, JobLine
+from service.commands.shown import table
 from service.store.policies import in_days
-from service.store.regrades import Change, CriterionChange
 from service.store.states import BatchState, JobState, Standing
-from submissions.people import Refusal
+
+if TYPE_CHECKING:
+    from decimal import Decimal
+
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from service.grading.ranks import RankTable
+    from service.store.audit import AuditEntry
+    from service.store.batches import BatchLine, JobLine
+    from service.store.regrades import Change, CriterionChange
+    from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
@@ -36,21 +43,16 @@ def summary(line: BatchLine) -> str:
 def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> Table:
     """A row a submission, taken in or not: marks, accuracy, verdict, and what else is to be known of it."""
     named = any(line.name not in ("", line.student) for line in lines)
-    table = Table(box=None, pad_edge=False)
-    for heading in ("student", *(["name"] if named else []), "assignment"):
-        table.add_column(heading, overflow="fold")
-    table.add_column("marks", justify="right")
-    table.add_column("accuracy", justify="right")
-    for heading in ("verdict", "grade"):
-        table.add_column(heading)
+    headings = ("student", *(["name"] if named else []), "assignment", "marks", "accuracy", "verdict", "grade")
+    made = table(*headings, right=("marks", "accuracy"))
 
-    def who(student: str, name: str, assignment: str) -> list[Text]:
-        return [Text(student), *([Text(name)] if named else []), Text(assignment)]
+    def who(student: str, name: str, assignment: str) -> list[str]:
+        return [student, *([name] if named else []), assignment]
 
     for line in lines:
         accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
         outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
-        table.add_row(
+        made.add_row(
             *who(line.student, line.name, line.assignment),
             _out_of(line.marks, line.max_marks),
             accuracy,
@@ -59,62 +61,54 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
         )
     for refusal in refusals:
         whose = who(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
-        table.add_row(*whose, "", "", Text(f"not taken in: {refusal.sentence}", style="red"), "")
-    return table
+        made.add_row(*whose, "", "", Text(f"not taken in: {refusal.sentence}", style="red"), "")
+    return made
 
 
 def refusals_table(refusals: Sequence[Refusal]) -> Table:
     """What was not taken in, and why."""
-    table = Table("not taken in", "why", box=None, pad_edge=False)
+    made = table("not taken in", "why")
     for refusal in refusals:
-        table.add_row(Text(refusal.source), Text(refusal.reason))
-    return table
+        made.add_row(refusal.source, refusal.reason)
+    return made
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
     """A row a submission whose marks change, or that needs a look; the others are counted."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("student", overflow="fold")
-    for heading in ("before", "after"):
-        table.add_column(heading, justify="right")
-    for heading in ("criteria that changed", "why", "grade"):
-        table.add_column(heading, overflow="fold")
+    made = table("student", "before", "after", "criteria that changed", "why", "grade", right=("before", "after"))
     shown = [change for change in changes if _worth_a_row(change)]
     for change in shown:
-        table.add_row(
-            Text(change.student),
+        made.add_row(
+            change.student,
             _out_of(change.before, change.before_max),
             _out_of(change.after, change.after_max),
-            Text("\n".join(_criterion(criterion) for criterion in change.criteria)),
+            "; ".join(_criterion(criterion) for criterion in change.criteria),
             Text(change.reason, style=_STYLES.get(change.state, "")),
             change.job_id,
         )
     same = len(changes) - len(shown)
     standing = sum(change.standing is Standing.STANDS for change in changes)
     told = f"{same} of {len(changes)} unchanged; {standing} of the new grades stand"
-    return Group(table, Text(told)) if shown else Text(told)
+    return Group(made, told) if shown else told
 
 
-def rank_table(table: RankTable) -> RenderableType:
+def rank_table(ranks: RankTable) -> RenderableType:
     """A row a student, the best first."""
-    shown = Table("place", "student", ", ".join(filter(None, (table.measure, table.unit))), box=None, pad_edge=False)
-    shown.add_column("95 % interval")
-    shown.add_column("trials that count")
-    for column in shown.columns[0], shown.columns[2]:
-        column.justify = "right"
-    for row in table.texts:
-        shown.add_row(*map(Text, row))
-    return Group(Text(f"{table.assignment}: {table.title}"), shown)
+    measure = ", ".join(filter(None, (ranks.measure, ranks.unit)))
+    made = table("place", "student", measure, "95 % interval", "trials that count", right=("place", measure))
+    for row in ranks.texts:
+        made.add_row(*row)
+    return Group(f"{ranks.assignment}: {ranks.title}", made)
 
 
 def history_table(history: Sequence[AuditEntry]) -> Table:
     """Who did what, and when."""
-    table = Table("when", "who", "did", "what came of it", box=None, pad_edge=False)
+    made = table("when", "who", "did", "what came of it")
     for entry in history:
         detail = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in entry.detail.items())
         when = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
-        table.add_row(when, Text(entry.actor), entry.action, Text(detail))
-    return table
+        made.add_row(when, entry.actor, entry.action, detail)
+    return made
 
 
 def remarks(line: JobLine) -> list[str]:

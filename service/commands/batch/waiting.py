@@ -23,6 +23,7 @@ from rich.progress import (
 from rich.text import Text
 from sqlalchemy import select
 
+from service.commands.shown import note
 from service.queue.notifier import Notifier
 from service.store import batches
 from service.store.engine import Store
@@ -94,7 +95,7 @@ class Waiting:
             while True:
                 if (held := self._held()) is not was_held:
                     goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
-                    self.console.print(f"batch {self.batch_id} {goes_on}", highlight=False, soft_wrap=True)
+                    note(f"batch {self.batch_id} {goes_on}")
                     was_held = held
                 self.keep_up()
                 if time.monotonic() - swept >= _REAP_SECONDS:

@@ -52,7 +52,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
     (folder / "[red]odd.txt").write_text("x")
     home = tmp_path_factory.mktemp("home")
     reports = folder.parent / "reports"
-    ended = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--wait", "--report", reports)
+    ended = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--wait", "--output", reports)
     return home, ended, reports
 
 
@@ -71,7 +71,7 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     odd = f"{file_stem('[red]odd.txt', 'refused')}.html"
     assert {path.name for path in reports.iterdir()} == {"flawed.html", "index.html", "reference.html", odd}
     assert "data:image/png;base64," in (reports / "reference.html").read_text()
-    assert f"report: {reports / 'index.html'}" in ended.out
+    assert f"report: {reports / 'index.html'}" in ended.err
     index = (reports / "index.html").read_text()
     assert 'href="reference.html"' in index
     assert "[red]odd.txt" in index
@@ -99,7 +99,7 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     home, ended, _ = graded
     found = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
     assert found is not None
-    shown = robomark(home, "show", found[1], "--report", tmp_path / "out")
+    shown = robomark(home, "show", found[1], "--output", tmp_path / "out")
     assert shown.status == 0
     assert "10" in shown.out
     images = sorted((tmp_path / "out").glob("*.png"))

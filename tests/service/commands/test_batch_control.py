@@ -77,7 +77,7 @@ def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Pat
 def test_a_file_for_each_submission(graded: tuple[Path, Path, Ended], tmp_path: Path, form: str) -> None:
     home, _, ended = graded
     out = tmp_path / "out" / form
-    exported = robomark(home, "batch", "export", _batch(ended), "--format", form, "--out", out)
+    exported = robomark(home, "batch", "export", _batch(ended), "--format", form, "--output", out)
     refused = ["line 4: eve", "line 5: bob", "line 6: mia", "line 7: kim"] if FORMATS[form].refusal else []
     assert (exported.status, exported.out.split()[0]) == (0, str(2 + len(refused)))
     odd = f"{file_stem('=1/2 🤖')}{FORMATS[form].suffix}"
@@ -92,7 +92,7 @@ def test_a_file_for_each_submission(graded: tuple[Path, Path, Ended], tmp_path: 
         assert json.loads(text)["score"] == 10
     on_screen = robomark(home, "batch", "export", _batch(ended), "--format", form)
     assert on_screen.status == (2 if FORMATS[form].table is None else 0)
-    assert ("--out" in on_screen.err) == (FORMATS[form].table is None)
+    assert ("--output" in on_screen.err) == (FORMATS[form].table is None)
 
 
 @pytest.mark.long

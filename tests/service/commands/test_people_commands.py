@@ -48,7 +48,7 @@ def download(tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path, tmp_path: Path) -> None:
     home, sheet, reports = tmp_path / "home", tmp_path / "worksheet.csv", tmp_path / "reports"
-    words = ["batch", "submit", download, "-a", ECHO, "--people", sheet, "--wait", "--report", reports]
+    words = ["batch", "submit", download, "-a", ECHO, "--people", sheet, "--wait", "--output", reports]
     ended = robomark(home, *words)
     assert ended.status == 2
     found = re.search(r"batch (\w{12}): 2 queued", ended.out)
@@ -81,12 +81,12 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
 def test_submitting_says_whether_a_worker_runs(download: Path, tmp_path: Path) -> None:
     home = tmp_path / "home"
     alone = robomark(home, "batch", "submit", download, "-a", ECHO)
-    assert "no worker runs: robomark worker starts one" in alone.out
+    assert "no worker runs: robomark worker starts one" in alone.err
     with open_store(Settings(home=home)) as store:
         for name in ("one", "two"):
             workers.beat(store, WorkerDescription(name, "here", 3, "0", "all"))
     helped = robomark(home, "batch", "submit", download, "-a", ECHO, "--again")
-    assert "2 workers grade them, 6 at a time" in helped.out
+    assert "2 workers grade them, 6 at a time" in helped.err
 
 
 def test_several_are_one_document_that_names_student_and_file(tmp_path: Path) -> None:

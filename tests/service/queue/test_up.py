@@ -48,7 +48,9 @@ def _address(up: subprocess.Popen[str]) -> str:
 def _ready(up: subprocess.Popen[str]) -> str:
     address = _address(up)
     assert up.stdout is not None
-    assert up.stdout.readline().startswith("ready: ")
+    ready = json.loads(up.stdout.readline())
+    assert ready["event"] == "up.ready"
+    assert ready["message"].startswith("ready: ")
     return address
 
 
@@ -114,9 +116,9 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         below = descendants(up.pid)
         up.send_signal(signal.SIGINT)
         out, err = up.communicate(timeout=60)
-        assert (up.returncode, out) == (0, "")
+        assert (up.returncode, err) == (0, "")
         # What was begun was ended in the time that is left to it, or went back.
-        assert re.fullmatch(r"ended; jobs in flight that went back: [01]\n", err)
+        assert re.fullmatch(r"ended; jobs in flight that went back: [01]", json.loads(out)["message"])
         assert not any(map(alive, below))
         assert _jobs(store, JobState.RUNNING) == 0
         with store.reading() as session:

@@ -10,7 +10,7 @@ from sim.floors import names
 
 
 def test_the_page_shows_every_floor_by_name_and_loads_nothing(tmp_path: Path) -> None:
-    ended = robomark("floors", tmp_path / "floors")
+    ended = robomark("floors", "--output", tmp_path / "floors")
     assert (ended.returncode, ended.stderr) == (0, "")
     page = (tmp_path / "floors" / "index.html").read_text()
     assert re.findall(r'<img src="data:image/png;base64,[^"]{2000,}" alt="The floor (\w+)\.">', page) == list(names())

@@ -77,7 +77,7 @@ def test_the_home_is_private_whatever_the_umask_and_reports_go_by_it(tmp_path: P
     home, report, marks = tmp_path / "home", tmp_path / "reports", tmp_path / "marks.csv"
     (tmp_path / "class").mkdir()
     shutil.copytree(examples("echo-responder") / "reference", tmp_path / "class" / "ada")
-    submitted = ("batch", "submit", tmp_path / "class", "-a", "echo-responder", "--report", report)
+    submitted = ("batch", "submit", tmp_path / "class", "-a", "echo-responder", "--output", report)
     ended = _robomark(home, 0o000, *submitted)
     assert ended.returncode == 0, ended.stderr
     assert {path.name for path in home.iterdir()} >= {"robomark.db", "run", "log", "broker"}
@@ -279,3 +279,14 @@ def test_a_worker_by_itself_takes_the_umask_of_the_home(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.communicate()
+
+
+def test_what_python_keeps_of_modules_is_for_whoever_reads_the_modules(tmp_path: Path) -> None:
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "late.py").write_text("found = 1\n")
+    code = "from service.home import keep_private; keep_private(); import package.late; open('own', 'w')"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": ""}
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, umask=0o022, check=True)
+    (late,) = tmp_path.rglob("late.*.pyc")
+    assert (_mode(late), _mode(late.parent)) == (0o644, 0o755)
+    assert _mode(tmp_path / "own") == 0o600

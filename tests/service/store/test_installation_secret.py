@@ -186,7 +186,7 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
     environment = {"ROBOMARK_HOME": str(home), "ROBOMARK_SECRET": SECRET, "ROBOMARK_LOG_LEVEL": "DEBUG"}
     done = [
         robomark(
-            "batch", "submit", batch, "-a", "echo-responder", "--wait", "--report", tmp_path / "out", **environment
+            "batch", "submit", batch, "-a", "echo-responder", "--wait", "--output", tmp_path / "out", **environment
         )
     ]
     found = re.search(r"^ada .* (\w+) *$", done[0].stdout, re.MULTILINE)

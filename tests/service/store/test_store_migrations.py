@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from alembic import command
+from alembic.script import ScriptDirectory
 from sqlalchemy import func, inspect, select, text
 
 import report_builders
@@ -17,8 +18,9 @@ from first_release import lay_first_release
 from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
-from service.store.migrate import configuration, current_revision, newest_revision
+from service.store.migrate import configuration
 from service.store.models import Artifact, Base, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
+from service.store.revision import current_revision, newest_revision
 from service.store.states import JobState, Standing
 from sim.errors import HostError
 from submissions.people import Refusal
@@ -33,7 +35,9 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
         assert current_revision(store.engine) == newest_revision()
         assert set(inspect(store.engine).get_table_names()) == {*Base.metadata.tables, "alembic_version"}
         with store.engine.begin() as connection:
-            command.check(configuration(connection))
+            known = configuration(connection)
+            command.check(known)
+            assert ScriptDirectory.from_config(known).get_current_head() == newest_revision()
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:

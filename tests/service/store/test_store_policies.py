@@ -12,11 +12,11 @@ import report_builders
 from builders import grading_request
 from service.store import batches, jobs, policies, regrades, results
 from service.store.engine import Store, now
-from service.store.intake import Accepted, accept, accept_batch, accept_new, course_of
+from service.store.intake import Accepted, accept, accept_batch, accept_new
 from service.store.models import Job, SubmissionRow
 from service.store.policies import PolicyLimits
 from service.store.states import JobState, Lane
-from service.store.students import Students
+from service.store.students import Students, course_of
 from sim.recording import Verdict
 from submissions.people import Student
 

@@ -1,0 +1,101 @@
+"""All commands by name: where each is, and what the lists of commands say of it. Imports none of them.
+
+What a command does is told by its own module; ``command_line.py`` loads the one that is to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """``module:name`` below ``service.commands``; ``serves`` is what runs until it is told to stop, and logs."""
+
+    where: str
+    summary: str
+    serves: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CommandGroup:
+    """Commands that are called by the group's name and their own."""
+
+    summary: str
+    commands: Mapping[str, Command]
+
+
+#: In the order in which help lists them.
+COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
+    {
+        "run": Command("run:run", "Run a robot program or a notebook in the simulator."),
+        "grade": Command("grade:grade", "Grade submissions now."),
+        "batch": CommandGroup(
+            "Grade many submissions through the queue.",
+            {
+                "submit": Command("batch.submit:submit", "Queue a submission for each student."),
+                "list": Command("batch.listing:list_batches", "List the newest batches."),
+                "status": Command("batch.status:status", "Show how far a batch is, its marks and statistics."),
+                "similar": Command("batch.similar:similar", "Show whose submissions are alike, for staff."),
+                "export": Command("batch.export:export", "Write the marks of a batch for another program."),
+                "pause": Command("batch.control:pause", "Begin no more of a batch."),
+                "resume": Command("batch.control:resume", "Let a paused batch go on."),
+                "cancel": Command("batch.control:cancel", "End what of a batch is not graded yet."),
+                "retry": Command("batch.control:retry", "Queue again what could not be graded."),
+                "regrade": Command("batch.regrade:regrade", "Grade a batch again."),
+                "publish": Command("batch.regrade:publish", "Let the newest grades stand, and release them."),
+            },
+        ),
+        "assignments": CommandGroup(
+            "List, show, check, make and export assignments.",
+            {
+                "list": Command("assignments.listing:list_assignments", "List the catalogue."),
+                "show": Command("assignments.showing:show", "Show what an assignment asks for."),
+                "check": Command("assignments.checking:check", "Find mistakes in an assignment, grade its examples."),
+                "new": Command("assignments.writing:new", "Make the folder of a new assignment."),
+                "export": Command("assignments.writing:export", "Write an assignment out."),
+                "autograder": Command("assignments.writing:autograder", "Make an autograder for Gradescope."),
+            },
+        ),
+        "models": CommandGroup(
+            "List, train and evaluate classifiers.",
+            {
+                "list": Command("models.cards:list_models", "List the classifiers and how often each is right."),
+                "train": Command("models.measuring:train", "Train a classifier again."),
+                "evaluate": Command("models.measuring:evaluate", "Measure a classifier."),
+                "compare": Command("models.cards:compare", "Show the cards of classifiers side by side."),
+            },
+        ),
+        "floors": Command("floors:floors", "Draw every floor with its scale."),
+        "show": Command("show:show", "Show a grade that is stored."),
+        "verify": Command("verify:verify", "Run a stored grading again and compare."),
+        "course": CommandGroup(
+            "Say when and how often students may submit.",
+            {
+                "policy": Command("course:policy", "Say what holds for all, or show it."),
+                "extend": Command("course:extend", "Allow one student more time or attempts."),
+                "enrol": Command("course:enrol", "Enrol students before they submit."),
+            },
+        ),
+        "up": Command("up:up", "Bring up broker, workers and web server.", serves=True),
+        "serve": Command("up:serve", "Answer on the web: health and metrics.", serves=True),
+        "worker": Command("worker:worker", "Grade what is queued until told to stop.", serves=True),
+        "doctor": Command("doctor:doctor", "Look at everything that grading needs on this machine."),
+        "db": CommandGroup(
+            "Look after the database.",
+            {
+                "upgrade": Command("database:upgrade_tables", "Bring the tables up to this release."),
+                "backup": Command("database:backup_database", "Copy the database while it is in use."),
+                "restore": Command("database:restore_database", "Bring a backup into an empty database."),
+                "purge": Command("database:purge_database", "Remove what is old."),
+            },
+        ),
+        "sandbox": CommandGroup(
+            "Show the sandbox round student code.",
+            {"check": Command("sandbox:check", "Put up the sandbox, try it, and say which layers stand.")},
+        ),
+        "demo": Command("demo:demo", "Grade sample submissions through a real worker."),
+    }
+)

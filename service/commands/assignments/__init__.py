@@ -1,0 +1,1 @@
+"""``robomark assignments``, a module for each kind of command."""

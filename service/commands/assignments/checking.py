@@ -1,0 +1,26 @@
+"""``robomark assignments check``: what can be said to it. What it does is ``examples.py``'s, which loads long."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from sim.errors import UsageError
+
+
+def check(
+    assignment: Annotated[str | None, typer.Argument(help="Its id in the catalogue, or its folder.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Check the whole catalogue and print one table.")] = False,
+    write_expected: Annotated[
+        bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
+    ] = False,
+) -> None:
+    """Find every mistake in an assignment's files, and grade its examples: do they get what they must?"""
+    if everything == (assignment is not None):
+        raise UsageError("name one assignment to check, or give --all for the whole catalogue")
+    if everything and write_expected:
+        raise UsageError("name the one assignment whose expectations are to be written")
+    from service.commands.assignments import examples
+
+    examples.check(assignment, write_expected=write_expected)

@@ -1,0 +1,18 @@
+"""``robomark assignments list``: the catalogue, a line each."""
+
+from __future__ import annotations
+
+from service.commands.shown import document, show, table
+from service.reports.readable import number, one_line
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.overview import overview
+
+
+def list_assignments() -> None:
+    """The assignments of the catalogue."""
+    assignments = [overview(assignment_folder(name)) for name in catalogue()]
+    document(assignments=assignments)
+    listed = table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
+    for each in assignments:
+        listed.add_row(each.section, each.id, one_line(each.title), number(each.marks), str(each.trials))
+    show(listed)

@@ -1,0 +1,87 @@
+"""``robomark assignments show``: what one assignment asks for, and how it is marked."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from service.commands.assignments.which import Which, count_words
+from service.commands.shown import document, table, tell
+from service.commands.shown import show as show_parts
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+
+def show(assignment: Which) -> None:
+    """What an assignment asks for, and how it is marked."""
+    from rich.text import Text
+
+    from service.reports.readable import one_line, readable
+    from submissions.assignment.reader import find_assignment
+
+    found = find_assignment(assignment)
+    trials = {each.id: sum(trial.scenario is each for trial in found.trials()) for each in found.scenarios}
+    document(**_told(found, trials))
+    title = Text(one_line(found.title), style="bold")
+    show_parts(title.append(f" ({found.id}), {found.max_marks:g} marks", style="not bold"))
+    if found.description:
+        show_parts(Text(_flowing(readable(found.description.strip(), 20_000, lines=500))))
+    show_parts(f"\n{_setting(found)}")
+    if found.given:
+        show_parts(f"given files: {', '.join(sorted(found.given))}")
+    criteria = table("criterion", "check", "marks", right=("marks",))
+    for criterion in found.criteria:
+        criteria.add_row(one_line(criterion.title), criterion.check, f"{criterion.marks:g}")
+    show_parts(criteria)
+    for scenario in found.scenarios:
+        counted = count_words(trials[scenario.id], "trial", "trials")
+        tell(f"scenario {scenario.id}: {counted} of at most {scenario.seconds:g} s, {scenario.visibility}")
+
+
+def _told(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
+    """What a document says of an assignment."""
+    return {
+        "id": found.id,
+        "title": found.title,
+        "section": found.section,
+        "description": found.description,
+        "version": found.version,
+        "marks": found.max_marks,
+        "background": found.world.background,
+        "robot": found.world.robot,
+        "program": found.parts.program,
+        "responder": found.parts.responder,
+        "given": sorted(found.given),
+        "criteria": [
+            {"id": each.id, "title": each.title, "check": each.check, "marks": each.marks} for each in found.criteria
+        ],
+        "scenarios": [
+            {"id": each.id, "trials": trials[each.id], "seconds": each.seconds, "visibility": each.visibility}
+            for each in found.scenarios
+        ],
+    }
+
+
+def _cell(which: str) -> str:
+    """The marked robot program of a notebook, in words."""
+    if which.isdecimal():
+        return f"robot program {which}"
+    return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'
+
+
+def _setting(found: Assignment) -> str:
+    if not found.scenarios:
+        return f"no robot is run; responder: {found.parts.responder}"
+    agents = "".join(f", {name}: {who}" for name, who in found.parts.agents.items())
+    noise = "" if found.world.noise == "course" else f", motor noise in {found.world.noise}"
+    return (
+        f"world: {found.world.background}, robot {found.world.robot}{noise}; "
+        f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
+        f"of a notebook: {_cell(found.parts.cell)}"
+    )
+
+
+def _flowing(text: str) -> str:
+    """Paragraphs on one line each, to be broken by whoever shows them; lists and indented lines stay."""
+    return re.sub(r"(?<=\S)\n(?=[^\W\d])", " ", text)

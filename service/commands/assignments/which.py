@@ -1,0 +1,14 @@
+"""The argument that names an assignment."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Which = Annotated[str, typer.Argument(help="Its id in the catalogue, or its folder.")]
+
+
+def count_words(number: int, one: str, many: str) -> str:
+    """``1 trial``, ``2 trials``."""
+    return f"{number} {one if number == 1 else many}"

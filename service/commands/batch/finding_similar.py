@@ -1,0 +1,65 @@
+"""Shows whose submissions of a batch are alike, for staff to look at.
+
+What is alike is decided in ``service.similarity``; marks neither come from it nor change by it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from service.commands.shown import document, note, show, table, tell
+from service.reports.similarity import as_plain, similarity_page, similarity_rows, what_it_says
+from service.reports.view import SimilarityView, staff_similarity
+from service.reports.written import prepare_folder, write_page
+from service.settings import load_settings
+from service.similarity.sources import sources_of
+from service.store import batches, intake
+from service.store.batches import JobLine
+from service.store.engine import Store, open_store
+from service.store.similarities import similarities
+
+#: Pairs on the screen and on the page; the JSON has all.
+_MOST_SHOWN = 100
+
+
+def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
+    """Show the pairs, and write the page with the evidence. Raises UsageError for what cannot be read or written."""
+    if output is not None:
+        prepare_folder(output)
+    with open_store(load_settings()) as store:
+        with store.reading() as session:
+            batch_id = batches.find_batch(session, batch)
+            name = batches.batch(session, batch_id).name
+            lines = batches.job_lines(session, batch_id)
+        view = staff_similarity(similarities(store, lines, given))
+        if output is not None:
+            page = similarity_page(view, _Texts(store, lines).of, f"Alike in {name}", _MOST_SHOWN)
+            path = write_page(output, "similar.html", page)
+            note(f"evidence: {path}")
+    document(assignments=as_plain(view))
+    _show(view)
+
+
+def _show(view: SimilarityView) -> None:
+    for found in view.found:
+        tell(what_it_says(found))
+        alike = table("student", "student", "alike", "where", "did the same")
+        for row in similarity_rows(found)[:_MOST_SHOWN]:
+            alike.add_row(*row)
+        if found.pairs:
+            show(alike)
+        if len(found.pairs) > _MOST_SHOWN:
+            tell(f"and {len(found.pairs) - _MOST_SHOWN} pairs more: --json has them all")
+
+
+class _Texts:
+    """The sources that a page quotes, read when they are asked for."""
+
+    def __init__(self, store: Store, lines: list[JobLine]) -> None:
+        self._store = store
+        self._jobs = {(line.assignment, line.student): line.id for line in lines}
+
+    def of(self, assignment: str, student: str, file: str) -> str:
+        with self._store.reading() as session:
+            submission = intake.load_submission(session, self._jobs[assignment, student])
+        return sources_of(submission)[file]

@@ -1,0 +1,47 @@
+"""``robomark batch submit``: what can be said to it. What it does is ``submitting.py``'s, which takes long to load."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sim.errors import UsageError
+
+
+def submit(
+    grading_requests: Annotated[
+        Path, typer.Argument(help="A folder or .zip with a submission for each student, or a .csv roster.")
+    ],
+    assignment: Annotated[
+        str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
+    ] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for the marks and show them.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write a report for each submission into this folder; waits."),
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Grade again what was submitted already.")] = False,
+    people: Annotated[
+        Path | None,
+        typer.Option(help="Who is in the course: a .csv with id, name, email; Moodle's grading worksheet is one."),
+    ] = None,
+) -> None:
+    """Queue a submission for each student; bad ones are named and stop no other.
+
+    Downloads of Moodle, Gradescope and nbgrader are taken as they are. A roster has the columns student (or id), file
+    and, where it has them, name, email, assignment; files lie below it. A student's newest submission replaces one
+    that still waits, and the same one again changes nothing.
+
+    Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
+    not be graded.
+    """
+    from service.commands.batch import submitting
+
+    if wait or output is not None:
+        refused = submitting.submit_and_wait(grading_requests, assignment, output=output, again=again, people=people)
+    else:
+        refused = submitting.submit(grading_requests, assignment, again=again, people=people)
+    if refused:
+        raise UsageError(f"{refused} of the submissions could not be taken in; the others were")

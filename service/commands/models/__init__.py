@@ -1,0 +1,1 @@
+"""``robomark models``, a module for each kind of command."""

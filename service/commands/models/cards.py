@@ -1,0 +1,93 @@
+"""``robomark models list`` and ``compare``: what the cards of classifiers say. Nothing is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from models.cards import Card, CardCurve, Tally, card, names
+from service.commands.models.shared import Output, interval, keep
+from service.commands.shown import document, show, table
+from service.home import for_the_user
+from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def list_models() -> None:
+    """The packaged classifiers and how often each is right, with the 95 % interval."""
+    cards = [card(name) for name in names()]
+    document(models=[_told(about) for about in cards])
+    numbers = ("trained on", "right", "95 % interval", "of")
+    listed = table("name", "file", *numbers, right=numbers)
+    for about in cards:
+        accuracy = about.measured.accuracy
+        listed.add_row(about.name, about.file, str(about.training_images), f"{accuracy.share:.3f}", interval(accuracy),
+                       str(accuracy.n))  # fmt: skip
+    show(listed)
+
+
+def compare(
+    chosen: Annotated[
+        list[str], typer.Argument(metavar="NAME NAME...", help="Models of the same things, two or more.")
+    ],
+    output: Output = None,
+) -> None:
+    """What the cards of classifiers say, side by side: how often each is right, with the 95 % intervals."""
+    with for_the_user():
+        about = [card(name) for name in chosen]
+        if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:
+            raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same things")
+    if output is not None:
+        from service.reports.written import prepare_folder
+
+        prepare_folder(output)
+    document(models=[_told(each) for each in about], curves=_in_common(about))
+    show(_beside("", [("accuracy", [each.measured.accuracy for each in about])], chosen))
+    for curves in _in_common(about):
+        first = curves[0]
+        rows = [(f"{value:g}", [curve.tallies[at] for curve in curves]) for at, value in enumerate(first.values)]
+        show("", _beside(f"{first.varied} ({first.unit}): {first.under}", rows, chosen))
+    if output is not None:
+        from service.reports.plots.models import comparison_plot
+
+        keep(output / f"{'-and-'.join(chosen)}.png", comparison_plot(chosen, _in_common(about)))
+
+
+def _told(about: Card) -> dict[str, Any]:
+    """What a document says of a card."""
+    accuracy = about.measured.accuracy
+    low, high = accuracy.interval
+    return {
+        "name": about.name,
+        "file": about.file,
+        "training_images": about.training_images,
+        "classes": about.classes,
+        "accuracy": {"value": accuracy.share, "low": low, "high": high, "n": accuracy.n},
+    }
+
+
+def _in_common(about: Sequence[Card]) -> list[list[CardCurve]]:
+    """The curves that every card has, for each what the cards have of it."""
+    found = []
+    for first in about[0].measured.curves:
+        same = [
+            curve
+            for each in about
+            for curve in each.measured.curves
+            if (curve.varied, curve.under, curve.values) == (first.varied, first.under, first.values)
+        ]
+        if len(same) == len(about):
+            found.append(same)
+    return found
+
+
+def _beside(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], chosen: Sequence[str]) -> Table:
+    made = table("", *chosen, "of", right=("", *chosen, "of"), title=title)
+    for head, tallies in rows:
+        shares = (f"{tally.share:.3f} ({interval(tally)})" for tally in tallies)
+        made.add_row(head, *shares, "/".join(dict.fromkeys(str(tally.n) for tally in tallies)))
+    return made

@@ -1,0 +1,34 @@
+"""What the commands about classifiers have in common: their arguments, and how an interval and a file are told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from models.cards import Tally
+from service.commands.shown import note
+from service.home import for_the_user
+from sim.errors import UsageError
+
+Name = Annotated[str, typer.Argument(help="The model's name, as the list has it.")]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Write the plots and the numbers into this folder.")
+]
+
+
+def interval(tally: Tally) -> str:
+    """The 95 % interval, in words."""
+    low, high = tally.interval
+    return f"{low:.3f} to {high:.3f}"
+
+
+def keep(path: Path, data: bytes) -> None:
+    """Write a file for the user and say where. Raises UsageError where it cannot be written."""
+    try:
+        with for_the_user():
+            path.write_bytes(data)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}") from error
+    note(str(path))

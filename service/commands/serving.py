@@ -1,0 +1,93 @@
+"""The whole service on this machine, or its web server alone, until it is told to stop.
+
+What is kept running is ``supervisor.py``'s and ``web``'s.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+
+import structlog
+from sqlalchemy.exc import SQLAlchemyError
+
+from responders.sandbox import control_group
+from responders.sandbox.manager import Sandboxes
+from service.queue.logs import announce, configure_logging
+from service.queue.supervisor import Supervisor, alone_in
+from service.settings import Settings, load_settings
+from service.store.engine import Store, open_store
+from service.web.listening import address, listen
+from service.web.server import serve_on
+from sim.errors import HostError, RobomarkError
+
+_log = structlog.get_logger(__name__)
+_LOOK_SECONDS = 0.5
+
+
+def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
+    """Keep broker, workers and web server up until Ctrl-C."""
+    settings = load_settings()
+    configure_logging(settings.log_level)
+    # Before there are others in this group: it can only be divided when nobody is left in it.
+    control_group.divide()
+    with ExitStack() as held:
+        leave_note = held.enter_context(alone_in(settings))
+        listening = held.enter_context(listen(host, port)) if serve else None
+        where = "" if listening is None else f", {address(listening)}"
+        leave_note(where)
+        with Sandboxes() as sandboxes:
+            # Here the reason can be said; a worker that refuses would only be seen to end.
+            sandboxes.check()
+        store = held.enter_context(open_store(settings))
+        try:
+            _keep_up(settings, store, Supervisor(settings, store, workers, listening), where)
+        except KeyboardInterrupt:
+            return
+
+
+def answer(host: str, port: int) -> None:
+    """Answer on the web until Ctrl-C."""
+    settings = load_settings()
+    configure_logging(settings.log_level)
+    open_store(settings).close()
+    with listen(host, port) as listening:
+        announce("serve.answers", f"robomark answers on {address(listening)}; Ctrl-C ends it")
+        try:
+            serve_on(settings, listening)
+        except KeyboardInterrupt:
+            return
+
+
+def _keep_up(settings: Settings, store: Store, service: Supervisor, where: str) -> None:
+    with service:
+        try:
+            service.ensure()
+            count = len(service.workers)
+            workers = "1 worker" if count == 1 else f"{count} workers"
+            announce("up.coming", f"robomark is coming up in {settings.home}: {workers}{where}")
+            _until_ready(service)
+            announce("up.ready", f"ready: {count * settings.concurrency} gradings at a time; Ctrl-C ends it")
+            while True:
+                _ensure(service)
+                time.sleep(_LOOK_SECONDS)
+        except KeyboardInterrupt:
+            given_back = service.stop()
+            announce("up.ended", f"ended; jobs in flight that went back: {given_back}")
+            raise
+
+
+def _until_ready(service: Supervisor) -> None:
+    while not service.ready:
+        service.ensure()
+        if sentence := service.short_lived():
+            raise HostError(sentence)
+        time.sleep(_LOOK_SECONDS)
+
+
+def _ensure(service: Supervisor) -> None:
+    """Once up, nothing but Ctrl-C ends it: what cannot be started now is tried again."""
+    try:
+        service.ensure()
+    except (RobomarkError, SQLAlchemyError, OSError) as error:
+        _log.warning("up.not_whole", error=str(error))

@@ -1,0 +1,45 @@
+"""How the statistics of assignments are shown on a terminal: a sentence and two tables for each.
+
+What they are is ``grading/statistics.py``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from service.commands.shown import table
+from service.reports.readable import one_line
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from service.grading.statistics import AssignmentStatistics
+
+_MOST_CAUSES = 5
+#: Students that a row names.
+_MOST_NAMED = 10
+
+
+def statistics_parts(found: Iterable[AssignmentStatistics]) -> Iterator[RenderableType]:
+    """What is to be shown of each assignment, after an empty line."""
+    for each in found:
+        spread = "" if each.spread is None else f", standard deviation {each.spread:.2f}"
+        yield (
+            f"\n{each.assignment}: {each.n} graded; mean {each.mean:.2f} of {each.max_marks.normalize():f}{spread}; "
+            f"lowest {each.lowest:g}, median {each.median:g}, highest {each.highest:g}"
+        )
+        shares = table("criterion", "mean share of its marks", right=("mean share of its marks",))
+        for criterion in each.criteria:
+            shares.add_row(one_line(criterion.title), f"{criterion.mean_share:.0%}")
+        yield shares
+        if each.causes:
+            causes = table("commonest causes", "students", "who", right=("students",))
+            for cause in each.causes[:_MOST_CAUSES]:
+                causes.add_row(one_line(cause.sentence), str(len(cause.students)), named(cause.students))
+            yield causes
+
+
+def named(students: tuple[str, ...]) -> str:
+    """The first of them by name, and that there are more."""
+    return ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")

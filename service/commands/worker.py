@@ -1,0 +1,37 @@
+"""``robomark worker``: grades what is queued. What a worker does is ``queue/worker.py``'s."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from sim.errors import HostError
+
+
+def worker(
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
+    ] = False,
+) -> None:
+    """Grade what is queued until told to stop; starts the bundled broker if no other is named and none runs."""
+    from responders.sandbox import control_group
+    from service.commands.unsafe import warn_of_no_sandbox
+    from service.queue.broker import EmbeddedBroker
+    from service.queue.logs import configure_logging
+    from service.queue.worker import run_worker
+    from service.settings import load_settings
+
+    settings = load_settings()
+    configure_logging(settings.log_level)
+    if unsafe:
+        warn_of_no_sandbox()
+    if settings.broker_url:
+        status = run_worker(settings, unsafe=unsafe)
+    else:
+        # Before the broker is in this group: it can only be divided when nobody is left in it.
+        control_group.divide()
+        with EmbeddedBroker(settings) as broker:
+            status = run_worker(broker.settings, unsafe=unsafe)
+    if status:
+        raise HostError(f"the worker ended with status {status}; its log says why")

@@ -1,0 +1,46 @@
+"""The marks of jobs, as statistics are made of them: one look at the criteria's rows, and no recording. Only reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.grading.statistics import MarkedCriterion, MarkedSubmission
+from service.store.batches import JobLine
+from service.store.models import CriterionResultRow
+from service.store.states import JobState
+
+#: How many jobs are asked for at once: databases take so many values, and not every number of them.
+_AT_ONCE = 1000
+
+
+def marked(session: Session, lines: Sequence[JobLine]) -> list[MarkedSubmission]:
+    """Those of the jobs that are graded and not for staff alone."""
+    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
+    criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
+    for begin in range(0, len(graded), _AT_ONCE):
+        rows = session.execute(
+            select(
+                CriterionResultRow.job_id,
+                CriterionResultRow.criterion,
+                CriterionResultRow.title,
+                CriterionResultRow.marks,
+                CriterionResultRow.max_marks,
+            )
+            .where(
+                CriterionResultRow.job_id.in_([line.id for line in graded[begin : begin + _AT_ONCE]]),
+                CriterionResultRow.unjudged.is_(None),
+            )
+            .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
+        )
+        for job_id, criterion, title, marks, max_marks in rows:
+            criteria[job_id].append(MarkedCriterion(criterion, title, marks, max_marks))
+    return [
+        MarkedSubmission(
+            line.student, line.assignment, line.marks, line.max_marks, line.verdict or "", tuple(criteria[line.id])
+        )
+        for line in graded
+        if line.marks is not None
+    ]

@@ -1,0 +1,164 @@
+"""What holds of every command: it is listed and loads, it says the same as a document, and a pipe gets plain lines."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from builders import echo, grading_request
+from command import robomark
+from forked_command import EndedCommand, forked
+from report_builders import faulty_grade, shape_grade
+from service.command_line import load_command
+from service.command_table import COMMANDS, Command, CommandGroup
+from service.settings import Settings
+from service.store import jobs, results
+from service.store.engine import now, open_store
+from service.store.installation import secret_of
+from service.store.intake import accept_batch
+from submissions.assignment.examples import examples
+from submissions.people import Refusal, Student
+
+
+def _all() -> Iterator[tuple[tuple[str, ...], Command]]:
+    for name, listed in COMMANDS.items():
+        if isinstance(listed, CommandGroup):
+            yield from (((name, below), command) for below, command in listed.commands.items())
+        else:
+            yield (name,), listed
+
+
+ALL = dict(_all())
+#: Of each command that shows something, a line that runs here, and the keys of its document beside "schema".
+SHOWING = {
+    "batch list": "batches",
+    "batch status BATCH": "batch pace jobs changes ranks unpublished_regrades statistics history",
+    "batch submit new -a echo-responder": "batch queued known refusals",
+    "batch similar BATCH": "assignments",
+    "batch pause BATCH": "batch changed waiting running",
+    "batch resume BATCH": "batch changed waiting running",
+    "batch cancel BATCH": "batch changed waiting running",
+    "batch retry --all": "batch queued outdated",
+    "batch regrade BATCH": "batch regraded",
+    "batch publish BATCH": "batch published",
+    "assignments list": "assignments",
+    "assignments show echo-responder": (
+        "id title section description version marks background robot program responder given criteria scenarios"
+    ),
+    "assignments new task": "output",
+    "assignments export echo-responder -o exported": "output files",
+    "assignments autograder echo-responder -o autograder": "output",
+    "models list": "models",
+    "models compare digits digits-28": "models curves",
+    "show GRADE": "job grade",
+    "course policy": "policies",
+    "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
+    "course enrol people.csv": "students",
+    "db upgrade": "revision",
+    "db backup copy.db": "file bytes",
+    "db purge --before 2020-01-01": "removed archive submissions grades students",
+}
+#: As above, of commands that run student code or draw.
+LONG = {
+    "run robot.py": "run notes",
+    "assignments check echo-responder": "assignments statistics",
+    "models evaluate shapes": "name measured same",
+    "floors -o floors": "page floors",
+    "sandbox check": (
+        "kernel robot_programs responders no_bubblewrap_because no_control_group_because trials_remember_because"
+    ),
+    "doctor": "findings",
+    "batch submit new -a echo-responder --wait": "batch queued known refusals jobs statistics report",
+    "demo -o demo": "batch queued known refusals jobs statistics report",
+}
+#: Have the format ``json`` for their document, verify what was really graded, need an empty database, or a minute.
+_ELSEWHERE = {("grade",), ("batch", "export"), ("verify",), ("db", "restore"), ("models", "train")}
+_CASES = [
+    *(pytest.param(line, keys, id=line) for line, keys in SHOWING.items()),
+    *(pytest.param(line, keys, id=line, marks=pytest.mark.long) for line, keys in LONG.items()),
+]
+_LONG = "very " * 40 + "long"
+_BOXES_AND_ESCAPES = re.compile(r"[\u2500-\u259f\x1b]")
+
+
+def test_every_command_that_shows_something_is_tried_here() -> None:
+    tried = {words for line in {**SHOWING, **LONG} for words in ALL if tuple(line.split()[: len(words)]) == words}
+    assert tried | _ELSEWHERE == {words for words, command in ALL.items() if not command.serves}
+
+
+def test_every_command_that_is_listed_can_be_loaded_and_is_listed_whole() -> None:
+    for words in ALL:
+        assert load_command(*words).help, words
+    shown = robomark("--help").stdout + "".join(robomark(name, "--help").stdout for name in ("batch", "assignments"))
+    told = " ".join(shown.split())
+    groups = (COMMANDS["batch"], COMMANDS["assignments"])
+    for listed in (*COMMANDS.values(), *(each for group in groups for each in group.commands.values())):  # type: ignore[union-attr]
+        assert listed.summary in told
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """A home with a batch of two graded submissions, one that waits, and one refused; and the ids in it."""
+    folder = tmp_path_factory.mktemp("home")
+    refused = [Refusal("[red]odd.txt", f"is {_LONG} and no submission", Student("eve"))]
+    with open_store(Settings(home=folder)) as store:
+        requests = [grading_request(student, assignment=echo()) for student in ("ada", "bob", "cyd")]
+        batch = accept_batch(store, "class", requests, refused, max_attempts=2)
+        grades = []
+        for grade in (shape_grade(wrong=2), faulty_grade()):
+            claim = jobs.claim(store, "worker", 60)
+            assert claim is not None
+            with store.reading() as session:
+                at = now(session)
+            own = replace(grade, secret_sha256=secret_of(store).sha256)
+            jobs.finish(store, claim, results.prepare(own), at)
+            grades.append(claim.job_id)
+    return folder, {"BATCH": batch.id, "GRADE": grades[0]}
+
+
+@pytest.mark.parametrize(("line", "keys"), _CASES)
+def test_a_command_tells_the_same_in_words_and_as_a_document(
+    line: str, keys: str, home: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    database, ids = home
+    words = [ids.get(word, word) for word in line.split()]
+    plain, document = (_ended(tmp_path / option, database, *words, option) for option in ("--quiet", "--json"))
+    assert plain.err == ""
+    assert plain.out.strip()
+    assert not _BOXES_AND_ESCAPES.search(plain.out), plain.out
+    told = json.loads(document.out)
+    assert told["schema"] == 1
+    assert told.keys() == {"schema", *keys.split()}
+
+
+def test_a_pipe_gets_whole_names_and_a_row_a_line(home: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    database, ids = home
+    ended = _ended(tmp_path / "at work", database, "batch", "status", ids["BATCH"], COLUMNS="40", FORCE_COLOR="")
+    row = next(line for line in ended.out.splitlines() if line.startswith("eve"))
+    assert f"[red]odd.txt: is {_LONG} and no submission" in row
+
+
+def test_no_command_has_another_meaning_for_the_assignments_letter_or_another_name_for_where_files_go() -> None:
+    for words in ALL:
+        options = {name: option.name for option in load_command(*words).params for name in option.opts}
+        assert options.get("-a", "assignment") == "assignment", words
+        assert not {"--out", "--into", "--folder"} & options.keys(), words
+        assert "--report" not in options or words == ("grade",), words
+
+
+def _ended(folder: Path, database: Path, *words: str, **environment: str) -> EndedCommand:
+    """The command in a folder with what the lines name, on a copy of the database."""
+    folder.mkdir()
+    shutil.copytree(database, folder / "home")
+    shutil.copytree(examples("echo-responder") / "reference", folder / "new" / "dan")
+    (folder / "robot.py").write_text("print('hello')\n")
+    (folder / "people.csv").write_text("id,name,email\nada,Ada Lovelace,ada@example.org\n")
+    ended = forked(folder, *words, ROBOMARK_HOME=str(folder / "home"), **environment)
+    assert ended.status == 0, ended
+    return ended

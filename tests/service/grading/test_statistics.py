@@ -1,0 +1,55 @@
+"""What a class got for an assignment, in figures that can be worked out by hand."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+
+from report_builders import shape_grade
+from service.grading.statistics import MarkedCriterion, MarkedSubmission, marked_of, statistics_of
+
+
+def _marked(who: str, *marks: int, verdict: str = "finished", assignment: str = "echo") -> MarkedSubmission:
+    """Of a submission for criteria a, b ... of 4 marks each."""
+    criteria = tuple(
+        MarkedCriterion(name, f"Does {name}", Decimal(got), Decimal(4)) for name, got in zip("abc", marks, strict=False)
+    )
+    return MarkedSubmission(who, assignment, Decimal(sum(marks)), Decimal(4 * len(marks)), verdict, criteria)
+
+
+def test_a_class_of_four() -> None:
+    (found,) = statistics_of(
+        [_marked("dan", 4, 4), _marked("bob", 4, 0), _marked("ada", 2, 0), _marked("cyd", 0, 0, verdict="cpu_limit")]
+    )
+    assert (found.n, found.max_marks, found.mean) == (4, 8, 3.5)
+    assert (found.lowest, found.median, found.highest) == (0, 3, 8)
+    assert found.spread == pytest.approx(3.4157, abs=1e-4)
+    assert [(each.title, each.n, each.mean_share) for each in found.criteria] == [
+        ("Does a", 4, 0.625),
+        ("Does b", 4, 0.25),
+    ]
+    assert [(cause.sentence, cause.students) for cause in found.causes] == [
+        ("lost marks for: Does b", ("ada", "bob")),
+        ("ended as cpu_limit", ("cyd",)),
+        ("lost marks for: Does a", ("ada",)),
+    ]
+
+
+def test_each_assignment_by_itself_and_nothing_of_none() -> None:
+    found = statistics_of([_marked("ada", 4, assignment="walk"), _marked("ada", 2, assignment="echo")])
+    assert [(each.assignment, each.mean, each.spread) for each in found] == [("echo", 2, None), ("walk", 4, None)]
+    assert found[1].causes == ()
+    assert statistics_of([]) == ()
+
+
+def test_a_fault_that_cost_no_marks_is_no_cause() -> None:
+    (found,) = statistics_of([_marked("ada", 4, 4, verdict="time_limit")])
+    assert found.causes == ()
+
+
+def test_of_a_grade_the_criteria_that_were_judged_count() -> None:
+    grade = shape_grade()
+    marked = marked_of(grade)
+    assert (marked.marks, marked.max_marks, marked.verdict) == (grade.marks, grade.max_marks, "finished")
+    assert [each.id for each in marked.criteria] == [each.id for each in grade.criteria if not each.unjudged]

@@ -1,0 +1,43 @@
+"""What services print: JSON from the first line in a file or pipe, lines for a person in front of a terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+
+_CODE = (
+    "import logging, structlog\n"
+    "from service.queue.logs import announce, configure_logging\n"
+    "configure_logging('INFO')\n"
+    "announce('up.ready', 'ready: 2 gradings at a time')\n"
+    "structlog.get_logger('ours').warning('job.lost', job='j1')\n"
+    "logging.getLogger('theirs').error('no broker')\n"
+)
+
+
+def test_a_pipe_gets_json_from_the_first_line() -> None:
+    ended = subprocess.run([sys.executable, "-c", _CODE], capture_output=True, text=True, check=True)
+    (announced,) = map(json.loads, ended.stdout.splitlines())
+    assert (announced["event"], announced["message"]) == ("up.ready", "ready: 2 gradings at a time")
+    ours, theirs = map(json.loads, ended.stderr.splitlines())
+    assert (ours["event"], ours["job"], ours["level"]) == ("job.lost", "j1", "warning")
+    assert (theirs["event"], theirs["level"]) == ("no broker", "error")
+
+
+def test_a_terminal_gets_lines_for_a_person() -> None:
+    ours, its = pty.openpty()
+    environment = {**os.environ, "NO_COLOR": "1"}
+    subprocess.run([sys.executable, "-c", _CODE], stdout=its, stderr=its, env=environment, check=True)
+    shown = os.read(ours, 65536).decode()
+    for end in (ours, its):
+        os.close(end)
+    first, second, third = shown.splitlines()
+    assert first == "ready: 2 gradings at a time"
+    assert "job.lost" in second
+    assert "job=j1" in second
+    assert "no broker" in third
+    assert "\x1b" not in shown
+    assert "{" not in shown
