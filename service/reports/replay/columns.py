@@ -21,7 +21,7 @@ def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
     """Every column of which anything is known, by the name that readers are told."""
     told = {}
     for each in COLUMNS:
-        values = np.asarray(getattr(ticks, each.told_as), np.float64).reshape(len(ticks), -1)
+        values = np.asarray(getattr(ticks, each.told_as), np.float64).reshape(len(ticks), each.width)
         if len(ticks) and np.isfinite(values).any():
             per = _STEPS_OF_FINE if each.name in _FINE else _STEPS
             told[each.told_as] = {"unit": each.unit, "per": per, "added": [_added(part, per) for part in values.T]}

@@ -9,9 +9,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from responders.code import Code
 from service.reports.readable import one_line, readable
 from sim.recording import Fault
-from submissions.submission import Submission
+from submissions.submission import Notebook, Submission
 
 _MOST_LINES, _LONGEST_LINE = 3000, 300
 _WRITES = re.compile(r"\b(?:(print)|say|speak)\w*\s*\(\s*")
@@ -93,17 +94,25 @@ def sources_of(submission: Submission | None) -> Sources:
     if submission is None:
         return Sources()
     if submission.notebook is not None:
-        return Sources(
-            [
-                ShownSource(
-                    f"cell {cell.number}", "program" if _is_program(cell.source) else "", cell.source, cell.number
-                )
-                for cell in submission.notebook.cells
-                if cell.source.strip()
-            ]
-        )
-    files = (("program", submission.program), ("responder", submission.responder))
+        return sources_of_cells(submission.notebook)
+    return sources_of_files(submission.program, submission.responder)
+
+
+def sources_of_files(program: Code | None, responder: Code | None) -> Sources:
+    """A robot program and what answers it, as far as they are there."""
+    files = (("program", program), ("responder", responder))
     return Sources([ShownSource(code.name, who, code.text) for who, code in files if code is not None])
+
+
+def sources_of_cells(notebook: Notebook) -> Sources:
+    """Every code cell that has something in it."""
+    return Sources(
+        [
+            ShownSource(f"cell {cell.number}", "program" if _is_program(cell.source) else "", cell.source, cell.number)
+            for cell in notebook.cells
+            if cell.source.strip()
+        ]
+    )
 
 
 def _is_program(cell: str) -> bool:
