@@ -203,10 +203,12 @@ class SourcePanel {
     this.choice = element("select", { "aria-label": "Source" },
       ...sources.map((source, index) => element("option", { value: index }, source.name)));
     this.choice.addEventListener("change", () => this.open(Number(this.choice.value)));
-    this.lines = element("ol", { className: "lines", tabIndex: 0, role: "group", "aria-label": "Lines of the source" });
+    this.lines = element("ol");
+    this.window = element("div", { className: "lines", tabIndex: 0, role: "region", "aria-label": "Lines of the source" },
+      this.lines);
     this.known = element("p", { className: "small soft" });
     this.root = element("section", { className: "source", hidden: !sources.length },
-      element("div", { className: "source-head" }, element("h3", {}, "Source"), this.choice), this.lines, this.known);
+      element("div", { className: "source-head" }, element("h3", {}, "Source"), this.choice), this.window, this.known);
     this.choice.hidden = sources.length < 2;
   }
 
@@ -243,7 +245,7 @@ class SourcePanel {
     if (!marked) return;
     marked.setAttribute("aria-current", "step");
     marked.classList.toggle("wrong", latest.kind === "fault");
-    this.lines.scrollTop = marked.offsetTop - this.lines.clientHeight / 2;
+    this.window.scrollTop = marked.offsetTop - this.window.clientHeight / 2;
   }
 }
 
