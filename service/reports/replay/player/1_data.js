@@ -103,6 +103,16 @@ class Trial {
   }
 }
 
+// The last image that a robot has sent until t; null before the first.
+function latestImage(robot, t) {
+  let latest = null;
+  for (const image of robot.images) {
+    if (image.t > t + ALMOST) break;
+    latest = image;
+  }
+  return latest;
+}
+
 function pictureOf(source) {
   return new Promise((resolve) => {
     if (!source) return resolve(null);

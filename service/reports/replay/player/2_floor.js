@@ -16,6 +16,7 @@ class FloorCanvas {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.ground = document.createElement("canvas");
+    this.trail = document.createElement("canvas");
     this.mode = "path";
   }
 
@@ -78,11 +79,12 @@ class FloorCanvas {
     this.drawGround(width, height);
     const context = this.context;
     context.setTransform(1, 0, 0, 1, 0, 0);
+    this.drawTrail(ticks);
     context.drawImage(this.ground, 0, 0);
+    context.drawImage(this.trail, 0, 0);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.trial.robots.forEach((robot, which) => this.drawTrail(robot, ticks, which));
     this.trial.robots.forEach((robot, which) => this.drawRobot(robot, ticks, which));
-    this.drawImages(t, speed);
+    this.drawMisread(t, speed);
     this.drawTouches(t);
     this.drawLosses(t);
     this.drawTalk(t, ticks, speed);
@@ -99,6 +101,7 @@ class FloorCanvas {
     const drawn = [width, height, region.left, region.bottom, region.width].join(" ");
     if (drawn === this.drawnGround) return;
     this.drawnGround = drawn;
+    this.drawnTrail = null;
     this.ground.width = width;
     this.ground.height = height;
     const context = this.ground.getContext("2d");
@@ -124,7 +127,7 @@ class FloorCanvas {
     for (const robot of this.trial.robots) {
       robot.seen = this.thinned(robot);
       context.setLineDash([2, 3]);
-      this.strokeTrail(context, robot, 0, Infinity, "rgba(28, 38, 48, 0.55)", 1);
+      this.strokePath(context, robot, 0, robot.length, "rgba(28, 38, 48, 0.55)", 1);
       context.setLineDash([]);
     }
   }
@@ -143,46 +146,66 @@ class FloorCanvas {
     return kept;
   }
 
-  strokeTrail(context, robot, from, until, colour, width) {
+  strokePath(context, robot, from, until, colour, width) {
     context.beginPath();
-    let [tick, x, y] = [0, 0, 0];
-    let begun = false;
-    for ([tick, x, y] of robot.seen) {
-      if (tick < from) continue;
+    context.moveTo(...this.place.at(...robot.pose(from)));
+    for (const [tick, x, y] of robot.seen) {
+      if (tick <= from) continue;
       if (tick > until) break;
-      if (begun) context.lineTo(...this.place.at(x, y));
-      else context.moveTo(...this.place.at(x, y));
-      begun = true;
+      context.lineTo(...this.place.at(x, y));
     }
-    if (begun && until < Infinity) context.lineTo(...this.place.at(...robot.pose(until)));
+    context.lineTo(...this.place.at(...robot.pose(until)));
     context.strokeStyle = colour;
     context.lineWidth = width;
     context.lineJoin = "round";
-    context.lineCap = "round";
     context.stroke();
   }
 
-  drawTrail(robot, ticks, which) {
-    for (const [from, until] of robot.pen) {
-      if (from > ticks) break;
-      this.strokeTrail(this.context, robot, from, Math.min(until, ticks), COLOURS.pen, Math.max(4, 8 * this.place.scale));
+  // What the robots have left behind: drawn on from where it was, and anew when time goes back.
+  drawTrail(ticks) {
+    const context = this.trail.getContext("2d");
+    if (this.drawnTrail === null || ticks < this.drawnTrail) {
+      this.trail.width = this.ground.width;
+      this.trail.height = this.ground.height;
+      this.drawnTrail = -1;
     }
-    this.strokeTrail(this.context, robot, 0, ticks, COLOURS.paper, 4);
-    this.strokeTrail(this.context, robot, 0, ticks, which ? COLOURS.second : COLOURS.left, 2);
+    context.setTransform(this.place.ratio, 0, 0, this.place.ratio, 0, 0);
+    const from = Math.max(0, this.drawnTrail);
+    this.trial.robots.forEach((robot, which) => {
+      const until = Math.min(ticks, robot.length);
+      for (const [down, up] of robot.pen) {
+        const [begins, ends] = [Math.max(from, down), Math.min(until, up)];
+        if (begins < ends) this.strokePath(context, robot, begins, ends, COLOURS.pen, Math.max(4, 8 * this.place.scale));
+      }
+      if (from < until) {
+        this.strokePath(context, robot, from, until, COLOURS.paper, 4);
+        this.strokePath(context, robot, from, until, which ? COLOURS.second : COLOURS.left, 2);
+      }
+      this.drawImages(context, robot, ticks);
+    });
+    this.drawnTrail = ticks;
   }
 
-  drawImages(t, speed) {
-    const { at, scale } = this.place;
+  drawImages(context, robot, ticks) {
+    for (const image of robot.images) {
+      const taken = image.t / this.trial.tick - ALMOST;
+      if (taken > ticks) break;
+      if (taken <= this.drawnTrail) continue;
+      const [x, y] = this.place.at(...placed(image.pose, robot.body.left));
+      const side = Math.max(8, image.side * this.place.scale);
+      const wrong = isMisread(image);
+      outlined(context, wrong ? COLOURS.fault : COLOURS.ink, wrong ? 2.5 : 1.5, () =>
+        context.rect(x - side / 2, y - side / 2, side, side));
+    }
+  }
+
+  drawMisread(t, speed) {
     for (const robot of this.trial.robots) {
-      for (const image of robot.images) {
-        if (image.t > t + ALMOST) break;
-        const [x, y] = at(...placed(image.pose, robot.body.left));
-        const side = Math.max(8, image.side * scale);
-        const wrong = isMisread(image);
-        outlined(this.context, wrong ? COLOURS.fault : COLOURS.ink, wrong ? 2.5 : 1.5, () =>
-          this.context.rect(x - side / 2, y - side / 2, side, side));
-        if (wrong && t - image.t < lasting(speed)) this.bubble(`taken for ${image.answer ?? "nothing"}`, x, y + side / 2 + 14, COLOURS.fault);
-      }
+      const image = latestImage(robot, t);
+      if (!image || !isMisread(image) || t - image.t > lasting(speed)) continue;
+      const [x, y] = this.place.at(...placed(image.pose, robot.body.left));
+      const below = Math.max(8, image.side * this.place.scale) / 2 + 14;
+      this.bubble(`taken for ${image.answer ?? "nothing"}`, x, y + below, COLOURS.fault);
     }
   }
 

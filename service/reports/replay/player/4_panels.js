@@ -101,11 +101,7 @@ class SensorPanel {
   }
 
   drawSent(robot, t) {
-    let latest = null;
-    for (const image of robot.images) {
-      if (image.t > t + ALMOST) break;
-      latest = image;
-    }
+    const latest = latestImage(robot, t);
     if (latest === this.lastSent) return;
     this.lastSent = latest;
     drawPixels(this.eyes.sentLeft.canvas, latest && latest.left, latest && latest.side);
