@@ -18,7 +18,8 @@ from sim.recording import COLUMNS, Image, Pose, Recording, Ticks
 
 #: What is no student's text, in a replay's data and in a grade.
 _NO_TEXTS = {
-    "format", "image", "left", "right", "unit", "background", "robot", "sender", "who", "lost", "visibility", "missing", "note",
+    "format", "image", "left", "right", "unit", "background", "robot", "sender", "who", "lost", "visibility",
+    "missing", "note",
 }  # fmt: skip
 
 
