@@ -236,7 +236,9 @@ _decode = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_no_du
 
 
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
-_NUMBER = re.compile(rb'\{"n":(0|[1-9][0-9]{0,11}),')
+#: What every line begins with, and nothing else in it can hold: a quotation mark inside of it is escaped.
+BEGINNING = b'{"n":'
+_NUMBER = re.compile(re.escape(BEGINNING) + rb"(0|[1-9][0-9]{0,11}),")
 
 
 def unnumbered(line: bytes) -> tuple[int, bytes]:

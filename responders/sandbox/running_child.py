@@ -327,9 +327,11 @@ class Child:
             if not more:
                 break
             data += more
-        for line in reversed(data.splitlines()):
+        for line in reversed(data.split(b"\n")):
+            # Packed acts may stand before it.
+            start = max(line.rfind(wire.BEGINNING), 0)
             with contextlib.suppress(wire.WireError):
-                frame = wire.parse(wire.unnumbered(line)[1], {"busy": wire.ROBOT["busy"]})
+                frame = wire.parse(wire.unnumbered(line[start:])[1], {"busy": wire.ROBOT["busy"]})
                 return frame
         return _NOWHERE
 

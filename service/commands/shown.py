@@ -57,10 +57,16 @@ def tell(sentence: str) -> None:
 
 def show(*parts: RenderableType) -> None:
     """Parts of the result, in words and tables."""
-    if not wants_json():
-        console = _console(sys.stdout.isatty(), stderr=False)
+    if wants_json():
+        return
+    on_terminal = sys.stdout.isatty()
+    console = _console(on_terminal, stderr=False)
+    with console.capture() as shown:
         for part in parts:
             console.print(part)
+    # A table fills its last column with blanks, which nobody wants in a file.
+    lines = shown.get().split("\n")
+    sys.stdout.write("\n".join(lines if on_terminal else (line.rstrip() for line in lines)))
 
 
 def note(sentence: str) -> None:

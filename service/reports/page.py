@@ -28,6 +28,7 @@ from service.reports.words import (
     hints_of,
     verdict_words,
 )
+from sim.recorded import stood_still
 from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -35,6 +36,7 @@ from submissions.submission import Submission
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
 _MOST_TRIALS = 250
+_STOOD_STILL = "the robot stood still, so neither its path nor its sensors are drawn"
 PROCESS_LIMITS = "process limits only"
 
 
@@ -240,7 +242,10 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
             AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
             for each in recording.agent_outputs
         ),
-        notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
+        notes=(
+            *((_STOOD_STILL,) if stood_still(recording) else ()),
+            *(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
+        ),
     )
 
 

@@ -118,3 +118,8 @@ def test_thousands_of_acts_without_a_question_arrive(runner: TrialRunner) -> Non
     recording = run_program(runner, program, Pose(1000, 500, 0))
     assert [line.text for line in recording.printed] == ["there"]
     assert recording.faults == ()
+
+
+def test_a_busy_loop_is_named_though_acts_are_held_back(runner: TrialRunner) -> None:
+    recording = run_program(runner, "tank_drive.on(10, 10)\nwhile True:\n    pass", Pose(1000, 500, 0))
+    assert [fault.line for fault in recording.faults] in ([2], [3])

@@ -107,7 +107,7 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     grade = build.shape_grade()
     reader = Reader(report(student_view(grade), draw_all(grade)))
     sources = reader.values("img", "src")
-    assert len(sources) == 9
+    assert len(sources) == 7
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert base64.b64decode(sources[0].split(",")[1]).startswith(b"\x89PNG")
     assert all(len(alt) > 20 for alt in reader.values("img", "alt"))

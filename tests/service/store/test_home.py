@@ -283,7 +283,9 @@ def test_a_worker_by_itself_takes_the_umask_of_the_home(tmp_path: Path) -> None:
 
 def test_what_python_keeps_of_modules_is_for_whoever_reads_the_modules(tmp_path: Path) -> None:
     (tmp_path / "package").mkdir()
-    (tmp_path / "package" / "late.py").write_text("found = 1\n")
+    source = tmp_path / "package" / "late.py"
+    source.write_text("found = 1\n")
+    source.chmod(0o644)  # whatever this process' own umask is by now
     code = "from service.home import keep_private; keep_private(); import package.late; open('own', 'w')"
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": ""}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, umask=0o022, check=True)
