@@ -1,7 +1,7 @@
 """A grade as one self-contained HTML file; the index of a batch; the page of floors.
 
 Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
-the pages load nothing, send nothing, and run nothing but the replay's player.
+the pages load nothing, send nothing, and run nothing but the replay's own script.
 """
 
 from __future__ import annotations
@@ -83,12 +83,12 @@ def report(
         return render("report.html", page=page_of(view, submission), images=images, replay="")
     replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES)
     played = frozenset(trial["trial"] for trial in replay["trials"])
-    return _render_with_player("report.html", replay, page=page_of(view, submission, played), images=images)
+    return _render_with_replay("report.html", replay, page=page_of(view, submission, played), images=images)
 
 
 def replay_page(replay: Mapping[str, Any]) -> str:
     """A page with nothing but a replay."""
-    return _render_with_player("replay.html", replay, title=replay["title"])
+    return _render_with_replay("replay.html", replay, title=replay["title"])
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
@@ -130,10 +130,10 @@ def render(template: str, **context: object) -> str:
     return _render(template, _style("report.css"), "", context)
 
 
-def _render_with_player(template: str, replay: Mapping[str, Any], **context: object) -> str:
-    """The same with the replay's player, which is all that the policy lets run."""
+def _render_with_replay(template: str, replay: Mapping[str, Any], **context: object) -> str:
+    """The same with a replay, whose script is all that the policy lets run."""
     data = Markup(base64.b64encode(packed(replay)).decode("ascii"))
-    return _render(template, _style("report.css", "replay.css"), _player(), {**context, "replay": data})
+    return _render(template, _style("report.css", "replay.css"), _component(), {**context, "replay": data})
 
 
 def _render(template: str, style: str, script: str, context: Mapping[str, object]) -> str:
@@ -167,9 +167,9 @@ def _style(*names: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def _player() -> str:
-    """The player's files in the order of their names, with names of their own."""
-    folder = files("service.reports.replay").joinpath("player")
+def _component() -> str:
+    """The script's files in the order of their names, with names of their own."""
+    folder = files("service.reports.replay").joinpath("component")
     parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
     code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
     return f'\n(() => {{\n"use strict";\n{code}}})();\n'

@@ -1,4 +1,4 @@
-"""Replays for tests: their data read as the player reads it, long recordings, and what comes of hostile data."""
+"""Replays for tests: their data read as the page reads it, long recordings, and what comes of hostile data."""
 
 from __future__ import annotations
 

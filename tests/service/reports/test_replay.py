@@ -223,7 +223,7 @@ def test_a_floor_of_the_assignments_own_is_shown_and_a_lost_one_left_white() -> 
     assert lost == {"name": "own.png", "image": None}
 
 
-def test_the_policy_lets_the_player_run_and_nothing_else() -> None:
+def test_the_policy_lets_the_script_run_and_nothing_else() -> None:
     page = report(student_view(build.shape_grade()), {}, build.faulty_submission())
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', page)
     scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)

@@ -81,7 +81,7 @@ def test_hostile_text_makes_no_tags_and_no_attributes(hostile: tuple[str, Reader
     _, reader = hostile
     assert reader.tags <= TAGS
     assert {name for _, name, _ in reader.attributes} <= ATTRIBUTES
-    assert reader.scripts == 2  # the replay's data and its player
+    assert reader.scripts == 2  # the replay's data and its script
     assert "<script>alert(1)</script>" in reader.text
     assert "{{7*7}}" in reader.text
 

@@ -1,4 +1,4 @@
-// The player: one slider over one trial, by mouse, touch, keyboard and links; and how a page starts it.
+// The controls: one slider over one trial, by mouse, touch, keyboard and links; and how a page starts it.
 
 const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
 const VIEWS = [["path", "Where it drove"], ["floor", "Whole floor"], ["near", "Near the robot"]];
@@ -6,7 +6,7 @@ const STEPS = { ArrowLeft: -0.1, ArrowRight: 0.1, ArrowDown: -1, ArrowUp: 1, Pag
 const REDUCED = window.matchMedia("(prefers-reduced-motion: reduce)");
 const REDUCED_STEP = 500; // ms from one still to the next
 
-class ReplayPlayer {
+class ReplayControls {
   constructor(replay, root) {
     this.replay = replay;
     this.root = root;
@@ -43,11 +43,11 @@ class ReplayPlayer {
     this.link = element("a", { className: "small" }, "Link to this moment");
     this.losses = element("ol", { className: "losses" });
     const keys = "Space plays; arrows step by 0.1 and 1 s, page keys by 10 s; Home and End go to the ends.";
-    const stage = element("div", { className: "stage" }, this.canvas,
+    const main = element("div", { className: "main-part" }, this.canvas,
       element("div", { className: "controls" }, this.play, this.slider, this.clock),
       element("div", { className: "choices" }, speedLabel, viewLabel, this.link),
       element("p", { className: "small soft keys" }, keys), this.losses, sensors.root);
-    this.root.replaceChildren(trialLabel, element("div", { className: "columns" }, stage,
+    this.root.replaceChildren(trialLabel, element("div", { className: "columns" }, main,
       element("div", { className: "panels" }, ...beside.map((panel) => panel.root))), this.table.root);
     const missing = this.replay.of - this.trials.length;
     if (missing) {
@@ -173,11 +173,11 @@ class ReplayPlayer {
 }
 
 async function startReplay(section) {
-  const root = section.querySelector(".player");
+  const root = section.querySelector(".component");
   try {
     const replay = await unpack(JSON.parse(section.querySelector("script").textContent).deflated);
-    for (const floor of replay.floors) floor.picture = await pictureOf(floor.image);
-    if (replay.trials.length) new ReplayPlayer(replay, root);
+    for (const floor of replay.floors) floor.loaded = await loadedImage(floor.image);
+    if (replay.trials.length) new ReplayControls(replay, root);
     section.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     root.replaceChildren(element("p", {}, `The replay cannot be shown by this browser: ${error.message}`));

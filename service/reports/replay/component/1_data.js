@@ -80,7 +80,7 @@ class Trial {
   constructor(told, floors) {
     Object.assign(this, told);
     this.robots = told.robots.map((robot) => new RobotTrack(robot));
-    this.floorImage = floors[told.floor].picture;
+    this.floorImage = floors[told.floor].loaded;
     const messages = told.messages.map((message) => ({ kind: "message", ...message }));
     this.happened = [...told.events, ...messages].sort((a, b) => a.t - b.t);
   }
@@ -113,12 +113,12 @@ function latestImage(robot, t) {
   return latest;
 }
 
-function pictureOf(source) {
+function loadedImage(source) {
   return new Promise((resolve) => {
     if (!source) return resolve(null);
-    const picture = new Image();
-    picture.onload = () => resolve(picture);
-    picture.onerror = () => resolve(null);
-    picture.src = source;
+    const loaded = new Image();
+    loaded.onload = () => resolve(loaded);
+    loaded.onerror = () => resolve(null);
+    loaded.src = source;
   });
 }
