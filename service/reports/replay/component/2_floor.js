@@ -293,13 +293,13 @@ class FloorCanvas {
     }
     const ends = Object.fromEntries(this.trial.robots.map((robot) => [robot.name, this.place.at(...robot.pose(ticks))]));
     const responder = this.trial.beacon ? this.place.at(...this.trial.beacon) : [width - 58, 20];
-    if (this.trial.messages.length && !this.trial.beacon && this.trial.robots.length === 1) {
-      chip(this.context, "responder", width - 58, 20);
-    }
     if (message) {
       const from = ends[message.from] ?? responder;
       const to = ends[message.to] ?? responder;
       this.drawLink(message, from, to, t);
+    }
+    if (this.trial.messages.length && !this.trial.beacon && this.trial.robots.length === 1) {
+      chip(this.context, "responder", width - 58, 20);
     }
     words ??= message ? null : printed; // what is printed to the other end is told as a message
     if (words) {
