@@ -1,4 +1,4 @@
-"""What the kernel tells of a process that student code runs in: its time on processors and in their queue, its end, its folder.
+"""What the kernel tells of a child: its time on processors and in their queue, how it ended, what is in its folder.
 
 Nothing here is asked of the process itself, and nothing is done to it.
 """
