@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
-.PHONY: setup demo test test-fast test-long test-all lint format bench bench-quick pictures lock wheel image clean
+.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick pictures lock wheel image clean
 
 setup: $(VENV)/.ready
 
@@ -39,7 +39,11 @@ FAST := tests/models/test_model_plots.py tests/responders/test_bridge.py tests/r
 test-fast: setup
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long" $(FAST)
 
-test-long: setup
+# Replays are tried in Chromium, and skipped where it cannot be had.
+browser:
+	which chromium chromium-browser google-chrome > /dev/null 2>&1 || timeout 300 apt-get install -y -q chromium > /dev/null 2>&1 || true
+
+test-long: setup browser
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m long
 
 test-all: test test-long

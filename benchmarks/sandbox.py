@@ -23,8 +23,8 @@ from responders.sandbox.running_child import Child, ChildLimits
 from responders.sandbox.zygote import Role
 from sim.recording import TICK
 
-_LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder": ChildLimits(2, 512 << 20)}
-_SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
+_LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": ChildLimits(2, 512 << 20)}
+_SCHEMAS = {"robot": wire.ROBOT, "responder with libraries": wire.RESPONDER}
 _CPU_LIMIT, _STALLED, _OUTPUT = 0.5, 5.0, 65536
 _ECHO = "def responder(text): return text"
 #: Counts what it has printed in a file that outlives it.
@@ -54,9 +54,9 @@ input()
 def measure(_times: int) -> list[Measurement]:
     """About twenty seconds."""
     with Sandboxes() as sandboxes, sandboxes.private_folder() as folder:
-        cold = wall_seconds(lambda: _spawn(sandboxes, "responder").close())
+        cold = wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
-        heavy = _many(100, lambda: _until_locked(sandboxes, "responder"))
+        heavy = _many(100, lambda: _until_locked(sandboxes, "responder with libraries"))
         answers = _many(50, lambda: _until_answer(sandboxes))
         ends = _many(100, lambda: _until_gone(sandboxes))
         turns = _turns(sandboxes)
@@ -110,7 +110,7 @@ def _until_locked(sandboxes: Sandboxes, role: Role) -> float:
 
 
 def _until_gone(sandboxes: Sandboxes) -> float:
-    return wall_seconds(_spawn(sandboxes, "responder").close)
+    return wall_seconds(_spawn(sandboxes, "responder with libraries").close)
 
 
 def _until_answer(sandboxes: Sandboxes) -> float:
@@ -131,8 +131,8 @@ def _turns(sandboxes: Sandboxes) -> list[float]:
 
 
 def _echo(sandboxes: Sandboxes) -> Child:
-    child = _spawn(sandboxes, "responder")
-    _start(child, "responder", _ECHO)
+    child = _spawn(sandboxes, "responder with libraries")
+    _start(child, "responder with libraries", _ECHO)
     while child.receive(wire.RESPONDER)["do"] != "ready":
         pass
     return child

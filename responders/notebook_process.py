@@ -14,6 +14,7 @@ from typing import Any
 from responders import wire
 from responders.code import Code
 from responders.faults import error_fault, surprise
+from responders.libraries_needed import notebook_source
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
@@ -37,6 +38,11 @@ class NotebookSpec:
     output_bytes: int
     seed: int
 
+    @property
+    def as_responder(self) -> ResponderSpec:
+        """What is run as Python in its own process."""
+        return ResponderSpec(Code(self.name, notebook_source(self.cells)), self.files, self.limits, self.output_bytes)
+
 
 class NotebookProcess(ResponderProcess):
     """A notebook's process during one execution. Cells and their lines are counted from 1."""
@@ -44,8 +50,7 @@ class NotebookProcess(ResponderProcess):
     _schema = wire.NOTEBOOK
 
     def __init__(self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
-        parts = ResponderSpec(Code(spec.name, ""), spec.files, spec.limits, spec.output_bytes)
-        super().__init__(parts, sandboxes, folder, spec.seed, meter)
+        super().__init__(spec.as_responder, sandboxes, folder, spec.seed, meter)
         self._notebook = spec
         self._first_lines = [1]
         for source in spec.cells:

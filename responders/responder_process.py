@@ -71,7 +71,7 @@ class ResponderProcess:
         self._slept = 0  # since then
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
-        self._child: ServedChild | None = sandboxes.spawn("responder", spec.limits, folder, meter)
+        self._child: ServedChild | None = sandboxes.spawn(spec.role, spec.limits, folder, meter)
         self.sandbox = self._child.sandbox
         self._seed = seed
 

@@ -6,6 +6,7 @@ Nothing here runs; ``trial.py`` makes a recording of it.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from typing import Literal
 
 from responders.channel import Channel
 from responders.code import Code
+from responders.libraries_needed import may_need_libraries
 from responders.sandbox.inside.libraries import LIBRARIES
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import Role
@@ -54,6 +56,13 @@ class ResponderSpec:
     limits: ChildLimits
     output_bytes: int
     function: str | None = None  # the name of the responder; by the module's own choice if not given
+
+    @property
+    def role(self) -> Role:
+        """Its process has the libraries loaded unless it surely needs none."""
+        withheld = any(name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.without)
+        needed = withheld or may_need_libraries(self.code.text, self.files)
+        return "responder with libraries" if needed else "responder"
 
 
 @dataclass(frozen=True, slots=True)

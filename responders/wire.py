@@ -114,12 +114,15 @@ BATTERY: Schema = MappingProxyType(
 )
 
 _REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_PLACE}, {})
+#: The last word of a child without libraries that has imported one.
+_LIBRARIES: tuple[Mapping[str, Check], Mapping[str, Check]] = ({}, {})
 
 #: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
 ROBOT: Schema = MappingProxyType(
     {
         "acts": ({"acts": _packed_alone}, {}),
         "refused": _REFUSED,
+        "libraries": _LIBRARIES,
         "print": ({"text": _text}, {}),
         "say": ({"text": _text}, {}),
         "polarity": ({"port": _port, "polarity": _text}, {}),
@@ -140,6 +143,7 @@ ROBOT: Schema = MappingProxyType(
 RESPONDER: Schema = MappingProxyType(
     {
         "refused": _REFUSED,
+        "libraries": _LIBRARIES,
         "ready": ({"error": _or_none(_error)}, {}),
         "print": ({"text": _text}, {}),
         "sleep": ({"units": _units}, {}),
@@ -211,6 +215,7 @@ NOTHING_KEPT = frozenset(
         "until_said",
         "stuck",
         "busy",
+        "libraries",
         "sleep",
         "cell",
         "state",

@@ -6,6 +6,7 @@ Keeps nothing and knows no queue; what is drawn is kept by ``store.plots``.
 from __future__ import annotations
 
 from service.grading.grade import Grade
+from sim.floors.canvas import Pixels
 from submissions.assignment.definition import Assignment
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -15,10 +16,15 @@ def draw(grade: Grade, assignment: Assignment, submission: Submission) -> dict[s
     """Every plot of the grade, name -> PNG; floors of the assignment's own, and a notebook's diagrams, as such."""
     # A worker that only grades need not load the drawing library.
     from service.reports.plots.drawn import draw_all
+
+    return draw_all(grade, own_floors(assignment), diagrams_in(submission.notebook).cells)
+
+
+def own_floors(assignment: Assignment) -> dict[str, Pixels]:
+    """The floor of the assignment's own, by its name, if it has one."""
     from sim.floors import floor_from_image
 
     world = assignment.world
-    images = {}
-    if world.image is not None:
-        images[world.background] = floor_from_image(world.background, world.image).pixels
-    return draw_all(grade, images, diagrams_in(submission.notebook).cells)
+    if world.image is None:
+        return {}
+    return {world.background: floor_from_image(world.background, world.image).pixels}

@@ -9,17 +9,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy.orm import Session
+
 from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
-from service.plotting import draw
+from service.plotting import draw, own_floors
 from service.reports.html import BatchRow, batch_index, refusal_page, report
+from service.reports.replay.document import replay_of_grade
 from service.reports.rows import ReportPage, missing_words
-from service.reports.view import staff_view, student_view
-from service.reports.written import file_stems, refused_stems, write_page
+from service.reports.view import View, staff_view, student_view
+from service.reports.written import file_stems, refused_stems, write_page, write_replay
 from service.store import intake, plots, policies, rankings, results
 from service.store.batches import JobLine
 from service.store.engine import Store
 from service.store.states import PlotState
+from sim.floors import names
 from sim.recording import Verdict
 from submissions.people import Refusal
 
@@ -38,6 +42,15 @@ def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: 
     """The page of one graded job, called by ``stem``. Raises UsageError when the folder cannot be written to."""
     html, drawn = _page(store, line, grade)
     return Written(write_page(folder, f"{stem}.html", html), drawn)
+
+
+def write_grade_replay(store: Store, line: JobLine, grade: Grade, path: Path) -> None:
+    """All trials of one graded job that its report may show. Raises UsageError when the file cannot be written."""
+    with store.reading() as session:
+        submission = intake.load_submission(session, line.id)
+        floors = own_floors(intake.load_assignment(session, line.id))
+        view = _view(session, line, grade)
+    write_replay(path, replay_of_grade(view, submission, floors))
 
 
 def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal]) -> Iterator[ReportPage]:
@@ -95,11 +108,16 @@ def _page(store: Store, line: JobLine, grade: Grade) -> tuple[str, Mapping[str, 
     """The page of one graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
-        released = policies.released(session, line.id)
+        view = _view(session, line, grade)
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
-        assignment = intake.load_assignment(session, line.id) if drawn is None else None
-    if assignment is not None:
+        built_in = {trial.recording.background for trial in grade.trials} <= set(names())
+        assignment = None if drawn is not None and built_in else intake.load_assignment(session, line.id)
+    if drawn is None and assignment is not None:
         drawn = draw(grade, assignment, submission)
     found = drawn or {}
-    view = student_view(grade, released) if line.staff_only is None else staff_view(grade)
-    return report(view, found, submission), found
+    return report(view, found, submission, own_floors(assignment) if assignment is not None else {}), found
+
+
+def _view(session: Session, line: JobLine, grade: Grade) -> View:
+    """What the reader of the job's report may see."""
+    return student_view(grade, policies.released(session, line.id)) if line.staff_only is None else staff_view(grade)

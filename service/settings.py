@@ -13,8 +13,6 @@ from typing import Self
 from pydantic import Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from pydantic_settings.exceptions import SettingsError
-from sqlalchemy.engine import make_url
-from sqlalchemy.exc import ArgumentError
 
 from sim.errors import UsageError
 from submissions.seeds import Secret
@@ -85,6 +83,10 @@ class Settings(BaseSettings):
     def _known_database(cls, url: str) -> str:
         if not url:
             return url
+        # Costs as much as all else that settings do.
+        from sqlalchemy.engine import make_url
+        from sqlalchemy.exc import ArgumentError
+
         try:
             parsed = make_url(url)
             kind = parsed.get_backend_name()

@@ -22,6 +22,17 @@ def robot_of(recording: Recording) -> Robot:
     return ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
 
 
+def stood_still(recording: Recording) -> bool:
+    """Whether no robot moved or turned in any tick; so too if there was none."""
+    ticks, start = recording.ticks, recording.start
+    # The heading has been radians in between.
+    still = all(
+        bool((abs(column - first) < 1e-9).all())
+        for column, first in ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
+    )
+    return still and (recording.partner is None or stood_still(recording.partner))
+
+
 def faults_of(recording: Recording) -> tuple[Fault, ...]:
     """The faults of all robots, the earliest first; of the same moment, the first robot's."""
     partners = recording.partner.faults if recording.partner is not None else ()

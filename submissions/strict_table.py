@@ -11,9 +11,12 @@ from pydantic import BaseModel, ConfigDict
 
 
 class StrictTable(BaseModel):
-    """Frozen, and refused where it has a key too many or a number that is none."""
+    """Frozen, and refused where it has a key too many or a number that is none.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    What checks it is made when it is first needed: of all kinds of criteria an assignment has a few.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 @dataclass(frozen=True, slots=True)

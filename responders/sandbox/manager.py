@@ -18,7 +18,7 @@ from responders.sandbox.inside import grants
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, ServedChild
-from responders.sandbox.zygote import FULL, ROLES, Isolation, Role, Zygote, own_modules
+from responders.sandbox.zygote import FULL, ROLES, WITH_LIBRARIES, Isolation, Role, Zygote, own_modules
 
 #: Of a role, its folder, its job's meter and what makes a child: the child, or what stands for it.
 StandIn = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]
@@ -37,6 +37,12 @@ class Sandboxes:
         self._stand_in: StandIn | None = None
         self._forgets_until = 0.0
         self._cpu_of_closed = 0.0
+        self._given_libraries: JobMeter | None = None  # the meter of the last job that had to have them
+
+    def begin(self, role: Role, without: tuple[str, ...]) -> None:
+        """Start what children of this role will come from, and wait for nothing; what is wrong with it shows then."""
+        with contextlib.suppress(OSError):
+            self._zygote(role, without).begin()
 
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
@@ -53,10 +59,16 @@ class Sandboxes:
         if self._group is not None:
             self._living = [(child, allowed) for child, allowed in self._living if not child.closed]
             self._group.make_room(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
+        if meter is not None and meter is self._given_libraries:
+            role = WITH_LIBRARIES[role]
         child = self._zygote(role, limits.without).spawn(limits, folder, meter, blamed=self._blamed)
         if self._group is not None:
             self._living.append((child, limits.memory_bytes))
         return child
+
+    def give_libraries(self, meter: JobMeter) -> None:
+        """From now on all children of the job that has this meter have libraries loaded."""
+        self._given_libraries = meter
 
     @contextlib.contextmanager
     def blaming(self) -> Iterator[None]:

@@ -6,8 +6,6 @@ A child's word is never taken for how it ended: that is read from the scheduler'
 from __future__ import annotations
 
 import contextlib
-import itertools
-import math
 import os
 import select
 import signal
@@ -20,8 +18,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from responders import packed, wire
+from responders.sandbox import process_state
 from responders.sandbox.meter import ChildStopped, JobMeter
-from sim.errors import HostError
+from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
@@ -62,6 +61,10 @@ class KilledFromOutside(HostError):
     """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
 
 
+class LibrariesNeeded(RobomarkError):
+    """A child that was forked without libraries has imported one: all has to be done again with them."""
+
+
 class ServedChild(Protocol):
     """What a bridge, a responder's process or a notebook's needs of a child."""
 
@@ -99,13 +102,13 @@ class Child:
         self.sandbox = ""
         self._reap = reap
         self._folder = folder
-        self._given = (0, 0) if folder is None else _content(folder, _MOST_GIVEN)
+        self._given = (0, 0) if folder is None else process_state.folder_content(folder, _MOST_GIVEN)
         self._pid = pid
         self._pidfd = pidfd
         self._socket = connection
         self._limits = limits
         self._meter = JobMeter()
-        self._blamed = False
+        self._blamed = self._has_libraries = False
         self._overran: Callable[[], bool] | None = None
         self._pending = b""
         self._sent = self._received = 0  # frames
@@ -115,19 +118,22 @@ class Child:
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
-        self._queued_before = _seconds_queued()
+        self._queued_before = process_state.seconds_queued()
         # The kernel's own time limits: with Python's there would be a second system call beside each.
         connection.setblocking(True)
         for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             connection.setsockopt(socket.SOL_SOCKET, limit, _POLL_TIME)
 
-    def begin(self, meter: JobMeter, blamed: bool, overran: Callable[[], bool] | None = None) -> None:
+    def begin(
+        self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
+    ) -> None:
         """From now on student code may run in it, and what it costs is counted by ``meter``.
 
         With ``blamed`` being killed is its own fault, as it runs alone on this machine and was killed before.
-        ``overran`` says whether it, with the other processes of its submission, has taken more than they may have.
+        Unless it ``has_libraries`` it may ask for them. ``overran`` says whether it, with the other processes of its
+        submission, has taken more than they may have.
         """
-        self._meter, self._blamed, self._overran = meter, blamed, overran
+        self._meter, self._blamed, self._has_libraries, self._overran = meter, blamed, has_libraries, overran
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
         """Send one frame, with what has ``arrived`` as JSON; a child that is deaf shows at the next ``receive``."""
@@ -153,7 +159,7 @@ class Child:
         self._waited += time.monotonic() - began
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
-        """The next frame, paid for if anything of it may be kept. Raises ChildStopped, or KilledFromOutside."""
+        """The next frame, paid for if anything of it may be kept. Raises as it ends, or LibrariesNeeded."""
         data = self._pending or self._more()
         try:
             if data[0] == packed.MARK and "acts" in schema:
@@ -173,6 +179,10 @@ class Child:
             ) from None
         if frame["do"] == "busy":
             raise self._too_busy(frame)
+        if frame["do"] == "libraries":
+            if self._has_libraries:
+                raise ChildStopped(Verdict.SANDBOX_VIOLATION, "its process asked for libraries that it has")
+            raise LibrariesNeeded("student code imports a library at run time")
         if frame["do"] not in wire.NOTHING_KEPT:
             self._meter.keep(len(line))
         elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
@@ -247,7 +257,7 @@ class Child:
                 self._meter.heartbeat()
                 used = self._check_cpu()
                 self._check_sleep()
-                if used != last_cpu or self._runnable():
+                if used != last_cpu or process_state.runnable(self._pid):
                     last_cpu, still_since = used, now
                 elif now - still_since > _STALLED_SECONDS:
                     raise self._stalled() from None
@@ -287,21 +297,19 @@ class Child:
         self._meter.check_sleep(slept)
 
     def _slept_seconds(self) -> float:
-        return max(0.0, self._waited - self._busy_seconds() - (_seconds_queued() - self._queued_before))
-
-    def _busy_seconds(self) -> float:
-        """What it has run, and waited for a processor; endless where the kernel does not say."""
-        try:
-            return sum(_scheduled(self._pid))
-        except (OSError, ValueError):
-            return math.inf
+        return max(
+            0.0,
+            self._waited
+            - process_state.busy_seconds(self._pid)
+            - (process_state.seconds_queued() - self._queued_before),
+        )
 
     def _check_folder(self) -> None:
         """One flat look: the sandbox lets no folder be made in it, and follow no link."""
         if self._folder is None:
             return
         most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES
-        size, count = _content(self._folder, most_files + 1)
+        size, count = process_state.folder_content(self._folder, most_files + 1)
         if size > most_bytes or count > most_files:
             raise ChildStopped(
                 Verdict.OUTPUT_LIMIT,
@@ -316,7 +324,7 @@ class Child:
         enough = self.cpu_seconds() + _LAST_WORD_CPU_SECONDS
         data = self._pending
         while len(data) < _UNREAD_BYTES and self.cpu_seconds() < enough:
-            if time.monotonic() > deadline and not self._runnable():
+            if time.monotonic() > deadline and not process_state.runnable(self._pid):
                 break
             try:
                 more = self._socket.recv(wire.MOST)
@@ -349,14 +357,6 @@ class Child:
             f"it did nothing for {_STALLED_SECONDS:g} seconds of real time: it waits for something that never comes",
         )
 
-    def _runnable(self) -> bool:
-        """Whether the child would run if it got a processor: then a busy machine is to blame, not the program."""
-        try:
-            state = Path(f"/proc/{self._pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except (OSError, IndexError):
-            return False
-        return state == "R"
-
     def _gone(self) -> ChildStopped:
         """What the wait status says of a child that has closed the wire. Raises KilledFromOutside."""
         used = self.cpu_seconds()
@@ -372,7 +372,7 @@ class Child:
         if number == signal.SIGSYS:
             return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
         if number != signal.SIGKILL:
-            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({_signal_name(number)})")
+            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({process_state.signal_name(number)})")
         if not ended:
             # It was alive until we ended it ourselves just now: it had only closed the wire.
             return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
@@ -402,35 +402,3 @@ class Child:
     def _kill(self) -> None:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
-
-
-def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
-
-
-def _seconds_queued() -> float:
-    """For how long this thread has stood in the queue for a processor; 0 where the kernel does not say."""
-    try:
-        return _scheduled("thread-self")[1]
-    except (OSError, ValueError):
-        return 0.0
-
-
-def _scheduled(process: int | str) -> tuple[float, float]:
-    """Seconds that a process has run, and stood in the queue for a processor, by ``/proc``."""
-    run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
-    return int(run) / 1e9, int(queued) / 1e9
-
-
-def _content(folder: Path, most: int) -> tuple[int, int]:
-    """The bytes and the number of the files in a flat folder, of at most ``most`` files."""
-    size = count = 0
-    with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in itertools.islice(entries, most):
-            count += 1
-            with contextlib.suppress(OSError):
-                size += entry.stat(follow_symlinks=False).st_size
-    return size, count

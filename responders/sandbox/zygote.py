@@ -18,8 +18,10 @@ import socket
 import struct
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
@@ -30,9 +32,10 @@ from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
 from sim.errors import HostError
 
-Role = Literal["robot", "robot with libraries", "responder"]
+Role = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
 Work = Literal["role", "battery"]
 
+_HERE = Path(__file__).resolve().parent
 _START_SECONDS = 60.0
 _END_SECONDS = 0.5
 _FILE_BYTES = 4 << 20
@@ -44,8 +47,18 @@ _FOLDERS: dict[Role, tuple[str, str]] = {
     "robot": ("sim", "brick"),
     "robot with libraries": ("sim", "brick"),
     "responder": ("responders", "kit"),
+    "responder with libraries": ("responders", "kit"),
 }
 ROLES: tuple[Role, ...] = tuple(_FOLDERS)
+#: Of each role, the one that has the libraries loaded too.
+WITH_LIBRARIES: Mapping[Role, Role] = MappingProxyType(
+    {
+        "robot": "robot with libraries",
+        "robot with libraries": "robot with libraries",
+        "responder": "responder with libraries",
+        "responder with libraries": "responder with libraries",
+    }
+)
 
 
 class SandboxMissing(HostError):
@@ -225,7 +238,8 @@ class Zygote:
         except BaseException:
             child.close()
             raise
-        child.begin(meter, blamed, self._group.watch() if self._group is not None else None)
+        watch = self._group.watch() if self._group is not None else None
+        child.begin(meter, blamed, self._role in WITH_LIBRARIES.values(), watch)
         return child
 
     def _check_isolation(self, child: Child) -> None:
@@ -242,22 +256,38 @@ class Zygote:
         child.sandbox = stamp(standing, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
-        """Exec a clean process, with nothing of ours in its environment, and wait until it has imported."""
+        """Begin, if need be, and wait until it has imported."""
+        self.begin()
+        if self._folders_inside >= 0 or self._comes_up():
+            return
+        if self.without_bubblewrap is None:
+            self.without_bubblewrap = "what Python needs cannot be seen in it"
+            self._exec([])
+            if self._comes_up():
+                return
+        raise HostError(f"the {self._role} zygote did not start")
+
+    def begin(self) -> None:
+        """Let it import meanwhile: the first child will wait for it. Raises OSError if it cannot be started at all."""
         if self._process is not None and self._process.poll() is None:
             return
-        here = Path(__file__).resolve().parent
-        roots = [own_modules(self._role)]
+        wrapping: list[str] = []
         if self._sandbox.bubblewrap:
-            wrapping = bubblewrap.wrapping([str(here), *roots], self._folders.path)
+            wrapping = bubblewrap.wrapping([str(_HERE), own_modules(self._role)], self._folders.path)
             self.without_bubblewrap = bubblewrap.why_not(wrapping)
-            if self.without_bubblewrap is None and self._exec(wrapping, here, roots):
-                return
-            self.without_bubblewrap = self.without_bubblewrap or "what Python needs cannot be seen in it"
-        if not self._exec([], here, roots):
-            raise HostError(f"the {self._role} zygote did not start")
+        self._exec(wrapping if self.without_bubblewrap is None else [])
 
-    def _exec(self, wrapping: list[str], here: Path, roots: list[str]) -> bool:
-        """Whether it comes to be ready."""
+    def _comes_up(self) -> bool:
+        try:
+            _, received = self._answer()
+        except (OSError, EOFError):
+            self.close()
+            return False
+        self._folders_inside = received[0]
+        return True
+
+    def _exec(self, wrapping: list[str]) -> None:
+        """Exec a clean process, with nothing of ours in its environment."""
         self.close()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         code = (
@@ -266,10 +296,10 @@ class Zygote:
         )
         joining = self._group.joining if self._group is not None else []
         without = " ".join(self._without)
-        arguments = [str(theirs.fileno()), str(here), self._role, str(self._folders.path), without, *roots]
+        own = [str(_HERE), self._role, str(self._folders.path), without, own_modules(self._role)]
         try:
             self._process = subprocess.Popen(
-                [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, *arguments],
+                [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, str(theirs.fileno()), *own],
                 pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -290,13 +320,6 @@ class Zygote:
         finally:
             theirs.close()
         self._control = ours
-        try:
-            _, received = self._answer()
-        except (OSError, EOFError):
-            self.close()
-            return False
-        self._folders_inside = received[0]
-        return True
 
     def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
         if self._control is None:

@@ -22,7 +22,6 @@ from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
 from service.reports.formats import FORMATS, Format
 from service.reports.rows import TableRow, missing_words
-from service.reports.written import prepare_folder, write_report
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
@@ -55,6 +54,9 @@ def grade_all(
     together = chosen.table if len(submissions) > 1 else None
     rows: list[TableRow[Grade]] = []
     if report is not None:
+        # Drawing takes long to load.
+        from service.reports.written import prepare_folder, write_report
+
         prepare_folder(report)
     near = _like_others(submissions) if report is not None else {}
     secret = secret_here(load_settings())

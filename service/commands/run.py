@@ -67,6 +67,9 @@ def run(
     duplication: channel_flags.DuplicationFlag = None,
     reordering: channel_flags.ReorderingFlag = None,
     corruption: channel_flags.CorruptionFlag = None,
+    replay: Annotated[
+        Path | None, typer.Option(help="Write a page that plays the run to this file; its data if it is a .json.")
+    ] = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     diagrams: Annotated[
@@ -117,6 +120,7 @@ def run(
         seconds=seconds,
         seed=seed,
         sheet=sheet,
+        replay=replay,
         trace_file=trace_file,
         image=image,
         diagrams=diagrams,

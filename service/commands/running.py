@@ -32,9 +32,11 @@ from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
+from service.reports.replay.document import replay_of_run
+from service.reports.replay.sources import Sources, sources_of_cells, sources_of_files
 from service.reports.robots import robots_of
 from service.reports.trace import storable, trace
-from service.reports.written import prepare_folder
+from service.reports.written import prepare_folder, write_replay
 from sim.errors import UsageError
 from sim.floors import Floor, floor, floor_from_image, names
 from sim.recorded import faults_of, floor_of
@@ -69,6 +71,7 @@ def run_program(
     seconds: float,
     seed: int,
     sheet: int | None,
+    replay: Path | None,
     trace_file: Path | None,
     image: Path | None,
     diagrams: Path | None,
@@ -101,7 +104,9 @@ def run_program(
         show_notebook(executed, _show)
         show_diagrams(notebook, diagrams)
         if executed.runs:
-            _keep(executed.runs[-1].recording, program.name, seed, trace_file, image, own)
+            recording = executed.runs[-1].recording
+            _keep(recording, program.name, seed, trace_file, image, own)
+            _keep_replay(replay, recording, program.name, seed, sources_of_cells(notebook), own)
         return
     if diagrams is not None:
         raise UsageError(f"{program.name} is not a notebook and draws no diagrams; leave --diagrams out")
@@ -133,6 +138,8 @@ def run_program(
     document(run=_told(recording), notes=chosen.notes)
     _show(recording)
     _keep(recording, program.name, seed, trace_file, image, own)
+    answering = None if spec.responder is None else spec.responder.code
+    _keep_replay(replay, recording, program.name, seed, sources_of_files(spec.program.code, answering), own)
 
 
 def _partner(second: Path | None) -> PartnerSpec | None:
@@ -162,6 +169,14 @@ def _keep(
         _write(trace_file, json.dumps(trace(recording)).encode())
     if image is not None:
         _write(image, _drawn(recording, name, seed, own))
+
+
+def _keep_replay(
+    path: Path | None, recording: Recording, name: str, seed: int, sources: Sources, own: Floor | None
+) -> None:
+    if path is not None:
+        floors = {} if own is None else {own.name: own.pixels}
+        write_replay(path, replay_of_run(recording, name, seed, sources, floors))
 
 
 def _notebook(path: Path) -> Notebook | None:

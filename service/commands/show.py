@@ -23,6 +23,10 @@ def show(
         Path | None,
         typer.Option("-o", "--output", help="Write the report, and the plots as files, into this folder."),
     ] = None,
+    replay: Annotated[
+        Path | None,
+        typer.Option("--replay", help="Write a page that plays its trials to this file; their data if it is a .json."),
+    ] = None,
 ) -> None:
     """A grade that is stored: its marks and what they rest on."""
     with open_store(load_settings()) as store:
@@ -33,7 +37,7 @@ def show(
             tell(_not_graded(line))
             return
         # A stored grade has its recordings, and a report its plots: they take longer to load than to ask for a grade.
-        from service.report_files import write_report
+        from service.report_files import write_grade_replay, write_report
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
@@ -46,6 +50,9 @@ def show(
         tell(plain_text(staff_view(graded)).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
+        if replay is not None:
+            write_grade_replay(store, line, graded, replay)
+            note(f"replay: {replay}")
         if output is None:
             return
         written = write_report(store, line, graded, output, file_stem(line.student))

@@ -76,6 +76,7 @@ def grade(
         with TrialRunner() as own:
             return grade(submission, assignment, secret=secret, observe=observe, runner=own)
     plan = plan_run(submission, assignment, secret)
+    runner.begin(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.heartbeat)

@@ -87,6 +87,13 @@ class RunPlan:
     second_program: ProgramSpec | None = None  # where there are two robots
     second_flags: Flags = field(default_factory=Flags)
 
+    @property
+    def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
+        """Those that take part in every trial; the one that takes longest to start first."""
+        answers = self.trial.notebook.as_responder if isinstance(self.trial, NotebookTrial) else self.answers
+        found = (answers, *self.agents.values(), self.program, self.second_program)
+        return tuple(each for each in found if each is not None)
+
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
     """The plan for grading ``submission`` in the installation that has this secret.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
@@ -21,11 +21,11 @@ from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
-from responders.sandbox.running_child import KilledFromOutside
+from responders.sandbox.running_child import KilledFromOutside, LibrariesNeeded
 from responders.sandbox.zygote import FULL, Isolation
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
-from responders.trial_spec import ResponderSpec, TrialSpec
+from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.slots import Slots
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
@@ -119,6 +119,11 @@ class TrialRunner:
         """Meanwhile children are not run of whom ``repeats`` knows what they would do."""
         return self._sandboxes.standing_in(repeats.child) if self._spares else nullcontext()
 
+    def begin(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
+        """Start all that these will need, beside each other, and wait for nothing."""
+        for role, without in dict.fromkeys((each.role, each.limits.without) for each in processes):
+            self._sandboxes.begin(role, without)
+
     def check_sandbox(self) -> str:
         """Which layers stand round student code here. Raises SandboxMissing when one cannot be put up."""
         return self._sandboxes.check()
@@ -152,6 +157,19 @@ class TrialRunner:
         self.close()
 
     def undisturbed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
+        """Do ``work``, and anew where it ends for a reason that is not the submission's fault.
+
+        Where a child has imported a library that it was not expected to, all is as if it had been expected.
+        """
+        before = meter.spent
+        try:
+            return self._unless_killed(work, meter)
+        except LibrariesNeeded:
+            meter.give_back(before)
+            self._sandboxes.give_libraries(meter)
+        return self._unless_killed(work, meter)
+
+    def _unless_killed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
         """Do ``work``; where a child in it is killed by neither us nor itself, again, and with nothing else running.
 
         Other people's children may have taken the memory; one that is killed alone twice is itself to blame.

@@ -21,6 +21,7 @@ import structlog
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
+from service.queue.right_answers import RightAnswer
 from service.store import self_tests
 from service.store.engine import Store
 from sim.recording import Verdict
@@ -32,6 +33,8 @@ from submissions.submission import Submission
 _log = structlog.get_logger(__name__)
 FOLDER = Path(__file__).with_name("known_answer")
 _ANSWER = FOLDER / "answer.json"
+#: How long a process that was spared the question at its start may work before it is asked.
+_SOON_SECONDS = 30.0
 #: A trial that ended so was cut by the machine or its load, and says nothing of the simulator.
 _CUT = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
 
@@ -56,6 +59,12 @@ def known() -> KnownAnswer:
     """What a worker must find."""
     told = json.loads(_ANSWER.read_text(encoding="utf-8"))
     return KnownAnswer(told["marks"], tuple(told["chains"]))
+
+
+def right_answer(folder: Path) -> RightAnswer:
+    """Where in ``folder`` it stands that the known answer was given rightly."""
+    asked = sorted(file for file in FOLDER.rglob("*") if file.is_file() and file.suffix in (".py", ".toml", ".json"))
+    return RightAnswer(folder, b"".join(file.read_bytes() for file in asked))
 
 
 def ask(runner: TrialRunner) -> KnownAnswer | None:
@@ -91,7 +100,11 @@ class Watch:
     Grading and looking take turns; whoever grades holds ``busy``.
     """
 
-    def __init__(self, store: Store, runner: TrialRunner, worker: str, every_seconds: float) -> None:
+    def __init__(
+        self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, right: RightAnswer | None = None
+    ) -> None:
+        """``right`` is where a right answer is written down for those that start later."""
+        self._right = right
         self._store = store
         self._runner = runner
         self._worker = worker
@@ -108,6 +121,13 @@ class Watch:
             if time.monotonic() >= self._next:
                 self._look()
             yield
+
+    def begin(self) -> None:
+        """Look now; or soon, where this build has answered rightly on this machine not long ago."""
+        if self._right is not None and self._right.given:
+            self._next = time.monotonic() + min(self._every, _SOON_SECONDS)
+        else:
+            self.look()
 
     def look(self) -> SelfTestAnswer:
         """Grade the known answer now, and write down what came of it."""
@@ -142,7 +162,11 @@ class Watch:
             wrong = difference(known(), actual)
             if not wrong:
                 self_tests.answered_rightly(self._store, self._worker, os.getpid())
+                if self._right is not None:
+                    self._right.note()
                 return SelfTestAnswer.RIGHT
+            if self._right is not None:
+                self._right.forget()
             spoilt = self_tests.quarantine(self._store, self._worker, wrong)
         except Exception:
             # Trouble with the machine or the database shows in the jobs themselves.

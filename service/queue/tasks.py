@@ -1,6 +1,7 @@
 """The two Celery tasks, and what a pool child keeps warm for them: the runner and the database.
 
-A task is a notice and carries nothing; what to do is claimed in the database.
+A task is a notice and carries nothing; what to do is claimed in the database. The worker's first process knows the
+tasks by their names alone: what does them is loaded in the pool children.
 """
 
 from __future__ import annotations
@@ -11,21 +12,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import structlog
 from celery import Task, current_app, shared_task, signals
 
-from responders.sandbox import control_group
-from responders.sandbox.zygote import FULL, NONE
-from service.grading.slots import Slots
-from service.grading.trial_runner import TrialRunner
 from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK
-from service.queue.grading_job import JobOutcome, grade_next, plot_next
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
-from service.queue.self_test import Watch
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
+
+if TYPE_CHECKING:
+    from service.grading.trial_runner import TrialRunner
+    from service.queue.self_test import Watch
 
 _log = structlog.get_logger(__name__)
 #: Set by the worker for its pool children: one name for all of them, so that a dead worker's jobs can be found.
@@ -69,12 +69,18 @@ class _Children:
 
     @cached_property
     def child(self) -> PoolChild:
+        from responders.sandbox import control_group
+        from responders.sandbox.zygote import FULL, NONE
+        from service.grading.slots import Slots
+        from service.grading.trial_runner import TrialRunner
+        from service.queue.self_test import Watch, right_answer
+
         settings = load_settings()
         unsafe = current_app.conf.get(NO_SANDBOX)
         group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
         store, runner = open_store(settings), TrialRunner(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
-        watch = Watch(store, runner, worker_name(), settings.self_test_seconds)
-        watch.keep_looking()
+        right = right_answer(settings.home / "run")
+        watch = Watch(store, runner, worker_name(), settings.self_test_seconds, right)
         return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
@@ -90,7 +96,10 @@ _children = _Children()
 @shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
 def grade_notice(task: WarmTask) -> None:
     """Grade the job whose turn it is, then ask for its plots."""
+    from service.queue.grading_job import JobOutcome, grade_next
+
     child = task.child
+    child.watch.keep_looking()
     with child.watch.busy():
         outcome = grade_next(child.store, child.settings, child.runner, worker_name())
     if outcome is JobOutcome.GRADED:
@@ -103,6 +112,8 @@ def grade_notice(task: WarmTask) -> None:
 @shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
 def plot_notice(task: WarmTask) -> None:
     """Draw the plots that have waited longest."""
+    from service.queue.grading_job import plot_next
+
     child = task.child
     try:
         plot_next(child.store, child.settings)
@@ -124,7 +135,8 @@ def _begin(**_: object) -> None:
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
         _children.child.runner.check_sandbox()
-        _children.child.watch.look()
+        _children.child.watch.begin()
+        _children.child.watch.keep_looking()
     except Exception:
         _log.exception("pool_child.cold")
 

@@ -1,7 +1,7 @@
 """A grade as one self-contained HTML file; the index of a batch; the page of floors.
 
 Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
-the pages load nothing, run nothing and send nothing.
+the pages load nothing, send nothing, and run nothing but the replay's own script.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
 from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -23,6 +25,7 @@ from service.grading.grade import Grade
 from service.grading.ranks import RankTable
 from service.reports.page import page_of
 from service.reports.readable import number, readable
+from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
 from service.reports.rows import TableRow
 from service.reports.view import View
 from service.reports.words import verdict_words
@@ -31,6 +34,7 @@ from submissions.submission import Submission
 
 #: What is expected of a submission where a refusal does not say.
 _USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
+_NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +67,28 @@ def gallery(floors: Sequence[PrintedFloor]) -> str:
     return render("gallery.html", floors=shown)
 
 
-def report(view: View, plots: Mapping[str, bytes], submission: Submission | None = None) -> str:
-    """The page of one grade, with the source lines at fault if the submission is given.
+def report(
+    view: View,
+    plots: Mapping[str, bytes],
+    submission: Submission | None = None,
+    own_floors: Mapping[str, Pixels] = _NO_FLOORS,
+) -> str:
+    """The page of one grade, with its replay, and with the student's source if the submission is given.
 
-    ``plots`` are those of ``draw_all``; the ones that are missing are left out.
+    ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
+    built in, by name.
     """
     images = {name: _data_uri(data) for name, data in plots.items()}
-    return render("report.html", page=page_of(view, submission), images=images)
+    if not view.grade.trials:
+        return render("report.html", page=page_of(view, submission), images=images, replay="")
+    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES)
+    played = frozenset(trial["trial"] for trial in replay["trials"])
+    return _render_with_replay("report.html", replay, page=page_of(view, submission, played), images=images)
+
+
+def replay_page(replay: Mapping[str, Any]) -> str:
+    """A page with nothing but a replay."""
+    return _render_with_replay("replay.html", replay, title=replay["title"])
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
@@ -108,11 +127,25 @@ def batch_index(
 
 def render(template: str, **context: object) -> str:
     """A page of ``templates``, with the one style and a policy that lets it load and run nothing."""
-    style = _style()
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+    return _render(template, _style("report.css"), "", context)
+
+
+def _render_with_replay(template: str, replay: Mapping[str, Any], **context: object) -> str:
+    """The same with a replay, whose script is all that the policy lets run."""
+    data = Markup(base64.b64encode(packed(replay)).decode("ascii"))
+    return _render(template, _style("report.css", "replay.css"), _component(), {**context, "replay": data})
+
+
+def _render(template: str, style: str, script: str, context: Mapping[str, object]) -> str:
+    policy = f"default-src 'none'; img-src data:; style-src {_digest(style)}; base-uri 'none'; form-action 'none'"
+    if script:
+        policy += f"; script-src {_digest(script)}"
     page = _environment().get_template(template)
-    return page.render(style=Markup(style), policy=policy, **context)
+    return page.render(style=Markup(style), script=Markup(script), policy=policy, **context)
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 @lru_cache(maxsize=1)
@@ -127,9 +160,19 @@ def _environment() -> Environment:
     )
 
 
+@lru_cache(maxsize=2)
+def _style(*names: str) -> str:
+    folder = files("service.reports").joinpath("templates")
+    return "\n" + "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)
+
+
 @lru_cache(maxsize=1)
-def _style() -> str:
-    return "\n" + files("service.reports").joinpath("templates/report.css").read_text(encoding="utf-8")
+def _component() -> str:
+    """The script's files in the order of their names, with names of their own."""
+    folder = files("service.reports.replay").joinpath("component")
+    parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
+    code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
+    return f'\n(() => {{\n"use strict";\n{code}}})();\n'
 
 
 def _shown(value: object) -> object:

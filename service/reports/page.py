@@ -17,6 +17,7 @@ from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.replay.trial import loss_moment, moment_hash
 from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import (
@@ -27,6 +28,7 @@ from service.reports.words import (
     hints_of,
     verdict_words,
 )
+from sim.recorded import stood_still
 from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -34,6 +36,7 @@ from submissions.submission import Submission
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
 _MOST_TRIALS = 250
+_STOOD_STILL = "the robot stood still, so neither its path nor its sensors are drawn"
 PROCESS_LIMITS = "process limits only"
 
 
@@ -49,6 +52,8 @@ class CriterionLine:
     state: str  # full, part, none
     visibility: str
     where: str
+    moment: str  # a link to where the replay shows it, and what it says; empty if it does not
+    watch: str
     for_staff: str
 
 
@@ -131,8 +136,8 @@ class Page:
     withheld: bool
 
 
-def page_of(view: View, submission: Submission | None = None) -> Page:
-    """Everything a report says of what the reader may see."""
+def page_of(view: View, submission: Submission | None = None, played: frozenset[int] = frozenset()) -> Page:
+    """Everything a report says of what the reader may see; ``played`` are the trials of its replay, from 1."""
     grade = view.grade
     plots = plots_of(grade)
     lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
@@ -145,7 +150,7 @@ def page_of(view: View, submission: Submission | None = None) -> Page:
         share=_share(float(grade.marks), float(grade.max_marks)),
         words=grade_words(grade),
         hints=hints_of(grade),
-        criteria=tuple(_criterion_line(grade, result) for result in grade.criteria),
+        criteria=tuple(_criterion_line(grade, result, played) for result in grade.criteria),
         faults=faults,
         faults_title="How it ended" if time_alone else "What went wrong",
         classification=tuple(plot for plot in plots if not plot.scenario),
@@ -186,9 +191,12 @@ def _kind(fault: Fault) -> str:
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
-def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:
+def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int]) -> CriterionLine:
     full = result.marks >= result.max_marks
-    failed = next((item for item in result.evidence if not item.passed), None)
+    missed = [item for item in result.evidence if not item.passed]
+    failed = next(iter(missed), None)
+    watched = next((item for item in missed if item.trial + 1 in played), None) if not full else None
+    seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
         message=readable(result.message, 1000, lines=12),
@@ -198,6 +206,8 @@ def _criterion_line(grade: Grade, result: CriterionResult) -> CriterionLine:
         state="full" if full else ("part" if result.marks > 0 else "none"),
         visibility=result.visibility,
         where="" if full or failed is None else _where(grade, failed),
+        moment="" if watched is None else moment_hash(watched.trial + 1, seconds),
+        watch=f"Watch it at {seconds:.2f} s",
         for_staff=readable(result.for_staff, 1000, lines=4),
     )
 
@@ -232,7 +242,10 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
             AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
             for each in recording.agent_outputs
         ),
-        notes=tuple(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
+        notes=(
+            *((_STOOD_STILL,) if stood_still(recording) else ()),
+            *(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
+        ),
     )
 
 

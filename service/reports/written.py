@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from service.grading.grade import Grade
 from service.home import for_the_user
-from service.reports.html import report
+from service.reports.html import replay_page, report
 from service.reports.plots.drawn import draw_all
 from service.reports.view import student_view
 from sim.errors import UsageError
@@ -70,6 +72,12 @@ def prepare_folder(folder: Path) -> None:
 def write_page(folder: Path, name: str, page: str) -> Path:
     """Write one page. Raises UsageError when the folder cannot be written to."""
     return write_file(folder, name, page.encode())
+
+
+def write_replay(path: Path, replay: Mapping[str, Any]) -> None:
+    """Write the page that plays it, or its data as JSON if the file is called so. Raises UsageError if it cannot be."""
+    page = json.dumps(replay, allow_nan=False) if path.suffix.lower() == ".json" else replay_page(replay)
+    write_file(path.parent, path.name, page.encode())
 
 
 def write_file(folder: Path, name: str, data: bytes) -> Path:

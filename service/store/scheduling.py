@@ -42,7 +42,7 @@ def next_job(session: Session, at: datetime, worker: str) -> str | None:
     # A common table, or SQLite would walk all jobs there ever were to count each share.
     recent = begun.cte("recent")
     counted = session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane))
-    by_lane: dict[Lane, int] = dict(counted.tuples().all())
+    by_lane: dict[Lane, int] = dict(counted.all())
     people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
     first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
 

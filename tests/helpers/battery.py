@@ -37,7 +37,7 @@ from responders.sandbox import manager
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
+from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside, LibrariesNeeded
 from responders.sandbox.zygote import NONE, Isolation, Role
 from sim.recording import TICK, Verdict
 
@@ -327,7 +327,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
             job
             | (
                 {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK}
-                if role == "robot"
+                if role.startswith("robot")
                 else {"function": None}
             )
         )
@@ -341,7 +341,7 @@ def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str
     said: list[str] = []
     try:
         while True:
-            frame = child.receive(SCHEMAS[role])
+            frame = child.receive(SCHEMAS[role.removesuffix(" with libraries")])
             if frame["do"] == "print":
                 said.append(frame["text"])
                 if until is not None and frame["text"].startswith(until):
@@ -352,6 +352,8 @@ def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str
         return said, stop
     except KilledFromOutside:
         return said, ChildStopped(Verdict.HOST_ERROR, "SIGKILL")
+    except LibrariesNeeded as needed:
+        return said, ChildStopped(Verdict.SANDBOX_VIOLATION, str(needed))
 
 
 @contextlib.contextmanager

@@ -144,7 +144,7 @@ def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child
         process = subprocess.Popen(command, stdin=file, preexec_fn=lambda: os.dup2(theirs.fileno(), 3), close_fds=False)
     theirs.close()
     child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ours, LIMITS, folder)
-    child.begin(meter, blamed=True)
+    child.begin(meter, blamed=True, has_libraries=True)
     try:
         yield child
     finally:

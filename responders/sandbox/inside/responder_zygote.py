@@ -1,14 +1,14 @@
 """The responders' zygote: what is imported before any fork, and whether a module, an agent or a notebook is to be run.
 
-What runs then is in ``responder_role.py``, ``agent_role.py`` and ``notebook_role.py``.
+What runs then is in ``responder_role.py``, ``agent_role.py`` and ``notebook_role.py``; libraries are loaded in
+``responder_with_libraries.py`` alone.
 """
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 
-from . import libraries, model_files, source_reader  # noqa: F401
+from . import libraries, source_reader  # noqa: F401
 from .agent_role import AgentRole
 from .frames import Wire
 from .lockdown import Grants
@@ -17,27 +17,12 @@ from .responder_role import ResponderRole
 
 #: What answering takes.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
-_PRELOADED = (
-    "json",
-    "math",
-    "re",
-    "statistics",
-    "nn_tools.network_views",
-    "nn_tools.sensor_data",
-    "nn_tools.weights",
-)
 
 
 def preload(without: list[str]) -> None:
-    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
-    libraries.preload(without)
-    missing = (ImportError,) if without else ()
-    for name in _PRELOADED:
-        with contextlib.suppress(*missing):
-            importlib.import_module(name)
-    model_files.preload_runtimes()
-    with contextlib.suppress(*missing):
-        model_files.explain_joblib()
+    """Import what of Python's responders use without needing a library."""
+    for name in libraries.BESIDE:
+        importlib.import_module(name)
 
 
 def run(wire: Wire, grants: Grants) -> None:

@@ -113,6 +113,8 @@ class Shell:
         line = self._requester.expand(str(line))
         if name in _ROBOT:
             return self._requester.start_robot(name, line, None)
+        if name in _WITHOUT_EFFECT:
+            return None
         data = _data_magics().get(name)
         if data is not None:
             return data(_words(line))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import array
 import contextlib
 import ctypes
+import functools
 import gc
 import importlib
 import json
@@ -34,15 +35,17 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, child, determinism, doorkeeper, grants, lockdown, refusals, withheld  # noqa: F401
+    from . import battery, child, determinism, doorkeeper, grants, libraries, lockdown, refusals, withheld  # noqa: F401
 
     control = socket.socket(fileno=3)
     if role_name == "robot":
         from . import robot_role as role
     elif role_name == "robot with libraries":
         from . import robot_with_libraries as role  # type: ignore[no-redef]
-    else:
+    elif role_name == "responder":
         from . import responder_zygote as role  # type: ignore[no-redef]
+    else:
+        from . import responder_with_libraries as role  # type: ignore[no-redef]
     for name in role.NEEDED:
         importlib.import_module(name)
     closed = withheld.keep_out(tuple(without))
@@ -50,7 +53,9 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
     door = doorkeeper.start(allowed, control.fileno())
     role.preload(without)
-    roles = {"role": role.run, "battery": battery.run}
+    with_libraries = role_name.endswith("with libraries")
+    run = role.run if with_libraries else functools.partial(libraries.run_without, role.run)
+    roles = {"role": run, "battery": battery.run}
     zygote = os.getpid()
     _one_thread()
     gc.collect()

@@ -6,7 +6,7 @@ The drawing is in one module a plot; nothing here is random, timed or kept betwe
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
 from service.reports.robots import SECOND, messages_of
 from service.reports.view import scenarios, staff_view, student_view, tells_of_hidden, worst_trial
-from sim.recorded import floor_of
+from sim.recorded import floor_of, stood_still
 from sim.recording import Recording
 from submissions.diagram_cells import DiagramCell
 from submissions.sweep import CONDITIONS, Varied
@@ -38,7 +38,10 @@ _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
 def plots_of(grade: Grade) -> tuple[Plot, ...]:
-    """Path and sensors of every scenario's worst trial, conversations of the first and the worst, classifications."""
+    """Path and sensors of every scenario's worst trial, conversations of the first and the worst, classifications.
+
+    Of a robot that stood still there is neither path nor sensors.
+    """
     return (*_classifications(grade), *_trials(grade))
 
 
@@ -51,15 +54,24 @@ def draw_all(
     y = 1143 mm; a floor that is in neither is drawn white.
     """
     drawn: dict[str, bytes] = {}
+    made: dict[Hashable, bytes] = {}
     for view in (staff_view(grade), student_view(grade)):
         for plot in plots_of(view.grade):
             if plot.name not in drawn:
-                drawn[plot.name] = png(_draw(view.grade, plot, images))
+                what = _shown(view.grade, plot)
+                if what not in made:
+                    made[what] = png(_draw(view.grade, plot, images))
+                drawn[plot.name] = made[what]
         for own in own_diagrams(view.grade, cells):
             for plot in own.plots:
                 if plot.name not in drawn:
                     drawn[plot.name] = png(draw_own(own, view.grade, plot))
     return drawn
+
+
+def _shown(grade: Grade, plot: Plot) -> Hashable:
+    """Plots of which this is the same are the same: criteria that judge the same answers show the same images."""
+    return (plot.title, grade.criteria[plot.subject].predictions) if plot.kind == "predictions" else plot.name
 
 
 def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
@@ -181,6 +193,8 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         index = worst_trial(grade, scenario)
         trial = grade.trials[index]
         recording = trial.recording
+        if stood_still(recording):
+            continue
         name = trial_name(trial)
         title = title_of(grade, scenario)
         start, end = recording.start, recording.end

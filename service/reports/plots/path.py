@@ -23,6 +23,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
+from service.reports.plots.path_marks import draw_marks, draw_times, placed
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -35,13 +36,12 @@ from service.reports.plots.style import (
     SECOND_ROBOT,
     WIDTH,
     axes_at,
-    drawable,
     font,
     new_figure,
     whole,
     write,
 )  # fmt: skip
-from sim.recorded import robot_of, ticks_until
+from sim.recorded import robot_of
 from sim.recording import Pose, Recording
 
 Pixels = NDArray[np.uint8]
@@ -203,8 +203,8 @@ def _draw_way(axes: Axes, recording: Recording, points: NDArray[np.float64], per
     _draw_trace(axes, recording, points, colour)
     _draw_robot(axes, recording.start, recording, dashed=True)
     _draw_robot(axes, recording.end, recording, dashed=False)
-    _draw_times(axes, recording, points, per_inch, colour)
-    _draw_marks(axes, recording, per_inch, colour if colour != LEFT else INK)
+    draw_times(axes, recording, points, per_inch, colour)
+    draw_marks(axes, recording, per_inch, colour if colour != LEFT else INK)
 
 
 def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], colour: str) -> None:
@@ -255,7 +255,7 @@ def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -
     ]  # fmt: skip
     axes.add_patch(
         Polygon(
-            [_placed(pose, x, y) for x, y in outline],
+            [placed(pose, x, y) for x, y in outline],
             closed=True,
             facecolor=(1, 1, 1, 0.12),
             edgecolor=INK,
@@ -265,70 +265,10 @@ def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -
         )
     )
     for sensor, colour in ((robot.left_light, LEFT), (robot.right_light, RIGHT)):
-        centre = _placed(pose, sensor.x, sensor.y)
+        centre = placed(pose, sensor.x, sensor.y)
         axes.add_patch(
             Circle(centre, sensor.diameter / 2, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=2.6)
         )
-
-
-def _placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
-    """World coordinates of a point of the robot (x right, y forward, mm)."""
-    angle = math.radians(pose.heading - 90)
-    cos, sin = math.cos(angle), math.sin(angle)
-    return pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
-
-
-def _draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
-    """Small times along the path, where the robot had moved on far enough to read them apart."""
-    ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
-    taken = [end for end in ends if math.isfinite(sum(end))]
-    step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
-    for second in range(step, math.ceil(recording.end_t), step):
-        row = ticks_until(recording, second)
-        if row >= len(points):
-            break
-        x, y = float(points[row, 0]), float(points[row, 1])
-        if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
-            continue
-        taken.append((x, y))
-        # To the robot's right, and the second one's to its left: two may drive the same way.
-        angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
-        axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
-        _tag(axes, x + 0.17 * per_inch * math.cos(angle), y + 0.15 * per_inch * math.sin(angle), f"{second} s", 7.6,
-             colour if colour == SECOND_ROBOT else INK)  # fmt: skip
-
-
-def _draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
-    robot = robot_of(recording)
-    for touch in recording.touches[:40]:
-        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
-        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=8, color=FAULT, markeredgewidth=2, zorder=6)
-    placed: dict[tuple[int, int], list[int]] = {}
-    for count, image in enumerate(recording.images, start=1):
-        x, y = _placed(image.pose, robot.left_light.x, robot.left_light.y)
-        placed.setdefault((round(x / 8), round(y / 8)), []).append(count)
-        corner = (x - image.side / 2, y - image.side / 2)
-        for colour, width in (("white", 2.4), (INK, 1.2)):
-            axes.add_patch(
-                Rectangle(corner, image.side, image.side, facecolor="none", edgecolor=colour, linewidth=width, zorder=6)
-            )
-    for (column, row), counts in placed.items():
-        text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-        _tag(axes, column * 8, row * 8 + 10 + 0.10 * per_inch, text, 7.8)
-    start, end = recording.start, recording.end
-    axes.plot(
-        [start.x], [start.y], "o", markersize=7, color="white", markeredgecolor=colour, markeredgewidth=1.6, zorder=7
-    )
-    axes.plot(
-        [end.x], [end.y], "o", markersize=5.5, color=colour, markeredgecolor="white", markeredgewidth=0.8, zorder=8
-    )
-
-
-def _tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
-    axes.text(
-        x, y, drawable(text), font=font(size), color=colour, ha="center", va="center", parse_math=False, zorder=9,
-        clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
-    )  # fmt: skip
 
 
 def _goes_on(points: NDArray[np.float64], view: Viewport) -> bool:

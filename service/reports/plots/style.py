@@ -11,11 +11,13 @@ from functools import lru_cache
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, get_font
 from matplotlib.text import Text
+from numpy.typing import NDArray
 from PIL import Image
 
 from service.reports.readable import one_line
@@ -113,12 +115,30 @@ def png(figure: Figure) -> bytes:
     """The figure as a PNG of at most 256 colours, without metadata; the same figure gives the same bytes."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
-    image = Image.frombuffer("RGBA", canvas.get_width_height(), bytes(canvas.buffer_rgba())).convert("RGB")  # type: ignore[no-untyped-call]
     stream = io.BytesIO()
-    image.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
-        stream, "PNG", compress_level=9, dpi=(DPI, DPI)
-    )
+    _with_palette(np.asarray(canvas.buffer_rgba())).save(stream, "PNG", compress_level=6, dpi=(DPI, DPI))  # type: ignore[no-untyped-call]
     return stream.getvalue()
+
+
+def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
+    """The same image with at most 256 colours, chosen by median cut.
+
+    Plots are flat: their pixels come in runs, and of their few thousand colours each is looked at once (weighted by the
+    root of how often it is there), which costs a fifth of looking at every pixel.
+    """
+    height, width = rgba.shape[:2]
+    pixels = np.ascontiguousarray(rgba).view(np.uint32).ravel()
+    starts = np.flatnonzero(np.concatenate(([True], pixels[1:] != pixels[:-1])))
+    lengths = np.diff(starts, append=pixels.size)
+    colours, which = np.unique(pixels[starts], return_inverse=True)
+    weights = np.ceil(np.sqrt(np.bincount(which, lengths))).astype(np.int64)
+    sample = np.repeat(colours, weights).view(np.uint8).reshape(1, -1, 4)[:, :, :3]
+    chosen = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    first = np.cumsum(weights) - weights
+    indices = np.asarray(chosen).ravel()[first][which]
+    image = Image.fromarray(np.repeat(indices, lengths).reshape(height, width))
+    image.putpalette(chosen.getpalette() or [])
+    return image
 
 
 @lru_cache(maxsize=1)

@@ -46,7 +46,7 @@ _MODELS = {
 @pytest.fixture(scope="module", params=["bare", "bubblewrap"])
 def sandboxes(request: pytest.FixtureRequest) -> Iterator[Sandboxes]:
     with Sandboxes(Isolation(bubblewrap=request.param == "bubblewrap")) as made:
-        reason = made.why_no_bubblewrap("responder")
+        reason = made.why_no_bubblewrap("responder with libraries")
         if request.param == "bubblewrap" and reason is not None:
             pytest.skip(f"bubblewrap does not work here: {reason}")
         yield made
@@ -140,7 +140,7 @@ def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path
     _says(sandboxes, folder, text, said)
 
 
-@pytest.mark.parametrize("role", ["robot", "responder"])
+@pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
 def test_the_standard_library_can_be_imported_late(role: str, sandboxes: Sandboxes, empty: Path) -> None:
     """All of it that this interpreter can import at all, but for what would draw or needs a screen."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
@@ -159,6 +159,8 @@ for name in {names!r}:
     _says(sandboxes, empty, text, [], role)
 
 
-def _says(sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: str = "responder") -> None:
+def _says(
+    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: str = "responder with libraries"
+) -> None:
     lines, stop = run_text(sandboxes, role, text + "\ndef responder(text): return text\n", folder)
     assert (lines, stop) == (said, None)

@@ -18,7 +18,7 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 
 
-@pytest.mark.parametrize("role", ["robot", "responder"])
+@pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
 def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
         said = sandboxes.check(role)  # type: ignore[arg-type]

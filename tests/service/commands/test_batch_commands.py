@@ -99,13 +99,16 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     home, ended, _ = graded
     found = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
     assert found is not None
-    shown = robomark(home, "show", found[1], "--output", tmp_path / "out")
+    shown = robomark(home, "show", found[1], "--output", tmp_path / "out", "--replay", tmp_path / "replay.json")
     assert shown.status == 0
     assert "10" in shown.out
     images = sorted((tmp_path / "out").glob("*.png"))
     assert images
     assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
     assert (tmp_path / "out" / "reference.html").exists()
+    replay = json.loads((tmp_path / "replay.json").read_text())
+    assert len(replay["trials"]) == replay["of"] > 0
+    assert [source["name"] for source in replay["sources"]] == ["robot.py", "responder.py"]
 
 
 def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:

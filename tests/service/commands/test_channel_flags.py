@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from command import robomark
+from replays import data_of
 from responders.channel import Channel
 from service.commands.channel_flags import changed, given_flags
 from submissions.assignment.examples import examples
@@ -40,14 +41,18 @@ def test_flags_change_what_they_name_and_nothing_else(
 
 
 def test_a_run_shows_what_was_lost(tmp_path: Path) -> None:
-    trace = tmp_path / "trace.json"
+    trace, replay = tmp_path / "trace.json", tmp_path / "replay.html"
     shown = robomark(
-        *("run", ECHO / "robot.py", "--responder", ECHO / "responder.py", "--trace", trace),
+        *("run", ECHO / "robot.py", "--responder", ECHO / "responder.py", "--trace", trace, "--replay", replay),
         *("-b", "Empty_Map", "-x", "100", "-y", "800", "--link", "infrared", "--beacon", "900,800", "--range", "700"),
     )
     assert "(lost) PY::0: out of range, 800 mm away" in shown.stdout
     first = json.loads(trace.read_text())["messages"][0]
     assert (first["lost"], first["distance"], first["angle"], first["delivered"]) == ("out of range", 800, 0, None)
+
+    (trial,) = data_of(replay.read_text())["trials"]
+    assert trial["messages"][0]["befell"] == "out of range, 800 mm away"
+    assert trial["beacon"] == [900, 800]
 
 
 def test_a_grade_on_another_channel_says_so() -> None:

@@ -23,6 +23,7 @@ from builders import grading_request, settings_in
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
+from service.queue import right_answers
 from service.queue import self_test as known_answers
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
@@ -78,6 +79,54 @@ def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, mo
         assert shut_out.worker == "machine-1"
         assert "trial 1 of the known answer has another hash" in shut_out.reason
         assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
+
+
+def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_soon(
+    store: Store, runner: TrialRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def ask(_: TrialRunner) -> known_answers.KnownAnswer:
+        asked.append("asked")
+        return known_answers.known()
+
+    def started() -> Watch:
+        watch = Watch(store, runner, "machine-1", 3600, known_answers.right_answer(tmp_path))
+        watch.begin()
+        return watch
+
+    monkeypatch.setattr(known_answers, "ask", ask)
+    started()
+    assert asked == ["asked"]
+    spared = started()
+    with spared.busy():
+        assert asked == ["asked"]
+    monkeypatch.setattr(known_answers, "_SOON_SECONDS", 0.0)
+    with started().busy():
+        assert asked == ["asked"] * 2
+
+
+@pytest.mark.parametrize("changed", ["build", "machine", "question", "day", "answer"])
+def test_a_right_answer_is_of_one_build_one_machine_and_one_day(
+    changed: str, store: Store, runner: TrialRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right_answers.RightAnswer(tmp_path, b"question").note()
+    question = b"question"
+    match changed:
+        case "build":
+            monkeypatch.setattr(right_answers, "grader_sha256", lambda: "another")
+        case "machine":
+            monkeypatch.setattr(right_answers, "_MACHINE", ())
+        case "question":
+            question = b"another question"
+        case "day":
+            for file in tmp_path.iterdir():
+                os.utime(file, (time.time() - 100_000,) * 2)
+        case "answer":
+            monkeypatch.setattr(known_answers, "ask", lambda _: known_answers.KnownAnswer("0", ()))
+            wrong = Watch(store, runner, "machine-1", 3600, right_answers.RightAnswer(tmp_path, question))
+            assert wrong.look() is SelfTestAnswer.WRONG
+    assert not right_answers.RightAnswer(tmp_path, question).given
 
 
 def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:

@@ -21,11 +21,11 @@ from sim.recording import Fault, Verdict
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "section", "footer", "div", "span", "p", "b",
     "i", "h1", "h2", "h3", "table", "thead", "tbody", "tfoot", "tr", "th", "td", "pre", "ol", "li", "dl", "dt", "dd",
-    "svg", "rect", "figure", "figcaption", "img", "details", "summary", "a", "wbr",
+    "svg", "rect", "figure", "figcaption", "img", "details", "summary", "a", "wbr", "script", "noscript",
 }  # fmt: skip
 ATTRIBUTES = {
     "lang", "charset", "http-equiv", "content", "name", "class", "scope", "role", "aria-label", "aria-hidden",
-    "viewbox", "preserveaspectratio", "width", "height", "src", "alt", "href",
+    "viewbox", "preserveaspectratio", "width", "height", "src", "alt", "href", "id", "type",
 }  # fmt: skip
 VOID = {"meta", "img", "rect", "wbr"}
 
@@ -39,6 +39,7 @@ class Reader(HTMLParser):
         self.attributes: list[tuple[str, str, str]] = []
         self.text = ""
         self.style = ""
+        self.scripts = 0
         self._open: list[str] = []
         self.feed(text)
         self.close()
@@ -61,6 +62,8 @@ class Reader(HTMLParser):
     def handle_data(self, data: str) -> None:
         if self._open and self._open[-1] == "style":
             self.style += data
+        elif self._open and self._open[-1] == "script":
+            self.scripts += 1
         else:
             self.text += data
 
@@ -78,6 +81,7 @@ def test_hostile_text_makes_no_tags_and_no_attributes(hostile: tuple[str, Reader
     _, reader = hostile
     assert reader.tags <= TAGS
     assert {name for _, name, _ in reader.attributes} <= ATTRIBUTES
+    assert reader.scripts == 2  # the replay's data and its script
     assert "<script>alert(1)</script>" in reader.text
     assert "{{7*7}}" in reader.text
 
@@ -103,7 +107,7 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     grade = build.shape_grade()
     reader = Reader(report(student_view(grade), draw_all(grade)))
     sources = reader.values("img", "src")
-    assert len(sources) == 9
+    assert len(sources) == 7
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert base64.b64decode(sources[0].split(",")[1]).startswith(b"\x89PNG")
     assert all(len(alt) > 20 for alt in reader.values("img", "alt"))

@@ -11,6 +11,7 @@ from PIL import Image
 
 import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
+from service.reports.page import page_of
 from service.reports.plots.confusion import confusion_table, draw_confusion
 from service.reports.plots.conversation import draw_conversation
 from service.reports.plots.drawn import draw_all, plots_of
@@ -19,6 +20,7 @@ from service.reports.plots.predictions import chosen_predictions, focus_image, s
 from service.reports.plots.sensor import draw_sensors, panels_of, strips_of
 from service.reports.plots.sequence import Gap, Step, conversation
 from service.reports.plots.style import DPI, WIDTH
+from service.reports.view import staff_view
 from sim.recording import Call, Message, Pose, Recording
 
 
@@ -35,13 +37,34 @@ def test_names_of_all_plots() -> None:
         "confusion-names-the-right-shape",
         "misread-names-the-right-shape",
         "predictions-names-the-right-shape",
-        "path-each-shape-5",
-        "sensors-each-shape-5",
         "conversation-each-shape-1",
         "conversation-each-shape-5",
         "talk-each-shape-1",
         "talk-each-shape-5",
     }
+
+
+def test_of_a_robot_that_stood_still_the_page_says_so_and_nothing_is_drawn() -> None:
+    for scene in page_of(staff_view(build.shape_grade())).scenes:
+        assert scene.notes[0] == "the robot stood still, so neither its path nor its sensors are drawn"
+    for scene in page_of(staff_view(build.line_follower_grade())).scenes:
+        assert {plot.kind for plot in scene.plots} >= {"path", "sensors"}
+        assert not any("stood still" in note for note in scene.notes)
+
+
+def test_criteria_that_judge_the_same_answers_share_their_images() -> None:
+    grade = build.shape_grade()
+    (judged,) = (result for result in grade.criteria if result.predictions)
+    again = replace(judged, id="says-it-too", title="Says it too")
+    drawn = draw_all(replace(grade, criteria=(*grade.criteria, again)))
+    assert drawn["predictions-says-it-too"] is drawn[f"predictions-{judged.id}"]
+
+
+def test_at_most_256_colours_and_white_stays_white() -> None:
+    for data in draw_all(build.line_follower_grade()).values():
+        with Image.open(io.BytesIO(data)) as image:
+            assert image.mode == "P"
+            assert image.convert("RGB").getpixel((image.width - 2, 2)) == (255, 255, 255)
 
 
 def test_bytes_repeat_and_sizes_are_small() -> None:

@@ -92,9 +92,21 @@ def test_a_fault_of_the_second_program_is_called_so(crashed: Grade) -> None:
     assert [message.sender for message in scene.messages] == ["robot"]
 
 
+def _second_on_its_way(recording: Recording) -> Recording:
+    """As if the second robot had moved a little: in this assignment both stand."""
+    partner = recording.partner
+    assert partner is not None
+    return replace(recording, partner=replace(partner, ticks=replace(partner.ticks, x=partner.ticks.x + 1.0)))
+
+
 def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
-    drawn = draw_all(relayed)
-    assert len(drawn) == 4
-    told = {plot.kind: plot.alt for plot in plots_of(relayed)}
+    moved = tuple(replace(trial, recording=_second_on_its_way(trial.recording)) for trial in relayed.trials)
+    for pair, kinds in (
+        (relayed, {"conversation", "talk"}),
+        (replace(relayed, trials=moved), {"path", "sensors", "conversation", "talk"}),
+    ):
+        told = {plot.kind: plot.alt for plot in plots_of(pair)}
+        assert told.keys() == kinds
+        assert draw_all(pair).keys() == {plot.name for plot in plots_of(pair)}
     assert "The second robot's from (2000, 200) mm to (2000, 200) mm." in told["path"]
     assert "the robot sent 1 messages, robot 2 4, the responder 5" in told["conversation"]

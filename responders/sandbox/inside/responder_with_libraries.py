@@ -1,0 +1,28 @@
+"""The zygote of responders that may need libraries: as any other's, but they are loaded before the fork.
+
+Which responders those are is the worker's to say; the others need not wait for them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+
+from . import libraries, model_files, responder_zygote
+
+NEEDED = responder_zygote.NEEDED
+run = responder_zygote.run
+_COURSE = ("nn_tools.network_views", "nn_tools.sensor_data", "nn_tools.weights")
+
+
+def preload(without: list[str]) -> None:
+    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
+    responder_zygote.preload(without)
+    libraries.preload(without)
+    missing = (ImportError,) if without else ()
+    for name in _COURSE:
+        with contextlib.suppress(*missing):
+            importlib.import_module(name)
+    model_files.preload_runtimes()
+    with contextlib.suppress(*missing):
+        model_files.explain_joblib()

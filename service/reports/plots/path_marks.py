@@ -1,0 +1,111 @@
+"""What is written along a path: times, and where the robot began, ended, touched something and took images.
+
+The path itself, the floor and the robot are ``path.py``'s.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from service.reports.plots.style import FAULT, INK, SECOND_ROBOT, drawable, font
+from sim.recorded import robot_of, ticks_until
+from sim.recording import Pose, Recording
+
+_TIME_SIZE, _NUMBER_SIZE = 7.6, 7.8  # points
+_FROM_PATH = 0.17, 0.15  # inches to the middle of a time
+_LINE = 0.16  # inches from a word to one above it
+
+
+def placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """World coordinates of a point of the robot (x right, y forward, mm)."""
+    angle = math.radians(pose.heading - 90)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
+
+
+def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
+    """Small times along the path, where the robot had moved on far enough to read them apart.
+
+    ``points`` are x, y in mm and the heading in degrees, row by row; an inch of the plot shows ``per_inch`` mm.
+    """
+    ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
+    taken = [end for end in ends if math.isfinite(sum(end))]
+    step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
+    for second in range(step, math.ceil(recording.end_t), step):
+        row = ticks_until(recording, second)
+        if row >= len(points):
+            break
+        x, y = float(points[row, 0]), float(points[row, 1])
+        if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
+            continue
+        taken.append((x, y))
+        axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
+        text = f"{second} s"
+        # To the robot's right, and the second one's to its left: two may drive the same way.
+        angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
+        sides = [
+            (x + way * _FROM_PATH[0] * per_inch * math.cos(angle), y + way * _FROM_PATH[1] * per_inch * math.sin(angle))
+            for way in (1, -1)
+        ]
+        place = next((side for side in sides if _whole_in_view(axes, *side, text, per_inch)), sides[0])
+        _tag(axes, *place, text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
+
+
+def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
+    """The start and the end, what was touched, and the places of images with their numbers."""
+    for touch in recording.touches[:40]:
+        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
+        axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=8, color=FAULT, markeredgewidth=2, zorder=6)
+    _draw_images(axes, recording, per_inch)
+    start, end = recording.start, recording.end
+    axes.plot(
+        [start.x], [start.y], "o", markersize=7, color="white", markeredgecolor=colour, markeredgewidth=1.6, zorder=7
+    )
+    axes.plot(
+        [end.x], [end.y], "o", markersize=5.5, color=colour, markeredgecolor="white", markeredgewidth=0.8, zorder=8
+    )
+
+
+def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
+    sensor = robot_of(recording).left_light
+    places: dict[tuple[int, int], list[int]] = {}
+    for count, image in enumerate(recording.images, start=1):
+        x, y = placed(image.pose, sensor.x, sensor.y)
+        places.setdefault((round(x / 8), round(y / 8)), []).append(count)
+        corner = (x - image.side / 2, y - image.side / 2)
+        for edge, width in (("white", 2.4), (INK, 1.2)):
+            axes.add_patch(
+                Rectangle(corner, image.side, image.side, facecolor="none", edgecolor=edge, linewidth=width, zorder=6)
+            )
+    numbered: list[tuple[float, float]] = []
+    # The last first: of places too close to be numbered apart it is the one that is kept.
+    for (column, row), counts in reversed(places.items()):
+        text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+        x, y = column * 8.0, row * 8 + 10 + 0.10 * per_inch
+        apart = 2 * _half_width(text) * per_inch
+        if all(abs(x - other[0]) > apart or abs(y - other[1]) > _LINE * per_inch for other in numbered):
+            numbered.append((x, y))
+            _tag(axes, x, y, text, _NUMBER_SIZE)
+
+
+def _half_width(text: str) -> float:
+    """About half of what a time or a number takes, inches."""
+    return 0.032 * len(text) + 0.03
+
+
+def _whole_in_view(axes: Axes, x: float, y: float, text: str, per_inch: float) -> bool:
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    width, height = _half_width(text) * per_inch, _LINE / 2 * per_inch
+    return left + width <= x <= right - width and bottom + height <= y <= top - height
+
+
+def _tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
+    axes.text(
+        x, y, drawable(text), font=font(size), color=colour, ha="center", va="center", parse_math=False, zorder=9,
+        clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+// The replay's data: unpacked, its columns as numbers, and where a robot is at a moment.
+
+const VERSION = 1;
+const ALMOST = 1e-6;
+
+async function unpack(packed) {
+  const bytes = Uint8Array.from(atob(packed), (character) => character.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const replay = JSON.parse(await new Response(stream).text());
+  if (replay.version !== VERSION) throw new Error(`its version is ${replay.version}, expected ${VERSION}`);
+  return replay;
+}
+
+function summedUp(column) {
+  return column.added.map((steps) => {
+    const values = new Float64Array(steps.length);
+    let sum = 0;
+    steps.forEach((step, row) => {
+      if (step !== null) sum += step;
+      values[row] = step === null ? NaN : sum / column.per;
+    });
+    return values;
+  });
+}
+
+class RobotTrack {
+  constructor(told) {
+    Object.assign(this, { name: told.name, body: told.body, images: told.images, start: told.start, end: told.end });
+    this.units = {};
+    this.columns = {};
+    for (const [name, column] of Object.entries(told.columns)) {
+      this.units[name] = column.unit;
+      this.columns[name] = summedUp(column);
+    }
+    this.length = this.columns.x ? this.columns.x[0].length : 0;
+    this.pen = penDown(told.pen, this.length);
+  }
+
+  // The pose after that many ticks, which need not be whole: [x, y, heading].
+  pose(ticks) {
+    if (!this.length) return ticks > 0 ? this.end : this.start;
+    const whole = Math.max(0, Math.min(Math.floor(ticks + ALMOST), this.length));
+    const before = this.row(whole);
+    if (whole === this.length || ticks - whole < 1e-3) return before;
+    const after = this.row(whole + 1);
+    return before.map((value, part) => value + (after[part] - value) * (ticks - whole));
+  }
+
+  row(ticks) {
+    if (ticks === 0) return this.start;
+    const { x, y, heading } = this.columns;
+    return [x[0][ticks - 1], y[0][ticks - 1], heading[0][ticks - 1]];
+  }
+
+  // What a column has after that many ticks, a list; empty where it is not known.
+  reading(name, ticks) {
+    const parts = this.columns[name];
+    if (!parts) return [];
+    const row = Math.max(0, Math.min(Math.floor(ticks + ALMOST), this.length) - 1);
+    return parts.map((values) => values[row]).filter((value) => !Number.isNaN(value));
+  }
+}
+
+// From each tick at which the pen goes down to the one at which it goes up.
+function penDown(changes, length) {
+  const strokes = [];
+  let since = null;
+  for (const [tick, down] of changes) {
+    if (down && since === null) since = tick;
+    if (!down && since !== null) {
+      strokes.push([since, tick]);
+      since = null;
+    }
+  }
+  if (since !== null) strokes.push([since, length]);
+  return strokes;
+}
+
+class Trial {
+  constructor(told, floors) {
+    Object.assign(this, told);
+    this.robots = told.robots.map((robot) => new RobotTrack(robot));
+    this.floorImage = floors[told.floor].loaded;
+    const messages = told.messages.map((message) => ({ kind: "message", ...message }));
+    this.happened = [...told.events, ...messages].sort((a, b) => a.t - b.t);
+  }
+
+  ticks(t) {
+    const ticks = t / this.tick;
+    return Math.abs(ticks - Math.round(ticks)) < 1e-3 ? Math.round(ticks) : ticks;
+  }
+
+  // How much of `happened` there is at t.
+  count(t) {
+    let low = 0;
+    let high = this.happened.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.happened[middle].t <= t + ALMOST) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+}
+
+// The last image that a robot has sent until t; null before the first.
+function latestImage(robot, t) {
+  let latest = null;
+  for (const image of robot.images) {
+    if (image.t > t + ALMOST) break;
+    latest = image;
+  }
+  return latest;
+}
+
+function loadedImage(source) {
+  return new Promise((resolve) => {
+    if (!source) return resolve(null);
+    const loaded = new Image();
+    loaded.onload = () => resolve(loaded);
+    loaded.onerror = () => resolve(null);
+    loaded.src = source;
+  });
+}

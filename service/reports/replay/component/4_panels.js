@@ -1,0 +1,282 @@
+// What stands beside the floor: what the sensors read, what happens, the source, and everything as a table.
+
+const RECENT = 7;
+const MOST_ROWS = 1500;
+const NAMES = {
+  left_rgb: "Left light", right_rgb: "Right light", ultrasonic: "Ultrasonic", gyro: "Gyro",
+  left_position: "Left wheel", right_position: "Right wheel",
+};
+const SHORT_UNITS = { "encoder degrees": "°", degrees: "°", "degrees, clockwise": "° clockwise" };
+
+// An element with these properties and children; texts become text, never markup.
+function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name in made) made[name] = value;
+    else made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+function seconds(t) {
+  return `${t.toFixed(2)} s`;
+}
+
+// Not before the moment, however it is rounded.
+function momentHash(trial, t) {
+  return `#trial=${trial.trial}&t=${Math.ceil(t * 1000 - ALMOST) / 1000}`;
+}
+
+function momentLink(trial, t) {
+  return element("a", { href: momentHash(trial, t) }, seconds(t));
+}
+
+class SensorPanel {
+  constructor() {
+    this.eyes = {};
+    const eyes = element("div", { className: "eyes" });
+    for (const [key, title] of [["left", "Left light"], ["right", "Right light"], ["sentLeft", "Sent, left"],
+      ["sentRight", "Sent, right"]]) {
+      const canvas = element("canvas", { width: 120, height: 120, role: "img", "aria-label": title });
+      const figure = element("figure", {}, canvas, element("figcaption", {}, title));
+      this.eyes[key] = { canvas, figure };
+      eyes.append(figure);
+    }
+    this.sent = element("p", { className: "sent small" });
+    this.readings = element("dl", { className: "readings" });
+    this.root = element("section", { className: "sensors" }, element("h3", {}, "What it senses"), eyes, this.sent,
+      this.readings);
+  }
+
+  show(trial) {
+    this.trial = trial;
+    this.lastSent = undefined;
+    const hasSent = trial.robots[0].images.length > 0;
+    for (const key of ["sentLeft", "sentRight"]) this.eyes[key].figure.hidden = !hasSent;
+    this.sent.hidden = !hasSent;
+    this.cells = new Map();
+    this.readings.replaceChildren();
+    const robot = trial.robots[0];
+    for (const name of ["place", ...Object.keys(robot.columns)]) {
+      if (["x", "y", "heading"].includes(name)) continue;
+      const value = element("dd");
+      this.cells.set(name, value);
+      this.readings.append(element("dt", {}, name === "place" ? "Robot" : NAMES[name] ?? name.replaceAll("_", " ")), value);
+    }
+  }
+
+  draw(t) {
+    const robot = this.trial.robots[0];
+    const ticks = this.trial.ticks(t);
+    const pose = robot.pose(ticks);
+    for (const side of ["left", "right"]) this.drawEye(side, robot, pose);
+    for (const [name, cell] of this.cells) {
+      const text = name === "place" ? placeWords(pose) : readingWords(robot, name, ticks);
+      if (cell.textContent !== text) cell.textContent = text;
+    }
+    this.drawSent(robot, t);
+  }
+
+  // The floor under the sensor, as its window lies: along the axes, whichever way the robot heads.
+  drawEye(side, robot, pose) {
+    const { canvas } = this.eyes[side];
+    const context = canvas.getContext("2d");
+    const [right, forward, diameter] = robot.body[side];
+    const [x, y] = placed(pose, [right, forward]);
+    const [column, row] = [Math.trunc(x - diameter / 2), Math.trunc(FLOOR_HEIGHT - y - diameter / 2)];
+    context.fillStyle = "#000000";
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    const floor = this.trial.floorImage;
+    if (!floor || Number.isNaN(x + y)) return;
+    const [per, side_] = [floor.naturalWidth / FLOOR_WIDTH, canvas.width / diameter];
+    context.save();
+    context.beginPath();
+    context.arc(canvas.width / 2, canvas.height / 2, canvas.width / 2, 0, 7);
+    context.clip();
+    context.imageSmoothingEnabled = false;
+    context.drawImage(floor, column * per, row * per, diameter * per, diameter * per, 0, 0, diameter * side_,
+      diameter * side_);
+    context.restore();
+  }
+
+  drawSent(robot, t) {
+    const latest = latestImage(robot, t);
+    if (latest === this.lastSent) return;
+    this.lastSent = latest;
+    drawPixels(this.eyes.sentLeft.canvas, latest && latest.left, latest && latest.side);
+    drawPixels(this.eyes.sentRight.canvas, latest && latest.right, latest && latest.side);
+    this.sent.textContent = latest ? sentWords(latest) : "No image is sent yet.";
+    this.sent.classList.toggle("wrong", Boolean(latest) && isMisread(latest));
+  }
+}
+
+function placeWords([x, y, heading]) {
+  const within = heading - 360 * Math.round(heading / 360);
+  return `x ${x.toFixed(1)}, y ${y.toFixed(1)} mm, heading ${within.toFixed(1)}°`;
+}
+
+function readingWords(robot, name, ticks) {
+  const values = robot.reading(name, ticks);
+  if (!values.length) return "–";
+  if (values.length === 3) return values.map((value, part) => `${"RGB"[part]} ${Math.round(value)}`).join("  ");
+  const unit = robot.units[name];
+  const short = SHORT_UNITS[unit] ?? ` ${unit}`;
+  return `${values.map((value) => value.toFixed(unit === "mm" ? 0 : 1)).join(", ")}${short}`;
+}
+
+function sentWords(image) {
+  const sent = `Sent at ${seconds(image.t)}`;
+  if (image.truth === undefined) return `${sent}.`;
+  if (!isMisread(image)) return `${sent}: ${image.truth}, and so it was named.`;
+  return `${sent}: ${image.truth}, ${image.answer === null ? "not named" : `taken for ${image.answer}`}.`;
+}
+
+function drawPixels(canvas, told, side) {
+  const context = canvas.getContext("2d");
+  context.clearRect(0, 0, canvas.width, canvas.height);
+  if (!told) return;
+  const bytes = atob(told);
+  if (bytes.length !== side * side * 3) return;
+  const small = element("canvas", { width: side, height: side });
+  const pixels = new ImageData(side, side);
+  for (let pixel = 0; pixel < side * side; pixel += 1) {
+    for (let part = 0; part < 3; part += 1) pixels.data[4 * pixel + part] = bytes.charCodeAt(3 * pixel + part);
+    pixels.data[4 * pixel + 3] = 255;
+  }
+  small.getContext("2d").putImageData(pixels, 0, 0);
+  context.imageSmoothingEnabled = false;
+  context.drawImage(small, 0, 0, canvas.width, canvas.height);
+}
+
+// The words for one thing that happened: who, what, and what came of it at the other end.
+function happenedWords(item) {
+  if (item.kind !== "message") return { who: item.who, kind: item.kind, text: item.text, outcome: "", wrong: isWrong(item) };
+  const got = item.arrived_as === undefined ? "" : `, as ${item.arrived_as}`;
+  const befell = item.befell ? `${item.befell}; ` : "";
+  const outcome = item.arrived === null ? `${item.befell ?? "not answered"}: never arrived`
+    : `${befell}arrived ${seconds(item.arrived)}${got}`;
+  return { who: `${item.from} → ${item.to}`, kind: "message", text: item.text, outcome, wrong: isWrong(item) };
+}
+
+function isWrong(item) {
+  return ["fault", "touched"].includes(item.kind) || (item.kind === "message" && (item.arrived === null || Boolean(item.befell)));
+}
+
+class HappenedPanel {
+  constructor() {
+    this.list = element("ol", { className: "happened" });
+    this.root = element("section", { className: "now" }, element("h3", {}, "What happens"), this.list);
+  }
+
+  show(trial) {
+    this.trial = trial;
+    this.shown = -1;
+  }
+
+  draw(t) {
+    const count = this.trial.count(t);
+    if (count === this.shown) return;
+    this.shown = count;
+    const recent = this.trial.happened.slice(Math.max(0, count - RECENT), count).reverse();
+    this.list.replaceChildren(...recent.map((item) => this.row(item)));
+    if (!recent.length) this.list.append(element("li", { className: "soft" }, "Nothing yet."));
+  }
+
+  row(item) {
+    const words = happenedWords(item);
+    const row = element("li", { className: `${item.kind}${words.wrong ? " wrong" : ""}` }, momentLink(this.trial, item.t),
+      element("span", { className: "who" }, item.kind === "message" ? words.who : `${words.who}: ${words.kind}`),
+      element("span", { className: "what" }, words.text));
+    if (words.outcome) row.append(element("span", { className: "outcome" }, words.outcome));
+    return row;
+  }
+}
+
+class SourcePanel {
+  constructor(sources) {
+    this.sources = sources;
+    this.choice = element("select", { "aria-label": "Source" },
+      ...sources.map((source, index) => element("option", { value: index }, source.name)));
+    this.choice.addEventListener("change", () => this.open(Number(this.choice.value)));
+    this.lines = element("ol");
+    this.window = element("div", { className: "lines", tabIndex: 0, role: "region", "aria-label": "Lines of the source" },
+      this.lines);
+    this.known = element("p", { className: "small soft" });
+    this.root = element("section", { className: "source", hidden: !sources.length },
+      element("div", { className: "source-head" }, element("h3", {}, "Source"), this.choice), this.window, this.known);
+    this.choice.hidden = sources.length < 2;
+  }
+
+  show(trial) {
+    this.trial = trial;
+    this.at = undefined;
+    if (this.sources.length) this.open(0);
+  }
+
+  open(index) {
+    const { lines, more } = this.sources[index];
+    this.opened = index;
+    this.choice.value = String(index);
+    this.lines.replaceChildren(...lines.map((line) => element("li", {}, line || " ")));
+    if (more) this.lines.append(element("li", { className: "soft" }, `… ${more} more lines`));
+  }
+
+  // The line of the latest thing that is known to have come from one.
+  draw(t) {
+    if (!this.sources.length) return;
+    let latest = null;
+    for (let index = this.trial.count(t) - 1; index >= 0 && !latest; index -= 1) {
+      if (this.trial.happened[index].line) latest = this.trial.happened[index];
+    }
+    if (latest === this.at) return;
+    this.at = latest;
+    this.lines.querySelector("[aria-current]")?.removeAttribute("aria-current");
+    this.known.textContent = latest ? `Line ${latest.line[1]} at ${seconds(latest.t)}.`
+      : "A line is marked when it has written something that no other line can have written, or has failed.";
+    if (!latest) return;
+    const [source, line] = latest.line;
+    if (source !== this.opened) this.open(source);
+    const marked = this.lines.children[line - 1];
+    if (!marked) return;
+    marked.setAttribute("aria-current", "step");
+    marked.classList.toggle("wrong", latest.kind === "fault");
+    this.window.scrollTop = marked.offsetTop - this.window.clientHeight / 2;
+  }
+}
+
+class EventTable {
+  constructor() {
+    this.body = element("tbody");
+    this.more = element("p", { className: "small soft" });
+    const head = ["Time", "Who", "What", "Text", "What came of it"].map((title) => element("th", { scope: "col" }, title));
+    this.root = element("details", { className: "events" }, element("summary", {}, "All that happened, as a table"),
+      element("div", { className: "scroll" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), this.body)),
+      this.more);
+    this.root.addEventListener("toggle", () => this.fill());
+  }
+
+  show(trial) {
+    this.trial = trial;
+    this.filled = false;
+    this.fill();
+  }
+
+  fill() {
+    if (!this.root.open || this.filled) return;
+    this.filled = true;
+    const lost = this.trial.lost.map((loss) => ({ ...loss, who: loss.title, kind: "marks lost" }));
+    const images = this.trial.robots.flatMap((robot) =>
+      robot.images.map((image) => ({ t: image.t, who: robot.name, kind: "image", text: sentWords(image) })));
+    const all = [...this.trial.happened, ...lost, ...images].sort((a, b) => a.t - b.t);
+    this.body.replaceChildren(...all.slice(0, MOST_ROWS).map((item) => {
+      const { who, kind, text, outcome, wrong } = happenedWords(item);
+      const place = item.pose ? placeWords(item.pose) : outcome;
+      return element("tr", { className: wrong || kind === "marks lost" ? "wrong" : "" },
+        element("td", { className: "number" }, momentLink(this.trial, item.t)),
+        ...[who, kind, text, place].map((cell) => element("td", {}, cell)));
+    }));
+    const missing = Math.max(0, all.length - MOST_ROWS) + this.trial.left_out;
+    this.more.textContent = missing ? `${missing.toLocaleString("en")} more are not shown.` : "";
+  }
+}

@@ -1,0 +1,187 @@
+// The controls: one slider over one trial, by mouse, touch, keyboard and links; and how a page starts it.
+
+const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
+const VIEWS = [["path", "Where it drove"], ["floor", "Whole floor"], ["near", "Near the robot"]];
+const STEPS = { ArrowLeft: -0.1, ArrowRight: 0.1, ArrowDown: -1, ArrowUp: 1, PageDown: -10, PageUp: 10 };
+const REDUCED = window.matchMedia("(prefers-reduced-motion: reduce)");
+const REDUCED_STEP = 500; // ms from one still to the next
+
+class ReplayControls {
+  constructor(replay, root) {
+    this.replay = replay;
+    this.root = root;
+    this.trials = replay.trials.map((trial) => new Trial(trial, replay.floors));
+    this.t = 0;
+    this.speed = 1;
+    this.playing = false;
+    const [sensors, ...beside] = [new SensorPanel(), new HappenedPanel(), new SourcePanel(replay.sources)];
+    this.panels = [sensors, ...beside];
+    this.table = new EventTable();
+    this.build(sensors, beside);
+    this.open(this.trials[replay.first], 0);
+    this.listen();
+  }
+
+  build(sensors, beside) {
+    const choice = (label, options) => {
+      const select = element("select", {}, ...options.map(([value, text]) => element("option", { value }, text)));
+      return [select, element("label", {}, element("span", {}, label), select)];
+    };
+    const [trial, trialLabel] = choice("Trial", this.trials.map((each) => [each.trial, `${each.name}: ${each.ended}`]));
+    const [view, viewLabel] = choice("View", VIEWS);
+    const [speed, speedLabel] = choice("Speed", SPEEDS);
+    speed.value = "1";
+    Object.assign(this, { trialChoice: trial, viewChoice: view, speedChoice: speed });
+    trialLabel.hidden = this.trials.length < 2;
+    trialLabel.className = "trial-choice";
+    this.canvas = element("canvas", { className: "floor", role: "img",
+      "aria-label": "The floor with the robot. The table below tells what happened in words." });
+    this.floor = new FloorCanvas(this.canvas);
+    this.play = element("button", { type: "button", className: "play" }, "Play");
+    this.slider = element("input", { type: "range", min: 0, step: "any", className: "moment", "aria-label": "Moment" });
+    this.clock = element("span", { className: "clock" });
+    this.link = element("a", { className: "small" }, "Link to this moment");
+    this.losses = element("ol", { className: "losses" });
+    const keys = "Space plays; arrows step by 0.1 and 1 s, page keys by 10 s; Home and End go to the ends.";
+    const main = element("div", { className: "main-part" }, this.canvas,
+      element("div", { className: "controls" }, this.play, this.slider, this.clock),
+      element("div", { className: "choices" }, speedLabel, viewLabel, this.link),
+      element("p", { className: "small soft keys" }, keys), this.losses, sensors.root);
+    this.root.replaceChildren(trialLabel, element("div", { className: "columns" }, main,
+      element("div", { className: "panels" }, ...beside.map((panel) => panel.root))), this.table.root);
+    const missing = this.replay.of - this.trials.length;
+    if (missing) {
+      this.root.append(element("p", { className: "small soft" },
+        `Of ${this.replay.of} trials, ${missing} are left out of this file.`));
+    }
+  }
+
+  listen() {
+    this.play.addEventListener("click", () => this.toggle());
+    this.slider.addEventListener("input", () => this.seek(this.slider.valueAsNumber));
+    this.speedChoice.addEventListener("change", () => { this.speed = Number(this.speedChoice.value); });
+    this.viewChoice.addEventListener("change", () => {
+      this.floor.mode = this.viewChoice.value;
+      this.draw();
+    });
+    this.trialChoice.addEventListener("change", () => this.open(this.byNumber(this.trialChoice.value), 0));
+    this.root.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    window.addEventListener("hashchange", () => this.follow(location.hash));
+    document.addEventListener("click", (event) => {
+      const link = event.target instanceof Element && event.target.closest("a[href^='#']");
+      if (link && link.hash === location.hash) this.follow(link.hash);
+    });
+    this.follow(location.hash);
+  }
+
+  byNumber(number) {
+    return this.trials.find((trial) => trial.trial === Number(number));
+  }
+
+  open(trial, t) {
+    this.trial = trial;
+    this.trialChoice.value = String(trial.trial);
+    this.slider.max = String(trial.seconds);
+    this.floor.show(trial);
+    for (const panel of [...this.panels, this.table]) panel.show(trial);
+    this.losses.replaceChildren(...trial.lost.map((loss) =>
+      element("li", {}, element("b", {}, loss.title), ` (${loss.marks}), lost at `, momentLink(trial, loss.t),
+        element("p", { className: "small" }, loss.text))));
+    this.seek(t);
+  }
+
+  // A link to a moment: #t=12.40, or #trial=2&t=12.40.
+  follow(hash) {
+    const asked = new URLSearchParams(hash.slice(1));
+    const t = Number.parseFloat(asked.get("t") ?? "");
+    if (!Number.isFinite(t)) return;
+    const trial = asked.has("trial") ? this.byNumber(asked.get("trial")) : this.trial;
+    if (!trial) return;
+    this.pause();
+    if (trial === this.trial) this.seek(t);
+    else this.open(trial, t);
+    this.root.scrollIntoView({ block: "start" });
+    this.slider.focus({ preventScroll: true });
+  }
+
+  key(event) {
+    if (event.altKey || event.ctrlKey || event.metaKey || event.target.closest("select, .lines, .scroll")) return;
+    if (event.key === " " && !event.target.closest("button, a, summary")) this.toggle();
+    else if (event.key in STEPS) this.step(STEPS[event.key] * (event.shiftKey ? 10 : 1));
+    else if (event.key === "Home") this.seek(0);
+    else if (event.key === "End") this.seek(this.trial.seconds);
+    else return;
+    event.preventDefault();
+  }
+
+  // From one tenth of a second to the next, wherever between them it stands.
+  step(by) {
+    this.seek(Math.round((this.t + by) * 10) / 10);
+  }
+
+  seek(t) {
+    this.t = Math.max(0, Math.min(t, this.trial.seconds));
+    this.draw();
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.start();
+  }
+
+  start() {
+    if (this.t >= this.trial.seconds - ALMOST) this.seek(0);
+    this.playing = true;
+    this.play.textContent = "Pause";
+    let last = performance.now();
+    const frame = (now) => {
+      if (!this.playing) return;
+      if (!REDUCED.matches || now - last >= REDUCED_STEP) {
+        this.seek(this.t + (Math.max(0, now - last) / 1000) * this.speed);
+        last = now;
+      }
+      if (this.t >= this.trial.seconds) this.pause();
+      else requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  pause() {
+    this.playing = false;
+    this.play.textContent = "Play";
+    this.tell();
+  }
+
+  draw() {
+    this.slider.value = String(this.t);
+    this.clock.textContent = `${this.t.toFixed(2)} of ${seconds(this.trial.seconds)}`;
+    this.floor.draw(this.t, this.speed);
+    for (const panel of this.panels) panel.draw(this.t);
+    if (!this.playing) this.tell();
+  }
+
+  // What a screen reader says of the moment, and the link to it.
+  tell() {
+    const place = placeWords(this.trial.robots[0].pose(this.trial.ticks(this.t)));
+    const count = this.trial.count(this.t);
+    const latest = count ? happenedWords(this.trial.happened[count - 1]) : null;
+    const said = latest ? `; last, ${latest.who} ${latest.kind}: ${latest.text.slice(0, 80)}` : "";
+    this.slider.setAttribute("aria-valuetext", `${this.t.toFixed(2)} of ${seconds(this.trial.seconds)}; ${place}${said}`);
+    this.link.href = momentHash(this.trial, this.t);
+  }
+}
+
+async function startReplay(section) {
+  const root = section.querySelector(".component");
+  try {
+    const replay = await unpack(JSON.parse(section.querySelector("script").textContent).deflated);
+    for (const floor of replay.floors) floor.loaded = await loadedImage(floor.image);
+    if (replay.trials.length) new ReplayControls(replay, root);
+    section.dataset.ready = String(Math.round(performance.now()));
+  } catch (error) {
+    root.replaceChildren(element("p", {}, `The replay cannot be shown by this browser: ${error.message}`));
+  }
+}
+
+document.querySelectorAll("section.replay").forEach(startReplay);

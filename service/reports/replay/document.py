@@ -1,0 +1,138 @@
+"""A whole replay as one JSON-serialisable document: the trials of a grade, or one run, their floors and their source.
+
+It holds what the reader's view holds, and no more. The page that plays it is ``html.py``'s.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+import zlib
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from service.grading.grade import TrialResult
+from service.reports.readable import one_line
+from service.reports.replay.sources import Sources, sources_of
+from service.reports.replay.trial import trial_data
+from service.reports.view import View, scenarios, worst_trial
+from sim.floors import floor, names
+from sim.recording import Recording
+from submissions.submission import Submission
+
+Pixels = NDArray[np.uint8]
+FORMAT, VERSION = "robomark replay", 1
+#: Compressed; what the trials of a report may take together. The first one is always there.
+REPORT_BYTES = 300_000
+_FLOOR_BYTES = 120_000
+_OWN: Mapping[str, Pixels] = MappingProxyType({})
+
+
+def replay_of_grade(
+    view: View,
+    submission: Submission | None = None,
+    own_floors: Mapping[str, Pixels] = _OWN,
+    most_bytes: float = math.inf,
+) -> dict[str, Any]:
+    """The trials that the view has: first the worst of each scenario, then the others.
+
+    They are as many as fit into ``most_bytes`` when they are compressed, and at least one. ``own_floors`` are those
+    that are not built in, by name.
+    """
+    grade = view.grade
+    worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
+    order = dict.fromkeys([*worst, *range(len(grade.trials))])
+    sources = sources_of(submission)
+    chosen: dict[int, dict[str, Any]] = {}
+    left = most_bytes
+    for index in order:
+        told = trial_data(grade.trials[index], sources, grade.criteria, index)
+        left -= len(packed(told)) if most_bytes < math.inf else 0
+        if left < 0 and chosen:
+            break
+        chosen[index] = told
+    title = f"{grade.assignment_title}: {grade.student}"
+    kept = sorted(chosen)
+    trials = [(grade.trials[index], chosen[index]) for index in kept]
+    first = kept.index(worst[0]) if kept else 0
+    return {**_document(title, trials, sources, own_floors), "of": len(grade.trials), "first": first}
+
+
+def replay_of_run(
+    recording: Recording, name: str, seed: int, sources: Sources, own_floors: Mapping[str, Pixels]
+) -> dict[str, Any]:
+    """One run, of which nothing was marked."""
+    trial = TrialResult(name, 0, seed, 0, 0, "visible", recording)
+    told = {**trial_data(trial, sources), "name": one_line(name, 60)}
+    return {**_document(name, [(trial, told)], sources, own_floors), "of": 1, "first": 0}
+
+
+def packed(document: Mapping[str, Any]) -> bytes:
+    """The document's JSON, compressed as every browser can read it."""
+    return zlib.compress(json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii"), 6)
+
+
+def _document(
+    title: str,
+    trials: Iterable[tuple[TrialResult, dict[str, Any]]],
+    sources: Sources,
+    own_floors: Mapping[str, Pixels],
+) -> dict[str, Any]:
+    numbers: dict[tuple[str, bool, int], int] = {}
+    floors: list[dict[str, Any]] = []
+    told = []
+    for trial, data in trials:
+        recording = trial.recording
+        ground = (recording.background, recording.label_patches, recording.sheet)
+        if ground not in numbers:
+            numbers[ground] = len(floors)
+            floors.append(_floor(recording, own_floors))
+        told.append({**data, "floor": numbers[ground]})
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "title": one_line(title, 200),
+        "floors": floors,
+        "sources": [source.told() for source in sources.shown],
+        "trials": told,
+    }
+
+
+def _floor(recording: Recording, own_floors: Mapping[str, Pixels]) -> dict[str, Any]:
+    """The floor as it was in the trial; without an image where nobody has it any more."""
+    own = own_floors.get(recording.background)
+    if own is not None:
+        image = _image(own)
+    elif recording.background in names():
+        image = _built_in(recording.background, recording.label_patches, recording.sheet)
+    else:
+        image = None
+    return {"name": one_line(recording.background, 80), "image": image}
+
+
+@lru_cache(maxsize=12)
+def _built_in(name: str, labels: bool, sheet: int) -> str:
+    return _image(floor(name, labels=labels, seed=sheet).pixels)
+
+
+def _image(pixels: Pixels) -> str:
+    """As a data URI: without loss if that is small, as printed floors are, and else as a photograph."""
+    image = Image.fromarray(np.ascontiguousarray(pixels[:, :, :3]))
+    data = _webp(image, lossless=True, method=2)
+    if len(data) > _FLOOR_BYTES:
+        data = _webp(image.resize((image.width // 2, image.height // 2)), quality=70)
+    return f"data:image/webp;base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _webp(image: Image.Image, **how: Any) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, "WEBP", **how)
+    return buffer.getvalue()

@@ -1,0 +1,216 @@
+"""One trial as a replay's data: the robots tick by tick, and all that happened, with its moment and its line.
+
+It hides nothing: what comes in is the reader's view already. The keys are told in ``docs/replay.md``.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from service.grading.grade import CriterionResult, Prediction, TrialResult
+from service.reports.crossing import befell_in_full
+from service.reports.readable import message_words, number, one_line, readable
+from service.reports.replay.columns import told_columns
+from service.reports.replay.sources import Place, Sources
+from service.reports.robots import PARTNER_OF, robots_of
+from service.reports.words import verdict_words
+from sim.recorded import pose_at, robot_of
+from sim.recording import SECOND, Image, Pose, Recording, Verdict
+from sim.robot import LightSensor
+
+#: Of each kind of thing that can happen, in one trial.
+_MOST = 2000
+_MOST_IMAGES = 1000
+_LONGEST_TEXT, _MOST_LINES = 600, 12
+
+
+def trial_data(
+    trial: TrialResult, sources: Sources, criteria: Sequence[CriterionResult] = (), index: int = 0
+) -> dict[str, Any]:
+    """All of a trial but its floor. ``index`` is the one that the evidence of the ``criteria`` knows it by."""
+    recording = trial.recording
+    texts, left_out = _events(recording, sources)
+    messages = sorted(_messages(recording, sources), key=lambda message: message["t"])
+    left_out += max(0, len(messages) - _MOST)
+    predictions = [each for result in criteria for each in result.predictions if each.trial == index]
+    return {
+        "trial": index + 1,
+        "name": f"{one_line(trial.scenario, 60)}, trial {trial.index + 1}",
+        "verdict": trial.verdict.value,
+        "ended": verdict_words(trial.verdict).short,
+        "seconds": recording.end_t,
+        "tick": recording.ticks.length / SECOND,
+        "obstacles": recording.obstacles,
+        "beacon": recording.beacon,
+        "robots": [_robot(name, own, predictions) for name, own in robots_of(recording)],
+        "messages": messages[:_MOST],
+        "events": texts,
+        "left_out": left_out,
+        "lost": _losses(recording, criteria, index),
+    }
+
+
+def loss_moment(recording: Recording, t: float | None) -> float:
+    """When a criterion was lost; what never happened was lost when the trial ended."""
+    return recording.end_t if t is None or not math.isfinite(t) else max(0.0, min(t, recording.end_t))
+
+
+def moment_hash(trial: int, t: float) -> str:
+    """A link to a moment of a trial, which is counted from 1; not before it, however it is rounded."""
+    return f"#trial={trial}&t={math.ceil(t * 1000 - 1e-6) / 1000:.3f}"
+
+
+def _robot(name: str, recording: Recording, predictions: Sequence[Prediction]) -> dict[str, Any]:
+    body = robot_of(recording)
+    return {
+        "name": name,
+        "body": {
+            "front": body.front,
+            "back": body.back,
+            "half_width": body.half_width,
+            "wheel_spacing": body.wheel_spacing,
+            "wheel_diameter": body.wheel_diameter,
+            "ultrasonic": body.ultrasonic_y,
+            "left": _sensor(body.left_light),
+            "right": _sensor(body.right_light),
+        },
+        "start": _pose(recording.start),
+        "end": _pose(recording.end),
+        "columns": told_columns(recording.ticks),
+        "pen": recording.pen,
+        "images": [_image(image, predictions) for image in recording.images[:_MOST_IMAGES]],
+    }
+
+
+def _sensor(sensor: LightSensor) -> list[float]:
+    return [sensor.x, sensor.y, sensor.diameter]
+
+
+def _pose(pose: Pose) -> list[float]:
+    return [round(value, 2) if math.isfinite(value) else 0.0 for value in (pose.x, pose.y, pose.heading)]
+
+
+def _image(image: Image, predictions: Sequence[Prediction]) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "t": image.t,
+        "side": image.side,
+        "pose": _pose(image.pose),
+        "left": _pixels(image.left),
+        "right": _pixels(image.right),
+    }
+    for each in predictions:
+        if (each.image.t, each.image.message) == (image.t, image.message):
+            told["truth"] = one_line(each.truth, 60)
+            told["answer"] = None if each.answer is None else one_line(each.answer, 60)
+    return told
+
+
+def _pixels(rgba: bytes) -> str:
+    """Without what is the same in every pixel: how opaque it is."""
+    whole = rgba[: len(rgba) // 4 * 4]
+    return base64.b64encode(np.frombuffer(whole, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
+
+
+def _events(recording: Recording, sources: Sources) -> tuple[list[dict[str, Any]], int]:
+    """What was printed, said, touched and went wrong, by time; and how much of it is left out."""
+    events: list[dict[str, Any]] = []
+    left_out = 0
+    for robot, own in robots_of(recording):
+        is_students = own is recording
+        kinds: tuple[list[dict[str, Any]], ...] = (
+            [
+                _event(line.t, robot, "printed", line.text, sources.wrote(line.text) if is_students else None)
+                for line in own.printed[:_MOST]
+            ],
+            [
+                _event(line.t, robot, "said", line.text, sources.wrote(line.text, spoken=True) if is_students else None)
+                for line in own.spoken[:_MOST]
+            ],
+            [
+                {**_event(touch.t, robot, "touched", touch.what), "pose": _pose(touch.pose)}
+                for touch in own.touches[:_MOST]
+            ],
+            [
+                _event(
+                    fault.t,
+                    fault.agent or fault.who,
+                    "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault",
+                    f"{fault.message} ({fault.place})" if fault.place else fault.message,
+                    sources.of_fault(fault),
+                )
+                for fault in own.faults[:_MOST]
+            ],
+        )
+        for kind, told in zip((own.printed, own.spoken, own.touches, own.faults), kinds, strict=True):
+            left_out += len(kind) - len(told)
+            events += told
+    return sorted(events, key=lambda event: event["t"]), left_out
+
+
+def _event(t: float, who: str, kind: str, text: str, place: Place | None = None) -> dict[str, Any]:
+    told = {"t": t, "who": one_line(who, 60), "kind": kind, "text": readable(text, _LONGEST_TEXT, lines=_MOST_LINES)}
+    return {**told, **_placed(place)}
+
+
+def _placed(place: Place | None) -> dict[str, Any]:
+    return {} if place is None else {"line": [place.source, place.line]}
+
+
+def _messages(recording: Recording, sources: Sources) -> Iterator[dict[str, Any]]:
+    """Every text that set out, with what the other end got of it and when."""
+    for robot, own in robots_of(recording):
+        other = PARTNER_OF[robot] if recording.partner is not None else "responder"
+        for message in own.messages:
+            if message.sender == "partner":
+                continue  # it is told as the other robot's
+            from_robot = message.sender == "robot"
+            receiver = other if message.to_partner or recording.partner is None else "responder"
+            told: dict[str, Any] = {
+                "t": message.t,
+                "from": robot if from_robot else "responder",
+                "to": receiver if from_robot else robot,
+                "text": message_words(message.text, _LONGEST_TEXT),
+                "arrived": message.delivered,
+            }
+            if message.arrived_as is not None:
+                told["arrived_as"] = message_words(message.arrived_as, _LONGEST_TEXT)
+            befell = befell_in_full(message)
+            if befell:
+                told["befell"] = befell
+            if from_robot and own is recording:
+                told |= _placed(sources.wrote(message.text))
+            yield told
+    for each in recording.agent_messages:
+        told = {
+            "t": each.t,
+            "from": one_line(each.sender, 60),
+            "to": one_line(each.receiver, 60),
+            "text": message_words(each.text, _LONGEST_TEXT),
+            "arrived": None if each.note else each.t,
+        }
+        yield {**told, "befell": one_line(each.note, 80)} if each.note else told
+
+
+def _losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
+    """Each criterion that the trial failed, with the moment and the place."""
+    lost = []
+    for result in criteria:
+        for item in result.evidence:
+            if item.passed or item.trial != index:
+                continue
+            t = loss_moment(recording, item.t)
+            lost.append(
+                {
+                    "t": t,
+                    "pose": _pose(item.pose or pose_at(recording, t)),
+                    "title": one_line(result.title, 120),
+                    "text": readable(item.message or result.message, _LONGEST_TEXT, lines=_MOST_LINES),
+                    "marks": f"{number(result.marks)} / {number(result.max_marks)}",
+                }
+            )
+    return lost

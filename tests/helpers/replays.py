@@ -1,0 +1,71 @@
+"""Replays for tests: their data read as the page reads it, long recordings, and what comes of hostile data."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import re
+import zlib
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from report_builders import line_follower_recording
+from sim.recording import COLUMNS, Image, Pose, Recording, Ticks
+
+#: What is no student's text, in a replay's data and in a grade.
+_NO_TEXTS = {
+    "format", "image", "left", "right", "unit", "background", "robot", "sender", "who", "lost", "visibility",
+    "missing", "note",
+}  # fmt: skip
+
+
+def data_of(page: str) -> dict[str, Any]:
+    """The data in a page."""
+    (packed,) = re.findall(r'<script type="application/json">\{"deflated": "([^"]*)"\}</script>', page)
+    return dict(json.loads(zlib.decompress(base64.b64decode(packed))))
+
+
+def values_of(column: dict[str, Any]) -> np.ndarray:
+    """A column as numbers, one row a tick."""
+    parts = []
+    for added in column["added"]:
+        total, values = 0, []
+        for step in added:
+            total += step or 0
+            values.append(np.nan if step is None else total / column["per"])
+        parts.append(values)
+    return np.array(parts).T
+
+
+def long_recording(ticks: int, images: int = 0) -> Recording:
+    """A recording so long, with so many images that nothing makes smaller."""
+    one = line_follower_recording(150)
+    times = -(-ticks // 150)
+    chance = np.random.default_rng(0)
+    columns = {
+        each.name: np.concatenate([getattr(one.ticks, each.name)] * times)[:ticks]
+        + (chance.integers(0, 3000, (ticks, each.width)) if each.whole else 0)
+        for each in COLUMNS
+    }
+    seconds = ticks / 30
+    taken = tuple(
+        Image(index * seconds / images, 0, Pose(500, 400, 0), chance.bytes(1600), chance.bytes(1600), 0)
+        for index in range(images)
+    )
+    return replace(one, ticks=Ticks(**columns), end_t=seconds, images=taken)
+
+
+def poisoned(told: Any, text: str, key: str = "") -> Any:
+    """The same data with another text in the place of each."""
+    if dataclasses.is_dataclass(told) and not isinstance(told, type):
+        changed = {each.name: poisoned(getattr(told, each.name), text, each.name) for each in dataclasses.fields(told)}
+        return replace(told, **changed)
+    if isinstance(told, Mapping):
+        return {each: poisoned(value, text, each) for each, value in told.items()}
+    if isinstance(told, list | tuple):
+        return type(told)(poisoned(value, text, key) for value in told)
+    return text if type(told) is str and key not in _NO_TEXTS else told

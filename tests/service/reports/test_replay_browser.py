@@ -1,0 +1,261 @@
+"""The replay in Chromium, from a file and without a network: the robot is where it was, and no text runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+import report_builders as build
+from browsing import DESKTOP, PHONE, OpenPage, chromium, opened
+from replays import long_recording, poisoned
+from service.reports.html import replay_page, report
+from service.reports.replay.document import replay_of_grade
+from service.reports.view import student_view
+from sim.floors import floor
+from sim.recording import Recording
+
+pytestmark = pytest.mark.long
+
+#: Where the middle of the axle is, CSS pixels: the mean of the pixels that have its colour.
+AXLE = """() => {
+  const canvas = document.querySelector("canvas.floor");
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let [count, x, y] = [0, 0, 0];
+  for (let at = 0; at < data.length; at += 4) {
+    if (data[at] !== 230 || data[at + 1] !== 0 || data[at + 2] !== 126) continue;
+    count += 1;
+    x += (at / 4) % canvas.width;
+    y += Math.floor(at / 4 / canvas.width);
+  }
+  const ratio = canvas.width / canvas.clientWidth;
+  return [(x / count + 0.5) / ratio, (y / count + 0.5) / ratio];
+}"""
+REGION = """() => {
+  const canvas = document.querySelector("canvas.floor");
+  return [...canvas.dataset.region.split(" ").map(Number), canvas.clientWidth, canvas.clientHeight];
+}"""
+PIXEL = """([x, y]) => {
+  const context = document.querySelector("canvas.floor").getContext("2d");
+  return [...context.getImageData(x, y, 1, 1).data];
+}"""
+SEEK = """(t) => {
+  const slider = document.querySelector(".moment");
+  slider.value = String(t);
+  slider.dispatchEvent(new Event("input"));
+}"""
+HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u202e\u2028"
+WIDTHS = pytest.mark.parametrize("context", [DESKTOP, PHONE], ids=["desktop", "phone"])
+SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def line_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("line") / "report.html"
+    file.write_text(report(student_view(build.line_follower_grade()), {}, build.faulty_submission()))
+    return file
+
+
+def on_canvas(page: Page, x: float, y: float) -> tuple[float, float]:
+    """Where a point of the world is on the canvas."""
+    left, bottom, across, up, width, height = page.evaluate(REGION)
+    return (x - left) * width / across, (bottom + up - y) * height / up
+
+
+def pose_at(recording: Recording, t: float) -> tuple[float, float]:
+    """Where the robot was at ``t``, on the straight line from one tick to the next."""
+    ticks = np.arange(len(recording.ticks) + 1) / 30
+    x, y = (np.concatenate(([start], values)) for start, values in (
+        (recording.start.x, recording.ticks.x), (recording.start.y, recording.ticks.y),
+    ))  # fmt: skip
+    return float(np.interp(t, ticks, x)), float(np.interp(t, ticks, y))
+
+
+def assert_robot_is_there(page: Page, recording: Recording, t: float) -> None:
+    wanted = on_canvas(page, *pose_at(recording, t))
+    found = page.evaluate(AXLE)
+    assert max(abs(found[0] - wanted[0]), abs(found[1] - wanted[1])) <= 1, t
+
+
+def now(page: Page) -> float:
+    return float(page.locator(".moment").evaluate("slider => slider.valueAsNumber"))
+
+
+def assert_quiet(found: OpenPage, file: Path) -> None:
+    assert [asked.partition("#")[0] for asked in found.asked] == [file.as_uri()]
+    assert found.complaints == []
+
+
+def test_the_robot_is_where_the_recording_has_it_at_twenty_moments(browser: Browser, line_report: Path) -> None:
+    recording = build.line_follower_grade().trials[0].recording
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
+        for view in ("path", "floor"):
+            found.page.locator("select").nth(2).select_option(view)
+            for tick in range(0, 300, 15):
+                found.page.evaluate(SEEK, tick / 30)
+                assert_robot_is_there(found.page, recording, tick / 30)
+        found.page.locator("select").nth(2).select_option("near")
+        found.page.evaluate(SEEK, 5)
+        assert_robot_is_there(found.page, recording, 5)
+        assert_quiet(found, line_report)
+
+
+def test_the_floor_lies_where_the_robot_drives(browser: Browser, line_report: Path) -> None:
+    pixels = floor("Lollipop").pixels
+    chance = np.random.default_rng(1)
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
+        found.page.locator("select").nth(2).select_option("floor")
+        compared = set()
+        for x, y in chance.integers((900, 300), (2300, 1100), (400, 2)).tolist():
+            around = pixels[1143 - y - 8 : 1143 - y + 8, x - 8 : x + 8].reshape(-1, 3)
+            if (around != around[0]).any():
+                continue
+            at_x, at_y = on_canvas(found.page, x, y)
+            seen = found.page.evaluate(PIXEL, [round(at_x), round(at_y)])
+            if np.abs(np.array(seen[:3]) - around[0]).max() <= 3:
+                compared.add(tuple(around[0].tolist()))
+        assert len(compared) >= 3  # paper, line, and a bar of another colour
+
+
+def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report: Path) -> None:
+    recording = build.line_follower_grade().trials[1].recording
+    with opened(browser, line_report, **DESKTOP) as found:
+        page = found.page
+        page.get_by_role("link", name="Watch it at 4.00 s").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator(".moment")).to_be_focused()
+        assert now(page) == pytest.approx(4)
+        assert_robot_is_there(page, recording, 4)
+        for key, t in (("Home", 0), ("ArrowUp", 1), ("PageUp", 10), ("PageDown", 0), ("ArrowRight", 0.1), ("End", 10),
+                       ("ArrowLeft", 9.9), ("ArrowDown", 8.9)):  # fmt: skip
+            page.keyboard.press(key)
+            assert now(page) == pytest.approx(t), key
+        for _ in range(5):
+            page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowRight")
+        assert now(page) == pytest.approx(4)
+        assert_robot_is_there(page, recording, 4)
+        assert "touched" in page.locator(".happened li").first.inner_text()
+        told = page.locator(".moment").get_attribute("aria-valuetext")
+        assert told is not None
+        assert told.startswith("4.00 of 10.00 s; x ")
+        assert_quiet(found, line_report)
+
+
+def test_the_slider_is_moved_by_touch(browser: Browser, line_report: Path) -> None:
+    recording = build.line_follower_grade().trials[1].recording
+    with opened(browser, line_report, "#trial=2&t=0", **PHONE) as found:
+        page = found.page
+        moments = set()
+        for part in range(20):
+            box = page.locator(".moment").bounding_box()
+            assert box is not None
+            page.touchscreen.tap(box["x"] + 10 + part * (box["width"] - 20) / 20, box["y"] + box["height"] / 2)
+            moments.add(round(now(page), 2))
+            assert_robot_is_there(page, recording, now(page))
+        assert len(moments) == 20
+        page.locator(".losses a").tap()
+        assert now(page) == pytest.approx(4)
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        assert_quiet(found, line_report)
+
+
+def test_playing_ends_at_the_end_and_starts_again(browser: Browser, line_report: Path) -> None:
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
+        page = found.page
+        page.locator("select").nth(1).select_option("50")
+        page.locator(".moment").focus()
+        page.keyboard.press("Space")
+        expect(page.locator(".play")).to_have_text("Play")
+        assert now(page) == pytest.approx(10)
+        page.locator("select").nth(1).select_option("0.25")
+        page.locator(".play").click()
+        assert now(page) < 9
+        page.locator(".play").click()
+        assert page.locator(".play").inner_text() == "Play"
+
+
+def test_with_reduced_motion_it_plays_in_stills(browser: Browser, line_report: Path) -> None:
+    with opened(browser, line_report, reduced_motion="reduce", **DESKTOP) as found:
+        page = found.page
+        page.locator(".play").click()
+        shown = page.evaluate("""() => new Promise((resolve) => {
+          const shown = new Set();
+          const until = performance.now() + 2000;
+          const look = () => {
+            shown.add(document.querySelector(".moment").value);
+            if (performance.now() < until) requestAnimationFrame(look);
+            else resolve(shown.size);
+          };
+          look();
+        })""")
+        assert 2 <= shown <= 6
+
+
+@WIDTHS
+def test_ten_minutes_with_500_images_can_be_scrubbed(browser: Browser, tmp_path: Path, context: dict[str, Any]) -> None:
+    recording = long_recording(18_000, images=500)
+    grade = build.line_follower_grade(2)
+    file = tmp_path / "long.html"
+    file.write_text(
+        report(student_view(replace(grade, trials=(replace(grade.trials[0], recording=recording),), criteria=())), {})
+    )
+    with opened(browser, file, "#t=599.5", **context) as found:
+        assert now(found.page) == pytest.approx(599.5)
+        assert_robot_is_there(found.page, recording, 599.5)
+        found.page.keyboard.press("Home")
+        assert_robot_is_there(found.page, recording, 0)
+        assert_quiet(found, file)
+
+
+@WIDTHS
+def test_hostile_texts_run_nothing_and_break_nothing(browser: Browser, tmp_path: Path, context: dict[str, Any]) -> None:
+    honest = replay_of_grade(student_view(build.faulty_grade()), build.faulty_submission())
+    images = replay_of_grade(student_view(build.shape_grade()))
+    both = {**honest, "trials": [*honest["trials"], images["trials"][4]]}
+    endless = f"{HOSTILE}{'W' * 1_000_000}"
+    pages = {
+        "replay.html": replay_page(poisoned(both, HOSTILE)),
+        "report.html": report(
+            student_view(poisoned(build.astray_grade(), endless)), {}, poisoned(build.faulty_submission(), endless)
+        ),
+    }
+    for name, page in pages.items():
+        file = tmp_path / name
+        file.write_text(page)
+        with opened(browser, file, **context) as found:
+            shown = found.page
+            for t in (0, 0.1, 0.4, 1.5):
+                shown.evaluate(SEEK, t)
+            shown.locator("section.replay summary").click()
+            expect(shown.locator(".events tbody tr").nth(3)).to_be_visible()
+            assert shown.locator("section.replay img, section.replay iframe").count() == 0
+            assert shown.evaluate("document.scripts.length") == 2
+            assert shown.evaluate("document.documentElement.scrollWidth") <= context["viewport"]["width"]
+            assert_quiet(found, file)
+
+
+@WIDTHS
+@SCHEMES
+def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, Any], scheme: str) -> None:
+    axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    file = tmp_path / "report.html"
+    file.write_text(report(student_view(build.astray_grade()), {}, build.faulty_submission()))
+    with opened(browser, file, "#trial=2&t=0.5", color_scheme=scheme, **context) as found:
+        found.page.locator("section.replay summary").click()
+        found.page.evaluate(axe)
+        expect(found.page.locator(".events tbody tr").first).to_be_visible()
+        wrong = found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)")
+        assert wrong == []
