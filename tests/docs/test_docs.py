@@ -76,6 +76,7 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     for name, text in files_shown(document):
         (tmp_path / "my-work" / name).write_text(text)
     shutil.copytree(EXAMPLE, tmp_path / "submissions" / "ada")
+    shutil.copytree(EXAMPLE, tmp_path / "handouts")
     shutil.copy(MESSAGING, tmp_path)
     (tmp_path / "my-robots").mkdir()
     (tmp_path / "my-robots" / "robot.py").write_text("print('PY::hello')\n")
