@@ -8,8 +8,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from harness.fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
-from harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.harness.fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from service.settings import load_settings
 from service.store.engine import open_store
 from service.store.states import JobState

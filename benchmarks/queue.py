@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.graded_store import short_request
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from benchmarks.measurement import A_MINUTE, COUNT, GAIN, SECONDS, Measurement
-from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.queue.supervisor import Supervisor

@@ -15,8 +15,8 @@ from sqlalchemy import event
 
 from benchmarks import many_rows
 from benchmarks.graded_store import graded_batch
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from benchmarks.measurement import MILLISECONDS, Measurement, median, wall_seconds
-from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.settings import load_settings
 from service.store import batches, jobs
 from service.store.engine import Store, open_store

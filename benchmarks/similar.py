@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
-from harness.copyists import COPYISTS
+from benchmarks.harness.copyists import COPYISTS
 from models.intervals import wilson
 from service.similarity.sources import given_with
 from service.similarity.writing import ALIKE, FEWEST_TOKENS, compare, source_of

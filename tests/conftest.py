@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from builders import settings_in
-from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from service.store.engine import Store, open_store

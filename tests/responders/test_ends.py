@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
+from benchmarks.harness.process_tree import children
 from command import COMMAND
-from harness.process_tree import children
 from hostile import FIND_WIRE, forged, packed
 from processes import until
 from responders.bridge import Bridge

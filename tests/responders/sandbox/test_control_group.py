@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
+from benchmarks.harness.process_tree import descendants
 from builders import settings_in
-from harness.process_tree import descendants
 from memory_group import MemoryGroup, memory_group
 from paths import HELPERS
 from processes import PATIENCE, alive, until

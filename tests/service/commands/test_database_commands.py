@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import report_builders
+from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request
 from command import robomark
-from harness.postgresql_server import fresh_database
 from service.settings import Settings
 from service.store import jobs, results
 from service.store.engine import open_store

@@ -12,8 +12,8 @@ import pytest
 from test_batch_commands import robomark
 
 import report_builders
+from benchmarks.harness.copyists import COPYISTS
 from builders import opened, settings_in
-from harness.copyists import COPYISTS
 from responders.code import Code
 from service.commands.batch.similar import similar
 from service.report_files import write_batch

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.harness.fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from builders import settings_in
-from harness.fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
-from harness.postgresql_server import PostgresqlServer, fresh_database
 from service.store.engine import open_store
 from service.store.states import JobState
 

@@ -14,9 +14,9 @@ import pytest
 from rich.console import Console
 from sqlalchemy import func, select
 
+from benchmarks.harness.postgresql_server import fresh_database
+from benchmarks.harness.process_tree import children, command_line, descendants
 from builders import comparable, grading_request, settings_in
-from harness.postgresql_server import fresh_database
-from harness.process_tree import children, command_line, descendants
 from processes import until
 from service.commands.batch.waiting import Waiting
 from service.grading.grader import grade

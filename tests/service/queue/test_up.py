@@ -16,8 +16,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import func, select
 
+from benchmarks.harness.process_tree import command_line, descendants
 from builders import accept_one, grading_request, settings_in
-from harness.process_tree import command_line, descendants
 from processes import COMMAND, alive, robomark, until
 from service.command_line import main
 from service.queue.broker import broker_answers

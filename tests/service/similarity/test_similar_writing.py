@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from harness.copyists import COPYISTS
+from benchmarks.harness.copyists import COPYISTS
 from service.similarity import writing
 from service.similarity.sources import given_with
 from service.similarity.tokens import MOST_TOKENS, tokens_of

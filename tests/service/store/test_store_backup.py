@@ -11,8 +11,8 @@ import pytest
 from sqlalchemy import func, select, update
 
 import report_builders
+from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request, settings_in
-from harness.postgresql_server import fresh_database
 from service.settings import Settings
 from service.store import jobs, regrades, results
 from service.store.backup import back_up, restore

@@ -26,8 +26,8 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
-from harness.postgresql_server import PostgresqlServer
-from harness.process_tree import children, command_line, descendants
+from benchmarks.harness.postgresql_server import PostgresqlServer
+from benchmarks.harness.process_tree import children, command_line, descendants
 from responders.code import Code
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
