@@ -92,9 +92,11 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
     recording = bare.trials[0].recording
     assert (recording.sheet, recording.label_patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
+    # Of a robot that stands still nothing is drawn.
+    moved = replace(recording, images=(), messages=(), ticks=replace(recording.ticks, x=recording.ticks.x + 1.0))
     images = set()
     for change in ({}, {"sheet": 0}, {"label_patches": True}):
-        trial = replace(bare.trials[0], recording=replace(recording, images=(), messages=(), **change))
+        trial = replace(bare.trials[0], recording=replace(moved, **change))
         drawn = draw_all(replace(bare, criteria=(), trials=(trial,)))
         images.add(next(drawn[name] for name in drawn if name.startswith("path")))
     assert len(images) == 3

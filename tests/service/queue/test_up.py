@@ -126,7 +126,9 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
             left = [session.get_one(Job, each.job_id) for each in spinning.jobs]
             assert {(job.state, job.attempt) for job in left} <= {(JobState.QUEUED, 0), (JobState.DONE, 1)}
     locks = {"broker.lock", "up.lock", "worker.lock", "gate.lock", "slots.lock"}
-    assert {path.name for path in (settings.home / "run").iterdir()} <= locks
+    left_there = {path.name for path in (settings.home / "run").iterdir()}
+    # What the self-test found right here is for the next start.
+    assert {name for name in left_there if not name.startswith("right-answer-")} <= locks
 
 
 @pytest.mark.long
