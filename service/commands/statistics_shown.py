@@ -27,7 +27,7 @@ def statistics_parts(found: Iterable[AssignmentStatistics]) -> Iterator[Renderab
         spread = "" if each.spread is None else f", standard deviation {each.spread:.2f}"
         yield (
             f"\n{each.assignment}: {each.n} graded; mean {each.mean:.2f} of {each.max_marks.normalize():f}{spread}; "
-            f"lowest {each.lowest:g}, median {each.median:g}, highest {each.highest:g}"
+            f"lowest {each.lowest:.2f}, median {each.median:.2f}, highest {each.highest:.2f}"
         )
         shares = table("criterion", "mean share of its marks", right=("mean share of its marks",))
         for criterion in each.criteria:

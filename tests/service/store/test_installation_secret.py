@@ -237,6 +237,6 @@ def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> 
     with open_store(Settings(home=home)) as store, store.transaction() as session:
         session.execute(update(Job).values(secret_sha256=None))
     then = robomark("verify", found[1], **environment)
-    assert "graded before this installation had a secret" in then.stdout
+    assert "graded before this installation had a secret" in then.stderr
     # This one was not: its worlds are others than those of then.
     assert then.returncode == 3
