@@ -102,7 +102,7 @@ def grade(
             *_unjudged_notes(criteria),
         ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
-        hints=hints_for(submission, plan, results, criteria),
+        hints=hints_for(submission, plan, results, criteria, meter.heartbeat),
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )

@@ -21,6 +21,7 @@ from service.grading.hint_rules import (
     of_responder_names,
 )
 from service.grading.hint_texts import of_texts
+from service.grading.judging.bounded import sentences_within
 from service.grading.run_plan import RunPlan
 from submissions.submission import Submission
 
@@ -33,13 +34,20 @@ _OF_MESSAGES: Sequence[Rule] = (of_messages, of_images, of_answers)
 
 
 def hints_for(
-    submission: Submission, plan: RunPlan, trials: Sequence[TrialResult], results: Sequence[CriterionResult]
+    submission: Submission,
+    plan: RunPlan,
+    trials: Sequence[TrialResult],
+    results: Sequence[CriterionResult],
+    heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[str, ...]:
-    """The most telling first; none where every criterion that is shown has full marks."""
+    """The most telling first; none where every criterion that is shown has full marks, or if it takes too long.
+
+    Raises what ``sentences_within`` raises.
+    """
     shown = [result for result in results if result.visibility == "visible"]
     if all(result.marks >= result.max_marks for result in shown):
         return ()
-    return near_misses(clues_of(submission, plan, trials, results))
+    return sentences_within(trials, lambda: near_misses(clues_of(submission, plan, trials, results)), heartbeat)
 
 
 def near_misses(clues: Clues) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Judging within bounds: little is judged at once, all else in a process that is killed at its limits.
 
-What is judged, and how, is ``judge.py``'s. A criterion that cannot be judged within its bounds spoils no other.
+What is judged, and how, is ``judge.py``'s. A criterion that cannot be judged within its bounds spoils no other, and
+what else is looked for in students' texts (``hints.py``) spoils no mark.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Bounds:
     memory_bytes: int
 
 
-#: Of all criteria, where there is little to judge.
+#: Of all criteria where there is little to judge, and of what no mark depends on.
 _GUARD = Bounds(2.0, 10.0, 256 << 20)
 
 
@@ -76,7 +77,7 @@ def judge_within(
     left = in_turn(assignment)
     results: dict[str, CriterionResult] = {}
     case = Case(assignment, trials, analysis, results)
-    if _written(trials) <= _LITTLE and threading.current_thread() is threading.main_thread():
+    if _is_little(trials):
         # Whatever is wrong here is found out in a process.
         with suppress(Exception, _Late), _guarded():
             while left:
@@ -99,6 +100,34 @@ def judge_within(
         criterion = left.pop(0)
         results[criterion.id] = _unjudged(criterion, _cause(status, bounds))
     return tuple(results[criterion.id] for criterion in assignment.criteria)
+
+
+def sentences_within(
+    trials: Sequence[TrialResult],
+    find: Callable[[], tuple[str, ...]],
+    heartbeat: Callable[[], None] = lambda: None,
+) -> tuple[str, ...]:
+    """What ``find`` finds in the trials' texts, on which no mark depends: nothing, where it cannot within bounds.
+
+    Raises HostError when no process can be started, and whatever ``heartbeat`` raises.
+    """
+    if _is_little(trials):
+        with suppress(Exception, _Late), _guarded():
+            return find()
+
+    def frames() -> Iterator[bytes]:
+        _confine(_GUARD)
+        _set_timers(_GUARD.cpu_seconds, _GUARD.seconds)
+        with suppress(Exception):
+            yield pickle.dumps(find())
+
+    told, _ = _in_a_process(frames, heartbeat)
+    return pickle.loads(told[0]) if told else ()
+
+
+def _is_little(trials: Sequence[TrialResult]) -> bool:
+    """Whether it is read at once, which only the main thread can break off."""
+    return _written(trials) <= _LITTLE and threading.current_thread() is threading.main_thread()
 
 
 class _Late(BaseException):

@@ -6,7 +6,7 @@ A line is known by what its ``print`` or ``say`` begins with, letter for letter;
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from responders.code import Code
@@ -22,15 +22,11 @@ _IMAGE = "IMG_DATA"
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """A line that prints or speaks, and what its text begins with, or is."""
+    """What a line prints or speaks: a text that begins so, or that is so in all."""
 
-    line: int
     prints: bool
     begins: str
     is_all: bool
-
-    def can_have_written(self, text: str) -> bool:
-        return text == self.begins if self.is_all else text.startswith(self.begins)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,21 +58,25 @@ class Sources:
 
     def __init__(self, shown: Sequence[ShownSource] = ()) -> None:
         self.shown = tuple(shown)
-        self._writers = [
-            (index, writer)
-            for index, source in enumerate(self.shown)
-            if source.who == "program"
-            for writer in _writers(source.text)
-        ]
+        #: A line for each, and two at most: where there are two it is not known which.
+        self._writers: dict[_Writer, list[Place]] = {}
+        for index, source in enumerate(self.shown):
+            if source.who == "program":
+                for line, writer in _writers(source.text):
+                    places = self._writers.setdefault(writer, [])
+                    if len(places) < 2:
+                        places.append(Place(index, line))
+        self._lengths = sorted({len(writer.begins) for writer in self._writers if not writer.is_all})
 
     def wrote(self, text: str, *, spoken: bool = False) -> Place | None:
-        """The only line of the robot program that can have printed, or spoken, the text; None if it is not known."""
+        """The only line of the robot program that can have printed, or spoken, the text; None if it is not known.
+
+        Its beginnings are looked up one by one, so that neither long sources nor many texts make this slow.
+        """
         text = _IMAGE if text.startswith(f"{_IMAGE}::") else text
-        found = [
-            Place(index, writer.line)
-            for index, writer in self._writers
-            if writer.prints is not spoken and writer.can_have_written(text)
-        ]
+        possible = [_Writer(not spoken, text, True)]
+        possible += [_Writer(not spoken, text[:length], False) for length in self._lengths if length <= len(text)]
+        found = [place for writer in possible for place in self._writers.get(writer, ())]
         return found[0] if len(found) == 1 else None
 
     def of_fault(self, fault: Fault) -> Place | None:
@@ -119,8 +119,7 @@ def _is_program(cell: str) -> bool:
     return cell.lstrip().startswith("%%sim")
 
 
-def _writers(text: str) -> list[_Writer]:
-    found = []
+def _writers(text: str) -> Iterator[tuple[int, _Writer]]:
     for number, line in enumerate(text.split("\n")[:_MOST_LINES], start=1):
         code = line[:_LONGEST_LINE].lstrip()
         if code.startswith(("#", "def ")):
@@ -128,5 +127,4 @@ def _writers(text: str) -> list[_Writer]:
         for call in _WRITES.finditer(code):
             literal = _LITERAL.match(code, call.end())
             begins = literal[3] if literal else ""
-            found.append(_Writer(number, call[1] is not None, begins, bool(literal and literal[4])))
-    return found
+            yield number, _Writer(call[1] is not None, begins, bool(literal and literal[4]))

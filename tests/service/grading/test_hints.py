@@ -6,7 +6,7 @@ import ast
 import io
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -23,6 +23,7 @@ from service.grading.grader import grade
 from service.grading.hint_clues import clues_of
 from service.grading.hint_rules import PRELOADED
 from service.grading.hints import near_misses
+from service.grading.judging import bounded
 from service.grading.run_plan import plan_run
 from service.grading.trial_runner import TrialRunner
 from service.reports.formats import FORMATS
@@ -234,3 +235,28 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
 
     short = max(cost(250), 0.002)
     assert cost(4 * 250) < 20 * 4 * short
+
+
+def _raises(_: object) -> tuple[str, ...]:
+    raise ValueError("a rule that nobody thought through")
+
+
+def _never_ends(_: object) -> tuple[str, ...]:
+    while True:
+        pass
+
+
+@pytest.mark.parametrize("rules", [_raises, _never_ends])
+@pytest.mark.parametrize("little", [True, False])
+def test_rules_that_fail_cost_neither_marks_nor_the_job(
+    rules: Callable[[object], tuple[str, ...]], little: bool, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = find_assignment("echo-responder")
+    submission = read_submission(examples("echo-responder") / "flawed", asked=asked.parts)
+    whole = grade(submission, asked, runner=runner)
+    monkeypatch.setattr("service.grading.hints.near_misses", rules)
+    monkeypatch.setattr(bounded, "_GUARD", replace(bounded._GUARD, cpu_seconds=0.1))
+    if not little:
+        monkeypatch.setattr(bounded, "_LITTLE", -1)
+    without = grade(submission, asked, runner=runner)
+    assert (without.marks, without.hints) == (whole.marks, ())

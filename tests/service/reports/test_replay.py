@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from responders.code import Code
 from service.grading.grade import Evidence, Grade
 from service.reports.html import replay_page, report
 from service.reports.replay.document import packed, replay_of_grade, replay_of_run
-from service.reports.replay.sources import Sources, sources_of, sources_of_files
+from service.reports.replay.sources import Place, Sources, sources_of, sources_of_files
 from service.reports.view import staff_view, student_view
 from service.reports.written import write_replay
 from sim.recording import COLUMNS, Fault, Message, Recording, Verdict
@@ -243,3 +244,14 @@ def test_a_replay_is_written_as_a_page_or_as_its_data(tmp_path: Path) -> None:
     data = json.loads((tmp_path / "run.json").read_text())
     assert data == data_of((tmp_path / "run.html").read_text())
     assert (data["format"], data["version"], data["title"]) == ("robomark replay", 1, "robot.py")
+
+
+def test_the_line_of_a_text_is_looked_up_and_not_searched_for() -> None:
+    """Thousands of texts in a file of thousands of lines that print: a search for each would take minutes."""
+    lines = [f"print('{number} is said'); " * 10 for number in range(3000)]
+    sources = sources_of_files(Code("robot.py", "\n".join([*lines[:-1], "print('2999 is said')"])), None)
+    began = time.process_time()
+    found = [sources.wrote(f"{number} is said") for _ in range(2) for number in range(3000)]
+    assert time.process_time() - began < 5
+    assert found[2999] == found[-1] == Place(0, 3000)
+    assert set(found) == {None, Place(0, 3000)}
