@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.harness.process_tree import command_line
 from paths import HELPERS
 from responders.sandbox.meter import JobMeter
 from running import run_program
@@ -132,7 +133,7 @@ def _state(pid: int) -> tuple[int | None, list[int], int]:
 
 def _zygotes(worker: int) -> set[int]:
     """The children of ``worker`` that are zygotes, or have one inside bubblewrap."""
-    return {pid for pid in _children(worker) if b"inside.zygote" in Path(f"/proc/{pid}/cmdline").read_bytes()}
+    return {pid for pid in _children(worker) if "inside.zygote" in command_line(pid)}
 
 
 def _parents() -> Iterator[tuple[int, int]]:

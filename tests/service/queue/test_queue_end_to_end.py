@@ -113,8 +113,7 @@ def _alive(pid: int) -> bool:
 
 
 def _pool_children(worker: int) -> list[int]:
-    pids = Path(f"/proc/{worker}/task/{worker}/children").read_text().split()
-    return [int(pid) for pid in pids if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    return [pid for pid in children(worker) if "spawn_main" in command_line(pid)]
 
 
 def _spinning(count: int) -> list[GradingRequest]:
@@ -181,9 +180,7 @@ def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
 def test_a_killed_broker_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(1) + [grading_request(f"quick-{number}") for number in range(4)])
     service.until_running(batch)
-    (broker,) = [
-        pid for pid in descendants(os.getpid()) if b"valkey-server" in Path(f"/proc/{pid}/cmdline").read_bytes()
-    ]
+    (broker,) = [pid for pid in descendants(os.getpid()) if "valkey-server" in command_line(pid)]
     os.kill(broker, signal.SIGKILL)
     service.wait(batch)
     service.assert_graded_once(batch)
