@@ -15,6 +15,7 @@ from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
 from service.store.states import Role
 from service.web.access import Reader
@@ -53,15 +54,11 @@ def wants_part(request: Request) -> bool:
 @lru_cache(maxsize=1)
 def static_files() -> Mapping[str, tuple[str, bytes]]:
     """The files that pages load, by the name they are served under, which has their hash: media type and content."""
-    web, reports = files("service.web").joinpath("static"), files("service.reports")
-    component = reports.joinpath("replay", "component")
-    scripts = sorted((each for each in component.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
-    replay = "\n".join(each.read_text(encoding="utf-8") for each in scripts)
-    styles = [reports.joinpath("templates", name) for name in ("report.css", "replay.css")]
+    web = files("service.web").joinpath("static")
     contents = {
         "htmx.js": web.joinpath("htmx.min.js").read_text(encoding="utf-8"),
-        "replay.js": f'(() => {{\n"use strict";\n{replay}}})();\n',
-        "robomark.css": "".join(each.read_text(encoding="utf-8") for each in [*styles, web.joinpath("robomark.css")]),
+        "replay.js": report_script(),
+        "robomark.css": report_style() + web.joinpath("robomark.css").read_text(encoding="utf-8"),
         "robomark.js": web.joinpath("robomark.js").read_text(encoding="utf-8"),
     }
     types = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
