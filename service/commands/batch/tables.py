@@ -119,6 +119,7 @@ def remarks(line: JobLine) -> list[str]:
         f"staff only: {line.staff_only}": line.staff_only is not None,
         f"no {line.missing}": bool(line.missing),
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
+        f"{line.set_by_hand} criteria set by hand": line.set_by_hand > 0,
         f"{line.surprises} trials that the log explains": line.surprises > 0,
         "suspect": line.suspect is not None,
         "published": line.published_at is not None,
