@@ -129,11 +129,8 @@ def criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
 def recount(session: Session, job_id: str) -> None:
     """Write down what a job's criteria come to as they count; nothing else writes a job's marks."""
     lines = criterion_marks(session, job_id)
-    total = {
-        "marks": sum((line.marks for line in lines), _NONE),
-        "max_marks": sum((line.max_marks for line in lines), _NONE),
-    }
-    statement = update(Job).where(Job.id == job_id).values(**total)
+    marks, most = (sum(each, _NONE) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
+    statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=most)
     session.execute(statement, execution_options={"synchronize_session": False})
 
 
