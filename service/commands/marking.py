@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 from sqlalchemy.orm import Session
 
-from service.commands.batch.tables import history_table, out_of
+from service.commands.batch.tables import out_of
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
-from service.store import audit, batches, comments, overrides
+from service.store import audit, batches, comments, marking_history, overrides
 from service.store.engine import open_store
 from service.store.models import Job
 
@@ -66,7 +66,7 @@ def history(grade: GradeId) -> None:
         job_id = batches.find_job(session, grade)
         criteria = overrides.criterion_marks(session, job_id)
         written = comments.of_job(session, job_id)
-        done = audit.entries(session, "submission", str(session.get_one(Job, job_id).submission_id))
+        done = marking_history.history(session, session.get_one(Job, job_id).submission_id)
     document(grade=job_id, criteria=criteria, comments=written, history=done)
     listed = table("criterion", "title", "as graded", "counts", "reason", right=("as graded", "counts"))
     for line in criteria:
@@ -79,7 +79,11 @@ def history(grade: GradeId) -> None:
     for each in written:
         tell(f"comment {each.id} of {each.actor}{f' on {each.criterion}' if each.criterion else ''}: {each.text}")
     if done:
-        show(history_table(done))
+        told = table("when", "who", "did", "criterion", "before", "after", "why, or what")
+        for step in done:
+            when = step.at.astimezone().strftime("%Y-%m-%d %H:%M")
+            told.add_row(when, step.actor, step.action, step.criterion, step.before, step.after, step.text)
+        show(told)
 
 
 def _change(grade: str, change: Callable[[Session, str, str], object]) -> None:

@@ -56,7 +56,7 @@ def ask(session: Session, submission_id: int, text: str) -> int:
     Raises UsageError where there is no grade that the student may see, an appeal is open, or the text is empty or too
     long.
     """
-    text = text.strip()
+    text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_TEXT:
         raise UsageError(f"the text has {len(text)} characters, expected 1 to {LONGEST_TEXT}")
     # One writer at a time, so that of two at once one finds the other open.
@@ -77,7 +77,7 @@ def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: s
 
     Raises UsageError where there is none of this id, it is answered, or the text is empty or too long.
     """
-    text = text.strip()
+    text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_TEXT:
         raise UsageError(f"the answer has {len(text)} characters, expected 1 to {LONGEST_TEXT}")
     row = session.get(Appeal, appeal_id, with_for_update=True)

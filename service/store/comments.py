@@ -36,7 +36,7 @@ def comment(session: Session, job_id: str, criterion: str, text: str, actor: str
 
     Raises UsageError for a criterion that the grade does not have, or a text that is empty or too long.
     """
-    text = text.strip()
+    text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_COMMENT:
         raise UsageError(f"the comment has {len(text)} characters, expected 1 to {LONGEST_COMMENT}")
     known = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
