@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,9 +22,15 @@ settings.load_profile("robomark")
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Commands that tests run keep nothing in the home of whoever runs the tests."""
+    """Commands that tests run keep nothing in the home of whoever runs the tests, and do not go by their settings.
+
+    A worker of theirs has one process to grade with: each loads for seconds, and few have much to grade.
+    """
     with pytest.MonkeyPatch.context() as patched:
+        for name in [name for name in os.environ if name.startswith("ROBOMARK_")]:
+            patched.delenv(name)
         patched.setenv("ROBOMARK_HOME", str(tmp_path_factory.mktemp("home")))
+        patched.setenv("ROBOMARK_CONCURRENCY", "1")
         yield
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from command import robomark
+from command import robomark, robomark_anew
 from service.cli import main
 from service.reports.formats import FORMATS
 from service.settings import Settings
@@ -66,7 +66,7 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        ended = robomark("assignments", "list", out=writing)
+        ended = robomark_anew("assignments", "list", out=writing)
     finally:
         os.close(writing)
     assert (ended.returncode, ended.stderr) == (130, "")
@@ -74,7 +74,7 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
 
 def test_a_full_disk_is_said_in_a_sentence() -> None:
     with Path("/dev/full").open("w") as full:
-        ended = robomark("assignments", "list", out=full.fileno())
+        ended = robomark_anew("assignments", "list", out=full.fileno())
     assert (ended.returncode, ended.stderr) == (3, "robomark: the machine would not do it: No space left on device\n")
 
 
@@ -91,7 +91,7 @@ def test_every_flag_of_the_magic_is_taken(tmp_path: Path) -> None:
 def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:
     program = tmp_path / "robot.py"
     program.write_text('print("robot \\U0001f916")')
-    ended = robomark("run", program, PYTHONIOENCODING="latin-1")
+    ended = robomark_anew("run", program, PYTHONIOENCODING="latin-1")
     assert r"robot \U0001f916" in ended.stdout
     assert (ended.returncode, ended.stderr) == (0, "")
 
@@ -172,7 +172,7 @@ print(json.dumps(found))
 
 
 def test_the_shell_completes_commands_of_a_group() -> None:
-    ended = robomark(_ROBOMARK_COMPLETE="complete_bash", COMP_WORDS="robomark batch s", COMP_CWORD="2")
+    ended = robomark_anew(_ROBOMARK_COMPLETE="complete_bash", COMP_WORDS="robomark batch s", COMP_CWORD="2")
     assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status", "similar"], "")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
@@ -14,6 +13,7 @@ from sqlalchemy import func, inspect, select, text
 
 import report_builders
 from builders import accept_one
+from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
@@ -41,8 +41,7 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:
-    spawned = multiprocessing.get_context("spawn")
-    processes = [spawned.Process(target=_open, args=(service_settings,)) for _ in range(4)]
+    processes = [FORKING.Process(target=_open, args=(service_settings,)) for _ in range(4)]
     for process in processes:
         process.start()
     for process in processes:
