@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
-from builders import settings_in
+from builders import opened, settings_in
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
-from service.store.engine import Store, open_store
+from service.store.engine import Store
 
 # Two cores are shared with whatever else runs: how long an example takes says nothing.
 settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -57,5 +57,5 @@ def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings
 @pytest.fixture
 def store(service_settings: Settings) -> Iterator[Store]:
     """The tables in an empty database of each kind."""
-    with open_store(service_settings) as opened:
-        yield opened
+    with opened(service_settings) as empty:
+        yield empty
