@@ -27,7 +27,7 @@ _REFUSED = "This link or token does not count, or not any more; ask for a new on
 @router.get("/sign-in")
 def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Query(alias="next")] = "/") -> Response:
     """Where a link or a token is asked for."""
-    return page(request, reader, "sign_in.html", target=_inside(target), refused="")
+    return page(request, reader, "sign_in.html", target=inside(target), refused="")
 
 
 @router.get("/sign-in/{link}")
@@ -63,8 +63,8 @@ def sign_in(
         if opened is not None and reader is not None:
             credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
     if opened is None:
-        return page(request, reader, "sign_in.html", status_code=403, target=_inside(target), refused=_REFUSED)
-    answer = RedirectResponse(_inside(target), 303)
+        return page(request, reader, "sign_in.html", status_code=403, target=inside(target), refused=_REFUSED)
+    answer = RedirectResponse(inside(target), 303)
     set_session(answer, context, opened)
     return answer
 
@@ -86,7 +86,7 @@ def choose_language(
     """Show the pages in this language from now on, in this browser."""
     if code not in languages():
         raise HTTPException(422, "There are no pages in this language.")
-    answer = RedirectResponse(_inside(target), 303)
+    answer = RedirectResponse(inside(target), 303)
     answer.set_cookie(
         LANGUAGE_COOKIE, code, max_age=365 * 86_400, httponly=True, samesite="lax", secure=_secure(context)
     )
@@ -109,7 +109,7 @@ def _address(request: Request) -> str:
     return "" if request.client is None else request.client.host
 
 
-def _inside(target: str) -> str:
+def inside(target: str) -> str:
     """Where to go after, if that is a path of ours; browsers take a backslash for a slash, and forget line ends."""
     parts = urlsplit(target)
     is_ours = target.startswith("/") and not target.startswith("//") and not parts.netloc and not parts.scheme
