@@ -17,13 +17,14 @@ from starlette.exceptions import HTTPException
 
 from service.lti.fetching import PlatformError
 from service.web.access import SignInNeeded, reader_of
+from service.web.language import translatable
 from service.web.rendering import page
 from sim.errors import HostError, RobomarkError, UsageError
 
 _log = structlog.get_logger(__name__)
 API = "/api/"
-_OURS = "Something went wrong here, not with you; it is written down. Try again in a minute."
-_NO_DATABASE = "The database does not answer; nothing was changed. Try again in a minute."
+_OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
 
 
 def add_error_pages(app: FastAPI) -> None:

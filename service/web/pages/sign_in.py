@@ -15,13 +15,13 @@ from service.store.states import CredentialKind
 from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
 from service.web.context import Context, WebContext
 from service.web.language import COOKIE as LANGUAGE_COOKIE
-from service.web.language import languages
+from service.web.language import languages, translatable
 from service.web.rate_limits import RateLimit
 from service.web.rendering import page
 
 router = APIRouter()
 _TRIES = RateLimit(burst=20, per_minute=20)
-_REFUSED = "This link or token does not count, or not any more; ask for a new one."
+_REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
 
 
 @router.get("/sign-in")
