@@ -134,19 +134,27 @@ def run_program(
         pen_down=chosen.pen_down,
         partner=_partner(second),
     )
+    other = None if over is None else _other_program(over)
     for each in chosen.notes:
         note(f"note: {each}")
     with TrialRunner(NONE if unsafe else FULL) as runner:
         recording = runner.run(spec, chosen.obstacles, meter)
         others = NO_OTHERS
-        if over is not None:
-            other = runner.run(replace(spec, program=_program_spec(over, *_program(over))), chosen.obstacles, meter)
-            others = OtherTrials(over.name, {0: _as_trial(other, seed)})
+        if other is not None:
+            beside = runner.run(replace(spec, program=other), chosen.obstacles, meter)
+            others = OtherTrials(other.code.name, {0: _as_trial(beside, seed)})
     document(run=_told(recording), notes=chosen.notes)
     _show(recording)
     _keep(recording, program.name, seed, trace_file, image, film, own)
     answering = None if spec.responder is None else spec.responder.code
     _keep_replay(replay, recording, program.name, seed, sources_of_files(spec.program.code, answering), own, others)
+
+
+def _other_program(path: Path) -> ProgramSpec:
+    """A program that is run in the first one's world, whatever its own first line says of one."""
+    if _notebook(path) is not None:
+        raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
+    return _program_spec(path, *_program(path))
 
 
 def _program_spec(path: Path, flags: Flags, text: str) -> ProgramSpec:

@@ -264,7 +264,7 @@ class FloorCanvas {
   drawOver(t) {
     const [mine, others] = [this.trial, this.over].map((run) => this.place.at(...run.robots[0].pose(run.ticks(t))));
     if (Math.hypot(mine[0] - others[0], mine[1] - others[1]) > 30) {
-      this.bubble(this.over.name, others[0], others[1] + 22, COLOURS.over);
+      this.bubble(this.over.name, others[0], others[1] + (others[1] > mine[1] ? 34 : -34), COLOURS.over);
     }
     if (this.over.parted !== null && Math.abs(this.over.parted - t) < 0.5) {
       const place = this.place.at(...this.trial.robots[0].pose(this.trial.ticks(this.over.parted)));
