@@ -87,13 +87,13 @@ def _frames(
     recording = trial.recording
     words = _Words(trial)
     robots = [own for _, own in robots_of(recording)]
-    drawn = 0
+    drawn, marked = 0, -math.inf
     for number, t in enumerate(moments):
         tick = ticks_until(recording, t)
         for which, own in enumerate(robots):
             _leave_trail(ground, own, sight, drawn, tick, SECOND_ROBOT if which else LEFT)
-        _leave_marks(ground, recording, sight, t)
-        drawn = tick
+            _leave_marks(ground, own, sight, marked, t)
+        drawn, marked = tick, t
         seen = ground.copy()
         for which, own in enumerate(robots):
             _draw_robot(seen, own, sight, tick, SECOND_ROBOT if which else INK)
@@ -189,14 +189,14 @@ def _strokes(own: Recording) -> list[tuple[int, int]]:
     return strokes
 
 
-def _leave_marks(ground: Image.Image, recording: Recording, sight: _Sight, t: float) -> None:
-    for _, own in robots_of(recording):
-        for touch in own.touches:
-            if touch.t <= t and math.isfinite(touch.pose.x + touch.pose.y):
-                x, y = sight.at(touch.pose.x, touch.pose.y)
-                for way in ([(x - 6, y - 6), (x + 6, y + 6)], [(x - 6, y + 6), (x + 6, y - 6)]):
-                    with _Layer(ground, way) as layer:
-                        layer.line(way, FAULT, 2.5)
+def _leave_marks(ground: Image.Image, own: Recording, sight: _Sight, since: float, until: float) -> None:
+    """A cross for each touch after the one moment until the other."""
+    for touch in own.touches:
+        if since < touch.t <= until and math.isfinite(touch.pose.x + touch.pose.y):
+            x, y = sight.at(touch.pose.x, touch.pose.y)
+            for way in ([(x - 6, y - 6), (x + 6, y + 6)], [(x - 6, y + 6), (x + 6, y - 6)]):
+                with _Layer(ground, way) as layer:
+                    layer.line(way, FAULT, 2.5)
 
 
 def _draw_robot(frame: Image.Image, own: Recording, sight: _Sight, tick: int, colour: str) -> None:

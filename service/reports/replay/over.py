@@ -50,7 +50,7 @@ def _parted(one: Recording, other: Recording) -> float | None:
     x, y, heading = (_along(one, times) - _along(other, times)).T
     turned = np.abs((heading + 180) % 360 - 180)
     apart = np.flatnonzero((np.hypot(x, y) > _FAR) | (turned > _TURNED))
-    return round(float(times[apart[0]]), 6) if apart.size else None
+    return float(times[apart[0]]) if apart.size else None
 
 
 def _times(recording: Recording) -> NDArray[np.float64]:
