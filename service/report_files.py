@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
 from service.plotting import draw, own_floors
-from service.reports.html import BatchRow, batch_index, refusal_page, report
+from service.reports.html import BatchRow, ReportParts, batch_index, refusal_page, report, report_parts
 from service.reports.replay.document import replay_of_grade
 from service.reports.rows import ReportPage, missing_words
 from service.reports.view import (
@@ -138,6 +138,19 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     with store.reading() as session:
         ranks = rankings.rank_tables(session, lines)
     return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
+
+
+def report_body(store: Store, line: JobLine, view: View) -> ReportParts:
+    """The report of one graded job as one reader may see it, for a page with a frame of its own.
+
+    Plots that are not drawn yet are left out: whoever waits for a page does not wait for them.
+    """
+    with store.reading() as session:
+        submission = intake.load_submission(session, line.id)
+        drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else {}
+        built_in = {trial.recording.background for trial in view.grade.trials} <= set(names())
+        floors = {} if built_in else own_floors(intake.load_assignment(session, line.id))
+    return report_parts(view, drawn, submission, floors)
 
 
 def _page(store: Store, line: JobLine, grade: Grade, over: JobLine | None = None) -> tuple[str, Mapping[str, bytes]]:

@@ -219,6 +219,7 @@ def test_one_program_is_run_over_another_and_filmed(tmp_path: Path) -> None:
     assert film.read_bytes().startswith(b"GIF89a")
     assert "expected --replay too" in robomark("run", one, "--over", other).stderr
     notebook = tmp_path / "n.ipynb"
-    notebook.write_text(json.dumps({"cells": [{"cell_type": "code", "source": "x = 1", "metadata": {}}], "nbformat": 4}))
+    cell = {"cell_type": "code", "source": "x = 1", "metadata": {}}
+    notebook.write_text(json.dumps({"cells": [cell], "nbformat": 4}))
     refused = robomark("run", one, "--replay", replay, "--over", notebook)
     assert (refused.returncode, "n.ipynb is a notebook" in refused.stderr) == (2, True)

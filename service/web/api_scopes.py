@@ -1,0 +1,17 @@
+"""What a token may do, in words. Which route needs which is said where the route is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+#: By name; a token does what its owner may do, and of that what its scopes name.
+SCOPES: Mapping[str, str] = MappingProxyType(
+    {
+        "read": "read what its owner may see",
+        "submit": "submit, for oneself as a student, or batches as an instructor",
+        "mark": "override, comment, publish, regrade",
+        "manage": "open assignments, set policies, enrol, delete",
+        "sign-in": "sign a browser in",
+    }
+)
