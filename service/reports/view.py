@@ -161,7 +161,8 @@ def scenarios(grade: Grade) -> tuple[str, ...]:
 
 def _circumstances(trial: TrialResult) -> Hashable:
     """What two trials share of which one can lie over the other: another version may have changed any of it."""
-    ground = (trial.recording.background, trial.recording.label_patches, trial.recording.sheet)
+    recording = trial.recording
+    ground = (recording.background, recording.label_patches, recording.sheet, recording.obstacles)
     noise = (trial.light_noise, trial.motor_noise, trial.sweep)
     return trial.scenario, trial.index, trial.seed, trial.place, noise, ground
 
