@@ -20,13 +20,11 @@ from service.store.states import CredentialKind
 from service.web.context import Context, WebContext
 from service.web.pages.home import course_path
 from service.web.pages.sign_in import inside, set_session
-from service.web.rate_limits import RateLimit
 from sim.errors import UsageError
 
 cross_site_router = APIRouter()
 #: Binds a launch to the browser that began it. Platforms post from their own site, so it has to go along from there.
 _STATE_COOKIE = "robomark_launch"
-_LAUNCHES = RateLimit(burst=300, per_minute=300)
 _LONGEST = 4000
 
 Text = Annotated[str, Form(max_length=_LONGEST)]
@@ -120,7 +118,7 @@ def _begin(
     message_hint: str,
     client_id: str,
 ) -> Response:
-    _LAUNCHES.spend("" if request.client is None else request.client.host)
+    context.limits.launches.spend("" if request.client is None else request.client.host)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
     with context.store.transaction() as session:
         platform = lti.find_platform(session, issuer, client_id or None)

@@ -16,11 +16,9 @@ from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
 from service.web.context import Context, WebContext
 from service.web.language import COOKIE as LANGUAGE_COOKIE
 from service.web.language import languages, translatable
-from service.web.rate_limits import RateLimit
 from service.web.rendering import page
 
 router = APIRouter()
-_TRIES = RateLimit(burst=20, per_minute=20)
 _REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
 
 
@@ -33,10 +31,11 @@ def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Q
 @router.get("/sign-in/{link}")
 def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
     """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
-    _TRIES.spend(_address(request))
+    context.limits.failed_sign_ins.check(_address(request))
     with context.store.reading() as session:
         name = credentials.owner(session, link)
     if name is None:
+        context.limits.failed_sign_ins.spend(_address(request))
         return page(request, reader, "sign_in.html", status_code=410, target="/", refused=_REFUSED)
     return page(request, reader, "sign_in_link.html", link=link, name=name)
 
@@ -50,7 +49,7 @@ def sign_in(
     target: Annotated[str, Form(alias="next")] = "/",
 ) -> Response:
     """Exchange a link's secret, or a token, for a session of this browser."""
-    _TRIES.spend(_address(request))
+    context.limits.failed_sign_ins.check(_address(request))
     # A whole link may have been pasted.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
     with context.store.transaction() as session:
@@ -63,6 +62,7 @@ def sign_in(
         if opened is not None and reader is not None:
             credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
     if opened is None:
+        context.limits.failed_sign_ins.spend(_address(request))
         return page(request, reader, "sign_in.html", status_code=403, target=inside(target), refused=_REFUSED)
     answer = RedirectResponse(inside(target), 303)
     set_session(answer, context, opened)
