@@ -60,6 +60,8 @@ class Settings(BaseSettings):
     #: assignment allows them more.
     slot_memory_mb: int = Field(default=1536, ge=256, le=1_000_000)
     log_level: str = "WARNING"
+    #: Where browsers find the web server, when others than this machine are to reach it.
+    public_url: str = ""
     #: Wins over the database's own; empty where there is none.
     secret: SecretStr = SecretStr("")
 
@@ -96,6 +98,14 @@ class Settings(BaseSettings):
         if kind not in {"sqlite", "postgresql"} or in_memory:
             raise ValueError("expected sqlite:///path or postgresql://user@host/name")
         return url
+
+    @field_validator("public_url")
+    @classmethod
+    def _whole_address(cls, url: str) -> str:
+        scheme, _, rest = url.partition("://")
+        if url and (scheme not in {"https", "http"} or not rest.rstrip("/") or "/" in rest.rstrip("/")):
+            raise ValueError("expected https://name, as browsers are to write it")
+        return url.rstrip("/")
 
     @field_validator("log_level")
     @classmethod

@@ -19,9 +19,10 @@ from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration
-from service.store.models import Artifact, Base, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
+from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
 from service.store.revision import current_revision, newest_revision
 from service.store.states import JobState, Standing
+from service.store.web_tables import METADATA
 from sim.errors import HostError
 from submissions.people import Refusal
 
@@ -33,7 +34,7 @@ def _open(settings: Settings) -> None:
 def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> None:
     with open_store(service_settings) as store:
         assert current_revision(store.engine) == newest_revision()
-        assert set(inspect(store.engine).get_table_names()) == {*Base.metadata.tables, "alembic_version"}
+        assert set(inspect(store.engine).get_table_names()) == {*METADATA.tables, "alembic_version"}
         with store.engine.begin() as connection:
             known = configuration(connection)
             command.check(known)
