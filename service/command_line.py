@@ -5,6 +5,7 @@ The commands themselves are in modules of their own, named after them; ``cli.py`
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import signal
@@ -70,7 +71,11 @@ class _Commands(_ChecksLess, TyperGroup):
         name, listed, rest = super().resolve_command(ctx, args)
         if name is None or isinstance(listed, _Commands):
             return name, listed, rest
-        return name, load_command(*ctx.command_path.split()[1:], name), rest
+        command = load_command(*ctx.command_path.split()[1:], name)
+        # What is imported stays, so that it is never looked through.
+        gc.freeze()
+        gc.enable()
+        return name, command, rest
 
 
 def load_command(*path: str) -> Any:
