@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.batch.tables import remarks
+from service.commands.batch.words import remarks
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
 from service.settings import load_settings

@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
-from service.similarity.pairs import Similarity
 from sim.recording import Verdict
+
+if TYPE_CHECKING:
+    from service.similarity.pairs import Similarity
 
 #: What a student sees before anything is published.
 BEFORE_PUBLICATION = frozenset({"visible"})
