@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from sim.errors import UsageError
-from submissions.seeds import Secret
+from submissions.seeds import PUBLIC, Secret
 
 PREFIX = "ROBOMARK_"
 #: A folder with files that are named as settings; it is called so by systemd, too.
@@ -77,11 +77,11 @@ def _log_level(level: str) -> str:
     return level.upper()
 
 
-def _secret(text: str) -> str:
-    text = text.strip()
+def _secret(given: str | Secret) -> Secret:
+    text = given.text if isinstance(given, Secret) else given.strip()
     if 0 < len(text) < _SHORTEST_SECRET:
         raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that nobody can guess")
-    return text
+    return Secret(text)
 
 
 def _seconds(least: float, most: float) -> Callable[[Any], float]:
@@ -142,7 +142,7 @@ class Settings:
     slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
     log_level: str = _setting(_log_level, default="WARNING")
     #: Wins over the database's own; empty where there is none.
-    secret: str = _setting(_secret, default="", repr=False)
+    secret: Secret = _setting(_secret, default=PUBLIC)
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -156,7 +156,7 @@ class Settings:
     @property
     def own_secret(self) -> Secret | None:
         """What the environment has in place of the database's secret."""
-        return Secret(self.secret) if self.secret else None
+        return None if self.secret == PUBLIC else self.secret
 
     @property
     def database(self) -> str:

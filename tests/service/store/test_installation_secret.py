@@ -79,7 +79,7 @@ def test_a_database_that_lost_it_is_not_graded_with(service_settings: Settings) 
 
 
 def test_the_environments_wins(service_settings: Settings) -> None:
-    settings = replace(service_settings, secret=SECRET)
+    settings = replace(service_settings, secret=Secret(SECRET))
     with open_store(settings) as store:
         assert secret_of(store) == secret_here(settings) == Secret(SECRET)
     with open_store(service_settings) as store:
