@@ -142,7 +142,7 @@ class Settings:
     slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
     log_level: str = _setting(_log_level, default="WARNING")
     #: Wins over the database's own; empty where there is none.
-    secret: Secret = _setting(_secret, default=PUBLIC)
+    secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
 
     def __post_init__(self) -> None:
         for each in fields(self):

@@ -374,9 +374,7 @@ def own_modules(role: Role) -> str:
 
 @functools.cache
 def keep_bytecode(folder: Path) -> None:
-    """Have Python keep what it compiles of the modules in there, as of any: a zygote writes nothing, and would compile
-    them at each start.
-    """
+    """Have Python keep what it compiles of these modules, as of any: zygotes keep nothing, each would do it anew."""
     if sys.dont_write_bytecode:
         return
     for file in folder.rglob("*.py"):
