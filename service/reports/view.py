@@ -16,7 +16,7 @@ from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
 
 if TYPE_CHECKING:
     from service.similarity.pairs import Similarity
