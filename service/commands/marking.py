@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from sqlalchemy.orm import Session
 
-from service.commands.batch.tables import out_of
+from service.commands.batch.words import out_of
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
 from service.store import audit, batches, comments, marking_history, overrides

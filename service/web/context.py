@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -10,6 +10,7 @@ from fastapi import Depends, Request
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
+from service.web.rate_limits import RateLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,7 @@ class WebContext:
     settings: Settings
     store: Store
     notifier: Notifier
+    limits: RateLimits = field(default_factory=RateLimits)
 
 
 def _context(request: Request) -> WebContext:
