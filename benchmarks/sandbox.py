@@ -57,11 +57,11 @@ def measure(_times: int) -> list[Measurement]:
         cold = wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
         heavy = _many(100, lambda: _until_locked(sandboxes, "responder with libraries"))
-        answers = _many(50, lambda: _until_answer(sandboxes))
+        answers = _many(50, lambda: _until_answer(sandboxes, folder))
         ends = _many(100, lambda: _until_gone(sandboxes))
-        turns = _turns(sandboxes)
+        turns = _turns(sandboxes, folder)
         alone = _many(50, _lockdown_alone)
-        dirty, share = _memory(sandboxes)
+        dirty, share = _memory(sandboxes, folder)
         cpu = max(_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
         stalled = _stall_overshoot(sandboxes)
         output = _output_overshoot(sandboxes, folder)
@@ -113,25 +113,25 @@ def _until_gone(sandboxes: Sandboxes) -> float:
     return wall_seconds(_spawn(sandboxes, "responder with libraries").close)
 
 
-def _until_answer(sandboxes: Sandboxes) -> float:
+def _until_answer(sandboxes: Sandboxes, folder: Path) -> float:
     start = time.perf_counter()
-    child = _echo(sandboxes)
+    child = _echo(sandboxes, folder)
     _turn(child)
     taken = time.perf_counter() - start
     child.close()
     return taken
 
 
-def _turns(sandboxes: Sandboxes) -> list[float]:
-    child = _echo(sandboxes)
+def _turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
+    child = _echo(sandboxes, folder)
     try:
         return _many(500, lambda: wall_seconds(lambda: _turn(child)))
     finally:
         child.close()
 
 
-def _echo(sandboxes: Sandboxes) -> Child:
-    child = _spawn(sandboxes, "responder with libraries")
+def _echo(sandboxes: Sandboxes, folder: Path) -> Child:
+    child = _spawn(sandboxes, "responder with libraries", folder)
     _start(child, "responder with libraries", _ECHO)
     while child.receive(wire.RESPONDER)["do"] != "ready":
         pass
@@ -168,9 +168,9 @@ def _lockdown_alone() -> float:
     return taken
 
 
-def _memory(sandboxes: Sandboxes) -> tuple[float, float]:
+def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
     """Megabytes that are a child's own, and its share of all when it is one of ten; not to be seen by everybody."""
-    children = [_echo(sandboxes) for _ in range(10)]
+    children = [_echo(sandboxes, folder) for _ in range(10)]
     try:
         lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()
     except PermissionError:
