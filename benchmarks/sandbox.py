@@ -21,7 +21,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits
 from responders.sandbox.zygote import Role
-from sim.recording import TICK
+from sim.recording import TICK, Verdict
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": ChildLimits(2, 512 << 20)}
 _SCHEMAS = {"robot": wire.ROBOT, "responder with libraries": wire.RESPONDER}
@@ -44,7 +44,7 @@ from responders.sandbox.running_child import ChildLimits
 from sim.recording import TICK
 sandboxes = Sandboxes()
 child = sandboxes.spawn("robot", ChildLimits(60, 64 << 20))
-child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": [], "modules": {},
+child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": {}, "modules": {},
             "tick": TICK})
 print(child._pid, flush=True)
 input()
@@ -139,7 +139,7 @@ def _echo(sandboxes: Sandboxes, folder: Path) -> Child:
 
 
 def _start(child: Child, role: Role, text: str) -> None:
-    own = {"preamble": "none", "sensors": [], "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
+    own = {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 
@@ -182,25 +182,27 @@ def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
     return sizes["Private_Dirty"], sizes["Pss"]
 
 
-def _run_to_its_end(sandboxes: Sandboxes, text: str, limits: ChildLimits) -> None:
+def _run_until(sandboxes: Sandboxes, text: str, limits: ChildLimits, verdict: Verdict) -> None:
     child = sandboxes.spawn("robot", limits)
     _start(child, "robot", text)
     try:
         while True:
             child.receive(wire.ROBOT)
-    except ChildStopped:
+    except ChildStopped as stop:
         child.close()
+        if stop.verdict is not verdict:
+            raise RuntimeError(f"expected {verdict}, but {stop.message}") from None
 
 
 def _cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
     before = sandboxes.children_cpu_seconds
-    _run_to_its_end(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20))
+    _run_until(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20), Verdict.CPU_LIMIT)
     return sandboxes.children_cpu_seconds - before - _CPU_LIMIT
 
 
 def _stall_overshoot(sandboxes: Sandboxes) -> float:
     text = "import select; select.select([], [], [])"
-    return wall_seconds(lambda: _run_to_its_end(sandboxes, text, _LIMITS["robot"])) - _STALLED
+    return wall_seconds(lambda: _run_until(sandboxes, text, _LIMITS["robot"], Verdict.STALLED)) - _STALLED
 
 
 def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
