@@ -79,8 +79,17 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "enrol": Command("course:enrol", "Enrol students before they submit."),
             },
         ),
+        "user": CommandGroup(
+            "Say who instructs, and let people sign in on the web.",
+            {
+                "add": Command("user:add", "Add an instructor, an operator or a student."),
+                "link": Command("user:link", "Print a link that signs somebody in once."),
+                "token": Command("user:token", "Print a token for programs."),
+                "list": Command("user:list_people", "List who is in a course."),
+            },
+        ),
         "up": Command("up:up", "Bring up broker, workers and web server.", serves=True),
-        "serve": Command("up:serve", "Answer on the web: health and metrics.", serves=True),
+        "serve": Command("up:serve", "Answer on the web: pages, API, health and metrics.", serves=True),
         "worker": Command("worker:worker", "Grade what is queued until told to stop.", serves=True),
         "doctor": Command("doctor:doctor", "Look at everything that grading needs on this machine."),
         "db": CommandGroup(

@@ -71,6 +71,13 @@ def _database(url: str) -> str:
     return url
 
 
+def _address(url: str) -> str:
+    scheme, _, name = url.rstrip("/").partition("://")
+    if url and (scheme not in {"https", "http"} or not name or "/" in name):
+        raise ValueError("expected https://name, as browsers are to write it")
+    return url.rstrip("/")
+
+
 def _log_level(level: str) -> str:
     if level.upper() not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
         raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
@@ -141,6 +148,8 @@ class Settings:
     #: assignment allows them more.
     slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
     log_level: str = _setting(_log_level, default="WARNING")
+    #: Where browsers find the web server, when others than this machine are to reach it.
+    public_url: str = _setting(_address, default="")
     #: Wins over the database's own; empty where there is none.
     secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
 

@@ -16,10 +16,15 @@ from responders.sandbox.manager import Sandboxes
 from service.queue.logs import announce, configure_logging
 from service.queue.supervisor import Supervisor, alone_in
 from service.settings import Settings, load_settings
+from service.store import audit, credentials, people
+from service.store.credentials import LINK_LIFETIME
 from service.store.engine import Store, open_store
-from service.web.listening import address, listen
+from service.store.states import CredentialKind
+from service.store.students import DEFAULT_COURSE
+from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
 from sim.errors import HostError, RobomarkError
+from submissions.people import Student
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 0.5
@@ -31,6 +36,8 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
     configure_logging(settings.log_level)
     # Before there are others in this group: it can only be divided when nobody is left in it.
     control_group.divide()
+    if serve:
+        check_reach(host, settings)
     with ExitStack() as held:
         leave_note = held.enter_context(alone_in(settings))
         listening = held.enter_context(listen(host, port)) if serve else None
@@ -41,6 +48,8 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
             sandboxes.check()
         store = held.enter_context(open_store(settings))
         try:
+            if listening is not None:
+                where += f"; sign in by {_first_link(settings, store, address(listening))}"
             _keep_up(settings, store, Supervisor(settings, store, workers, listening), where)
         except KeyboardInterrupt:
             return
@@ -50,6 +59,7 @@ def answer(host: str, port: int) -> None:
     """Answer on the web until Ctrl-C."""
     settings = load_settings()
     configure_logging(settings.log_level)
+    check_reach(host, settings)
     open_store(settings).close()
     with listen(host, port) as listening:
         announce("serve.answers", f"robomark answers on {address(listening)}; Ctrl-C ends it")
@@ -75,6 +85,16 @@ def _keep_up(settings: Settings, store: Store, service: Supervisor, where: str) 
             given_back = service.stop()
             announce("up.ended", f"ended; jobs in flight that went back: {given_back}")
             raise
+
+
+def _first_link(settings: Settings, store: Store, listening_at: str) -> str:
+    """A link that signs in, once, whoever brings the service up: an instructor of the first course, and operator."""
+    account = audit.this_user().partition("@")[0]
+    with store.transaction() as session:
+        member = people.make_instructor(session, DEFAULT_COURSE, Student(account))
+        people.make_operator(session, member.person_id)
+        secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
+    return f"{settings.public_url or listening_at}/sign-in/{secret}"
 
 
 def _until_ready(service: Supervisor) -> None:

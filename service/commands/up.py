@@ -6,7 +6,12 @@ from typing import Annotated
 
 import typer
 
-Host = Annotated[str, typer.Option(help="Where the web server listens; only this machine reaches the default.")]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Where the web server listens; only this machine reaches the default. For others, set ROBOMARK_PUBLIC_URL."
+    ),
+]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="0 takes any that is free.")]
 
 
@@ -25,7 +30,7 @@ def up(
 
 
 def serve(host: Host = "127.0.0.1", port: Port = 8470) -> None:
-    """Answer on the web: /health/live, /health/ready and /metrics. Grades nothing; workers do."""
+    """Answer on the web: pages, the API, /health/live, /health/ready and /metrics. Grades nothing; workers do."""
     from service.commands.serving import answer
 
     answer(host, port)

@@ -27,7 +27,7 @@ from service.reports.page import page_of
 from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
 from service.reports.rows import TableRow
-from service.reports.view import View
+from service.reports.view import NO_OTHERS, OtherTrials, View
 from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
@@ -67,28 +67,75 @@ def gallery(floors: Sequence[PrintedFloor]) -> str:
     return render("gallery.html", floors=shown)
 
 
+@dataclass(frozen=True, slots=True)
+class ReportParts:
+    """A report without a frame: the HTML for a page's ``main``, and the style and the script that it needs.
+
+    ``style`` is the same for every report, and so is ``script``, which runs when the body is there (``defer``), so that
+    a site can serve them as files. The body has no style and no script of its own: its images are data URIs
+    (``img-src data:``), and its replay is data that no browser runs.
+    """
+
+    title: str
+    body: Markup
+    style: str
+    script: str
+
+
+def report_parts(
+    view: View,
+    plots: Mapping[str, bytes],
+    submission: Submission | None = None,
+    own_floors: Mapping[str, Pixels] = _NO_FLOORS,
+    others: OtherTrials = NO_OTHERS,
+) -> ReportParts:
+    """One grade, with its replay, and with the student's source if the submission is given.
+
+    ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
+    built in, by name; ``others`` lie over the trials in the replay.
+    """
+    images = {name: _data_uri(data) for name, data in plots.items()}
+    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
+    played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
+    body = _environment().get_template("report_body.html")
+    told = body.render(
+        page=page_of(view, submission, played), images=images, replay=_written_out(replay) if replay else ""
+    )
+    title = f"{view.grade.assignment_title}: {view.grade.student}"
+    return ReportParts(title, Markup(told), report_style(), report_script())
+
+
+def report_style() -> str:
+    """What every report is laid out with."""
+    return _style("report.css", "replay.css")
+
+
+@lru_cache(maxsize=1)
+def report_script() -> str:
+    """What plays the replay of every report: its files in the order of their names, with names of their own."""
+    folder = files("service.reports.replay").joinpath("component")
+    parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
+    code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
+    return f'\n(() => {{\n"use strict";\n{code}}})();\n'
+
+
 def report(
     view: View,
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
+    others: OtherTrials = NO_OTHERS,
 ) -> str:
-    """The page of one grade, with its replay, and with the student's source if the submission is given.
-
-    ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
-    built in, by name.
-    """
-    images = {name: _data_uri(data) for name, data in plots.items()}
-    if not view.grade.trials:
-        return render("report.html", page=page_of(view, submission), images=images, replay="")
-    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES)
-    played = frozenset(trial["trial"] for trial in replay["trials"])
-    return _render_with_replay("report.html", replay, page=page_of(view, submission, played), images=images)
+    """The page of one grade: its parts in one file."""
+    parts = report_parts(view, plots, submission, own_floors, others)
+    script = parts.script if view.grade.trials else ""
+    return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body})
 
 
 def replay_page(replay: Mapping[str, Any]) -> str:
     """A page with nothing but a replay."""
-    return _render_with_replay("replay.html", replay, title=replay["title"])
+    context = {"title": replay["title"], "replay": _written_out(replay)}
+    return _render("replay.html", report_style(), report_script(), context)
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
@@ -130,10 +177,8 @@ def render(template: str, **context: object) -> str:
     return _render(template, _style("report.css"), "", context)
 
 
-def _render_with_replay(template: str, replay: Mapping[str, Any], **context: object) -> str:
-    """The same with a replay, whose script is all that the policy lets run."""
-    data = Markup(base64.b64encode(packed(replay)).decode("ascii"))
-    return _render(template, _style("report.css", "replay.css"), _component(), {**context, "replay": data})
+def _written_out(replay: Mapping[str, Any]) -> Markup:
+    return Markup(base64.b64encode(packed(replay)).decode("ascii"))
 
 
 def _render(template: str, style: str, script: str, context: Mapping[str, object]) -> str:
@@ -164,15 +209,6 @@ def _environment() -> Environment:
 def _style(*names: str) -> str:
     folder = files("service.reports").joinpath("templates")
     return "\n" + "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)
-
-
-@lru_cache(maxsize=1)
-def _component() -> str:
-    """The script's files in the order of their names, with names of their own."""
-    folder = files("service.reports.replay").joinpath("component")
-    parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
-    code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
-    return f'\n(() => {{\n"use strict";\n{code}}})();\n'
 
 
 def _shown(value: object) -> object:

@@ -19,8 +19,9 @@ from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
 from service.store.migrate import upgrade
-from service.store.models import Base, Course, Installation, Job
+from service.store.models import Course, Installation, Job
 from service.store.revision import current_revision
+from service.store.web_tables import METADATA
 from sim.errors import HostError, UsageError
 
 #: Some of them hold a recording each.
@@ -100,7 +101,7 @@ def _copy_rows(source: Engine, target: Engine) -> None:
             raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
         # Each was made with its tables; the worlds of what is brought in follow from its own.
         into.execute(delete(Installation))
-        for table in Base.metadata.sorted_tables:
+        for table in METADATA.sorted_tables:
             _copy_table(table, rows, into)
 
 

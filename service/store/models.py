@@ -18,7 +18,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import new_id
-from service.store.states import BatchState, JobState, Lane, PlotState, Role, Standing
+from service.store.states import BatchState, CredentialKind, JobState, Lane, PlotState, Role, Standing
 
 
 def _enum(kind: type[StrEnum]) -> Enum:
@@ -49,6 +49,7 @@ class Base(DeclarativeBase):
         str: SafeText(),
         Any: SafeJson(),
         Role: _enum(Role),
+        CredentialKind: _enum(CredentialKind),
         Lane: _enum(Lane),
         JobState: _enum(JobState),
         PlotState: _enum(PlotState),
@@ -85,6 +86,7 @@ class Person(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(default="")  # empty where nobody said, like the address
     email: Mapped[str | None]
+    operator: Mapped[bool] = mapped_column(default=False)  # runs the whole installation
     created_at: Mapped[datetime]
 
 

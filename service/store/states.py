@@ -12,7 +12,15 @@ class Role(StrEnum):
     """What somebody is in a course."""
 
     STUDENT = "student"
-    STAFF = "staff"
+    INSTRUCTOR = "instructor"
+
+
+class CredentialKind(StrEnum):
+    """What a secret is good for."""
+
+    LINK = "link"  # signs in once
+    SESSION = "session"  # a browser that is signed in
+    TOKEN = "token"  # a program's
 
 
 class Lane(StrEnum):

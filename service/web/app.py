@@ -1,32 +1,73 @@
-"""The web application: liveness, readiness and metrics.
+"""The web application: pages for people, the API for programs, liveness, readiness and metrics.
 
-Holds no state of its own; everything it tells is in the database.
+Holds no state of its own but how often somebody asked; everything it tells is in the database. A module of ``pages`` or
+``api`` that has a ``router`` is served; what other sites may post to is in a page module's ``cross_site_router``.
 """
 
 from __future__ import annotations
 
-from fastapi import FastAPI
+import importlib
+import pkgutil
+
+from fastapi import Depends, FastAPI
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.exceptions import HTTPException
 
 from service.doctor import examine_service
+from service.queue.celery_app import make_celery
+from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
+from service.version import GRADER_VERSION
+from service.web import api, pages
+from service.web.access import same_site
+from service.web.context import WebContext
+from service.web.errors import add_error_pages
 from service.web.metrics import metrics_text
+from service.web.rendering import static_files
+from service.web.security import Guarded
 
 
 def make_app(settings: Settings, store: Store) -> FastAPI:
     """The application for one database and one broker."""
     # The pages that FastAPI brings for its descriptions load scripts from elsewhere.
-    app = FastAPI(title="Robomark", docs_url=None, redoc_url=None)
+    app = FastAPI(
+        title="Robomark", version=GRADER_VERSION, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
+    )
+    app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings))
+    app.add_middleware(Guarded, public_url=settings.public_url)
+    add_error_pages(app)
+    _add_probes(app, settings, store)
 
-    @app.get("/health/live")
+    @app.get("/static/{name}", include_in_schema=False)
+    def static(name: str) -> Response:
+        """A file that pages load; its name changes when it does."""
+        if name not in static_files():
+            raise HTTPException(404, "There is no such file.")
+        media_type, data = static_files()[name]
+        return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
+
+    for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
+        found = importlib.import_module(module.name)
+        if router := getattr(found, "router", None):
+            app.include_router(router, dependencies=[Depends(same_site)], include_in_schema=False)
+        if router := getattr(found, "cross_site_router", None):
+            app.include_router(router, include_in_schema=False)
+    for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
+        if router := getattr(importlib.import_module(module.name), "router", None):
+            app.include_router(router, prefix="/api/v1")
+    return app
+
+
+def _add_probes(app: FastAPI, settings: Settings, store: Store) -> None:
+    @app.get("/health/live", include_in_schema=False)
     def live() -> JSONResponse:
         """This process answers; nothing else is looked at."""
         return JSONResponse({"live": True})
 
-    @app.get("/health/ready")
+    @app.get("/health/ready", include_in_schema=False)
     def ready() -> JSONResponse:
         """Whether submissions would be graded now: 200, or 503 with what is not well."""
         findings = examine_service(settings, store)
@@ -34,12 +75,10 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
         checks = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
         return JSONResponse({"ready": is_ready, "checks": checks}, status_code=200 if is_ready else 503)
 
-    @app.get("/metrics")
+    @app.get("/metrics", include_in_schema=False)
     def metrics() -> Response:
         """The metrics of the whole service, for Prometheus."""
         try:
             return Response(metrics_text(store), media_type=CONTENT_TYPE_LATEST)
         except SQLAlchemyError:
             return PlainTextResponse("the database does not answer\n", status_code=503)
-
-    return app

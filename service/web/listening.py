@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import socket
 from contextlib import ExitStack
+from ipaddress import ip_address
 
+from service.settings import Settings
 from sim.errors import UsageError
 
 
@@ -25,6 +27,20 @@ def listen(host: str, port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UsageError(f"{host}:{port} cannot be listened on: {reason}; name another with --port or --host") from None
+
+
+def check_reach(host: str, settings: Settings) -> None:
+    """Raises UsageError where others than this machine would reach the server, and nobody said how they are to."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except OSError:
+        return
+    if settings.public_url or all(ip_address(str(each[4][0]).partition("%")[0]).is_loopback for each in found):
+        return
+    raise UsageError(
+        f"--host {host} lets other machines reach this server, which speaks no TLS: put a proxy that does before it, "
+        "and set ROBOMARK_PUBLIC_URL to what browsers are to write, like https://robomark.example.org"
+    )
 
 
 def address(listening: socket.socket) -> str:

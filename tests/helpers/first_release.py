@@ -14,7 +14,7 @@ from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, 
 from paths import DATA
 from service.store.engine import open_engine
 from service.store.migrate import configuration
-from service.store.models import Base
+from service.store.web_tables import METADATA
 
 REVISION = "0002"
 #: What columns of then are called today.
@@ -40,7 +40,7 @@ def _copy(file: Path, engine: Engine) -> None:
     source = create_engine(f"sqlite:///{file}")
     names = set(inspect(source).get_table_names())
     with source.connect() as old, engine.begin() as new:
-        for today in Base.metadata.sorted_tables:
+        for today in METADATA.sorted_tables:
             if today.name not in names:
                 continue
             # The columns of then, with today's types, which read what SQLite has and write what PostgreSQL wants.

@@ -11,7 +11,7 @@ import pytest
 
 import report_builders as build
 from service.grading.grade import Grade
-from service.reports.html import BatchRow, batch_index, report
+from service.reports.html import BatchRow, batch_index, report, report_parts, report_script, report_style
 from service.reports.page import page_of, timeline
 from service.reports.plots.drawn import draw_all, plots_of
 from service.reports.view import staff_view, student_view
@@ -118,6 +118,19 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     assert "unsafe" not in policy
     assert not re.search(r"url\(|@import", reader.style)
     assert "@media print" in reader.style
+
+
+def test_the_parts_of_a_report_are_its_body_and_two_files_that_are_the_same_for_all() -> None:
+    shapes, line = (report_parts(student_view(made()), {}) for made in (build.shape_grade, build.line_follower_grade))
+    assert shapes.body != line.body
+    assert (shapes.style, shapes.script) == (line.style, line.script) == (report_style(), report_script())
+    reader = Reader(shapes.body)
+    assert reader.tags.isdisjoint({"html", "head", "body", "main", "style", "meta"})
+    assert reader.values("script", "type") == ["application/json"]
+    assert reader.scripts == 1
+    whole = report(student_view(build.shape_grade()), {})
+    assert shapes.body in whole
+    assert f"<title>{shapes.title}</title>" in whole
 
 
 def test_students_see_nothing_hidden_and_staff_see_all() -> None:

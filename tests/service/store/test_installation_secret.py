@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import re
 import shutil
 import sqlite3
@@ -16,7 +15,7 @@ import pytest
 from sqlalchemy import update
 
 from battery import scrambled
-from command import robomark
+from command import FORKING, robomark
 from first_release import lay_first_release
 from responders.code import Code
 from service import home_secret
@@ -43,9 +42,8 @@ def _put_secret(settings: Settings, found: Queue[str]) -> None:
 
 
 def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
-    spawned = multiprocessing.get_context("spawn")
-    found: Queue[str] = spawned.Queue()
-    processes = [spawned.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
+    found: Queue[str] = FORKING.Queue()
+    processes = [FORKING.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
     for process in processes:
         process.start()
     secrets = {found.get(timeout=120) for _ in processes}
@@ -53,7 +51,7 @@ def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
         process.join()
     (secret,) = secrets
     assert re.fullmatch(r"[0-9a-f]{64}", secret)
-    _put_secret(service_settings, again := spawned.Queue())
+    _put_secret(service_settings, again := FORKING.Queue())
     assert again.get(timeout=60) == secret
 
 

@@ -19,13 +19,14 @@ from service.store.backup import back_up, restore
 from service.store.engine import Store, open_engine, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch, accept_new
-from service.store.models import Artifact, Base, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
+from service.store.models import Artifact, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.purge import Purged, purge
 from service.store.states import JobState
+from service.store.web_tables import METADATA
 from sim.errors import HostError, UsageError
 
 GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
-TABLES = Base.metadata.sorted_tables
+TABLES = METADATA.sorted_tables
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])

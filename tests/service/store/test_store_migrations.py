@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
@@ -15,14 +14,16 @@ from sqlalchemy import func, inspect, select, text
 
 import report_builders
 from builders import accept_one
+from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
 from service.store.engine import open_engine, open_store
 from service.store.migrate import configuration
-from service.store.models import Artifact, Base, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
+from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
 from service.store.revision import current_revision, newest_revision
 from service.store.states import JobState, Standing
+from service.store.web_tables import METADATA
 from sim.errors import HostError
 from submissions.people import Refusal
 
@@ -34,7 +35,7 @@ def _open(settings: Settings) -> None:
 def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> None:
     with open_store(service_settings) as store:
         assert current_revision(store.engine) == newest_revision()
-        assert set(inspect(store.engine).get_table_names()) == {*Base.metadata.tables, "alembic_version"}
+        assert set(inspect(store.engine).get_table_names()) == {*METADATA.tables, "alembic_version"}
         with store.engine.begin() as connection:
             known = configuration(connection)
             command.check(known)
@@ -42,8 +43,7 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:
-    spawned = multiprocessing.get_context("spawn")
-    processes = [spawned.Process(target=_open, args=(service_settings,)) for _ in range(4)]
+    processes = [FORKING.Process(target=_open, args=(service_settings,)) for _ in range(4)]
     for process in processes:
         process.start()
     for process in processes:

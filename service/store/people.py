@@ -1,0 +1,111 @@
+"""Who instructs a course and who runs the installation, made known beside the students.
+
+Students are enrolled by ``students.py``; how any of them signs in is ``credentials.py``'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.engine import now
+from service.store.models import Course, Enrolment, Person
+from service.store.states import Role
+from service.store.students import Students, course_of
+from sim.errors import UsageError
+from submissions.names import shown_name
+from submissions.people import Student
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """Somebody in a course."""
+
+    person_id: int
+    enrolment_id: int
+    id: str  # what the course knows them by
+    name: str
+    email: str
+    role: Role
+    operator: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CourseLine:
+    """A course, and how many are in it."""
+
+    id: int
+    name: str
+
+
+def make_instructor(session: Session, course: str, who: Student) -> Member:
+    """Make somebody an instructor of the course, which is made where there is none of that name.
+
+    An instructor of this id in another course is the same person.
+    """
+    at = now(session)
+    course_id, own = course_of(session, course, at), shown_name(who.id)
+    taken = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.student == own)
+    elsewhere = select(Enrolment.person_id).where(Enrolment.student == own, Enrolment.role == Role.INSTRUCTOR).limit(1)
+    person_id = session.scalar(elsewhere)
+    if person_id is not None and session.scalar(taken) is None:
+        row = Enrolment(course_id=course_id, person_id=person_id, student=own, written=own, role=Role.INSTRUCTOR)
+        session.add(row)
+        session.flush()
+        return _member(session, row.id)
+    return _make(session, course, who, Role.INSTRUCTOR)
+
+
+def make_student(session: Session, course: str, who: Student) -> Member:
+    """Enrol somebody as a student, whatever they were in the course before."""
+    return _make(session, course, who, Role.STUDENT)
+
+
+def make_operator(session: Session, person_id: int) -> None:
+    """Let a person run the installation."""
+    session.get_one(Person, person_id).operator = True
+
+
+def member(session: Session, course: str, written: str) -> Member:
+    """Somebody in the course, by id. Raises UsageError for a course or a person that there is not."""
+    course_id = session.scalar(select(Course.id).where(Course.name == course))
+    if course_id is None:
+        raise UsageError(f"there is no course {course!r}")
+    return _member(session, Students(session, course_id).find(written))
+
+
+def members(session: Session, course_id: int) -> list[Member]:
+    """Everybody in the course, by id."""
+    query = (
+        select(Enrolment, Person)
+        .join(Person, Enrolment.person_id == Person.id)
+        .where(Enrolment.course_id == course_id)
+        .order_by(Enrolment.student)
+    )
+    return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+
+
+def courses(session: Session) -> list[CourseLine]:
+    """All courses, by name."""
+    return [CourseLine(row.id, row.name) for row in session.scalars(select(Course).order_by(Course.name))]
+
+
+def _make(session: Session, course: str, who: Student, role: Role) -> Member:
+    at = now(session)
+    enrolment_id = Students(session, course_of(session, course, at)).enrol(who, at)
+    session.get_one(Enrolment, enrolment_id).role = role
+    session.flush()
+    return _member(session, enrolment_id)
+
+
+def _member(session: Session, enrolment_id: int) -> Member:
+    enrolment = session.get_one(Enrolment, enrolment_id)
+    return _line(enrolment, session.get_one(Person, enrolment.person_id))
+
+
+def _line(enrolment: Enrolment, person: Person) -> Member:
+    return Member(
+        person.id, enrolment.id, enrolment.student, person.name, person.email or "", enrolment.role, person.operator
+    )

@@ -1,0 +1,186 @@
+"""Who asks, and what they may come near: every route but the few that are for anybody takes one of these.
+
+Somebody without the role is told that there is nothing there, so that no answer tells what exists. What of a grade a
+reader may see is ``reports/view.py``'s.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+from sqlalchemy.orm import Session
+from starlette.exceptions import HTTPException
+
+from service.store import credentials
+from service.store.credentials import Identity
+from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
+from service.store.states import CredentialKind, Role
+from service.web.context import Context
+from service.web.language import translatable
+from sim.errors import RobomarkError
+
+SESSION_COOKIE = "robomark"
+CSRF_FIELD = "csrf"
+CSRF_HEADER = "x-csrf-token"
+_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class SignInNeeded(RobomarkError):
+    """Nobody is signed in where somebody has to be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Somebody who is signed in with a browser, and the word that their forms have to carry."""
+
+    identity: Identity
+    csrf: str
+
+    @property
+    def actor(self) -> str:
+        """Who is written down for what they do."""
+        return actor_of(self.identity)
+
+
+@dataclass(frozen=True, slots=True)
+class InCourse:
+    """A reader in a course that they have a role in."""
+
+    reader: Reader
+    course_id: int
+    course: str  # its name
+
+    @property
+    def actor(self) -> str:
+        """Who is written down for what they do."""
+        return self.reader.actor
+
+
+def actor_of(identity: Identity) -> str:
+    """Who is written down for what somebody does by the web or the API."""
+    return f"{identity.name} (person {identity.person_id})"
+
+
+def csrf_word(session_secret: str) -> str:
+    """What a form has to carry: it follows from the session, and the session does not follow from it."""
+    return hmac.new(session_secret.encode(), b"robomark csrf", hashlib.sha256).hexdigest()
+
+
+def reader_of(request: Request, context: Context) -> Reader | None:
+    """Who is signed in, if anybody is."""
+    secret = request.cookies.get(SESSION_COOKIE, "")
+    if not secret:
+        return None
+    with context.store.reading() as session:
+        identity = credentials.identify(session, secret, CredentialKind.SESSION)
+    return None if identity is None else Reader(identity, csrf_word(secret))
+
+
+MaybeReader = Annotated[Reader | None, Depends(reader_of)]
+
+
+def _signed_in(reader: MaybeReader) -> Reader:
+    if reader is None:
+        raise SignInNeeded("sign in first")
+    return reader
+
+
+SignedIn = Annotated[Reader, Depends(_signed_in)]
+
+
+async def same_site(request: Request, reader: MaybeReader) -> None:
+    """What changes something has to come from a page of ours: by its word, and by what the browser says of itself."""
+    if request.method in _SAFE:
+        return
+    if request.headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+        raise HTTPException(403, translatable("This came from another site; open the page here and send it again."))
+    if reader is None:
+        return
+    word = request.headers.get(CSRF_HEADER)
+    if word is None:
+        word = str((await request.form()).get(CSRF_FIELD, ""))
+    if not secrets.compare_digest(word.encode(), reader.csrf.encode()):
+        raise HTTPException(
+            403, translatable("This page was open for too long, or came from another site; load it and send again.")
+        )
+
+
+def nothing_here() -> HTTPException:
+    """What is answered where there is nothing, or nothing for this reader."""
+    return HTTPException(404, translatable("There is nothing here, or nothing that you may see."))
+
+
+def course_of_role(session: Session, identity: Identity, course_id: int, role: Role) -> Course:
+    """The course, where somebody has this role in it; what it raises tells nobody whether it exists."""
+    found = session.get(Course, course_id)
+    if found is None or identity.roles.get(course_id) is not role:
+        raise nothing_here()
+    return found
+
+
+def _instructing(course_id: int, reader: SignedIn, context: Context) -> InCourse:
+    with context.store.reading() as session:
+        course = course_of_role(session, reader.identity, course_id, Role.INSTRUCTOR)
+        return InCourse(reader, course.id, course.name)
+
+
+def _studying(course_id: int, reader: SignedIn, context: Context) -> InCourse:
+    with context.store.reading() as session:
+        course = course_of_role(session, reader.identity, course_id, Role.STUDENT)
+        return InCourse(reader, course.id, course.name)
+
+
+def _operating(reader: SignedIn) -> Reader:
+    if not reader.identity.operator:
+        raise nothing_here()
+    return reader
+
+
+#: An instructor of the course in the path, a student of it, and who runs the installation.
+Instructing = Annotated[InCourse, Depends(_instructing)]
+Studying = Annotated[InCourse, Depends(_studying)]
+Operating = Annotated[Reader, Depends(_operating)]
+
+
+def batch_in(session: Session, course_id: int, batch_id: str) -> Batch:
+    """A batch of the course."""
+    row = session.get(Batch, batch_id)
+    if row is None or row.course_id != course_id:
+        raise nothing_here()
+    return row
+
+
+def job_in(session: Session, course_id: int, job_id: str) -> Job:
+    """A job of the course."""
+    row = session.get(Job, job_id)
+    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
+        raise nothing_here()
+    return row
+
+
+def submission_in(session: Session, course_id: int, submission_id: int) -> SubmissionRow:
+    """A submission in the course."""
+    row = session.get(SubmissionRow, submission_id)
+    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
+        raise nothing_here()
+    return row
+
+
+def own_submission(session: Session, identity: Identity, course_id: int, submission_id: int) -> SubmissionRow:
+    """A student's own submission in the course."""
+    row = submission_in(session, course_id, submission_id)
+    if session.get_one(Enrolment, row.enrolment_id).person_id != identity.person_id:
+        raise nothing_here()
+    return row
+
+
+def enrolment_in(session: Session, identity: Identity, course_id: int) -> Enrolment:
+    """What somebody is in the course; several enrolments of one person in one course there are not."""
+    for row in session.query(Enrolment).filter_by(course_id=course_id, person_id=identity.person_id).limit(1):
+        return row
+    raise nothing_here()

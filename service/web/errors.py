@@ -1,0 +1,109 @@
+"""What is answered when something cannot be: a page with one sentence for people, problem+json for programs.
+
+Never a traceback; what was ours is in the log.
+"""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from urllib.parse import quote
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.exceptions import HTTPException
+
+from service.lti.fetching import PlatformError
+from service.web.access import SignInNeeded, reader_of
+from service.web.language import translatable
+from service.web.rendering import page
+from sim.errors import HostError, RobomarkError, UsageError
+
+_log = structlog.get_logger(__name__)
+API = "/api/"
+_OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
+
+
+def add_error_pages(app: FastAPI) -> None:
+    """Let every error of a route become its answer."""
+    app.add_exception_handler(SignInNeeded, _sign_in_needed)
+    app.add_exception_handler(HTTPException, _refused)
+    app.add_exception_handler(RequestValidationError, _misread)
+    app.add_exception_handler(UsageError, _usage)
+    app.add_exception_handler(PlatformError, _platform)
+    app.add_exception_handler(HostError, _host)
+    app.add_exception_handler(SQLAlchemyError, _no_database)
+    app.add_exception_handler(Exception, _surprise)
+
+
+async def _sign_in_needed(request: Request, _error: Exception) -> Response:
+    if request.url.path.startswith(API):
+        return _problem(401, "A token is needed: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
+    target = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
+    where = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
+    if request.headers.get("hx-request") == "true":
+        return Response(status_code=401, headers={"hx-redirect": where})
+    return RedirectResponse(where, 303)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    return answer(request, error.status_code, str(error.detail), dict(error.headers or {}))
+
+
+async def _misread(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"][1:]) or str(first["loc"][0])
+    message = str(first["msg"])
+    return answer(request, 422, f"{where}: {message[:1].lower()}{message[1:]}")
+
+
+async def _usage(request: Request, error: Exception) -> Response:
+    return answer(request, 422, _sentence(error))
+
+
+async def _host(request: Request, error: Exception) -> Response:
+    _log.error("web.host_error", path=request.url.path, error=str(error))
+    return answer(request, 503, _OURS)
+
+
+async def _platform(request: Request, error: Exception) -> Response:
+    return answer(request, 502, _sentence(error))
+
+
+async def _no_database(request: Request, error: Exception) -> Response:
+    _log.error("web.no_database", path=request.url.path, error=str(error))
+    return answer(request, 503, _NO_DATABASE)
+
+
+async def _surprise(request: Request, error: Exception) -> Response:
+    _log.error("web.surprise", path=request.url.path, exc_info=error)
+    return answer(request, 500, _OURS)
+
+
+def answer(request: Request, status: int, sentence: str, headers: dict[str, str] | None = None) -> Response:
+    """The sentence, as whoever asks can read it."""
+    if request.url.path.startswith(API):
+        return _problem(status, sentence, headers)
+    try:
+        reader = reader_of(request, request.app.state.context)
+    except (RobomarkError, SQLAlchemyError):
+        reader = None
+    shown = page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
+    shown.headers.update(headers or {})
+    return shown
+
+
+def _problem(status: int, sentence: str, headers: dict[str, str] | None = None) -> Response:
+    """A problem as RFC 9457 has it."""
+    body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": sentence}
+    return JSONResponse(body, status, headers, "application/problem+json")
+
+
+def _sentence(error: Exception) -> str:
+    text = str(error)
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

@@ -1,0 +1,116 @@
+"""Signing in by a personal link or a token, and out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+from urllib.parse import urlsplit
+
+from fastapi import APIRouter, Form, Query, Request
+from fastapi.responses import RedirectResponse, Response
+from starlette.exceptions import HTTPException
+
+from service.store import credentials
+from service.store.credentials import SESSION_LIFETIME
+from service.store.states import CredentialKind
+from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
+from service.web.context import Context, WebContext
+from service.web.language import COOKIE as LANGUAGE_COOKIE
+from service.web.language import languages, translatable
+from service.web.rendering import page
+
+router = APIRouter()
+_REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
+
+
+@router.get("/sign-in")
+def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Query(alias="next")] = "/") -> Response:
+    """Where a link or a token is asked for."""
+    return page(request, reader, "sign_in.html", target=inside(target), refused="")
+
+
+@router.get("/sign-in/{link}")
+def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
+    """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
+    context.limits.failed_sign_ins.check(_address(request))
+    with context.store.reading() as session:
+        name = credentials.owner(session, link)
+    if name is None:
+        context.limits.failed_sign_ins.spend(_address(request))
+        return page(request, reader, "sign_in.html", status_code=410, target="/", refused=_REFUSED)
+    return page(request, reader, "sign_in_link.html", link=link, name=name)
+
+
+@router.post("/sign-in")
+def sign_in(
+    request: Request,
+    reader: MaybeReader,
+    context: Context,
+    secret: Annotated[str, Form(max_length=200)],
+    target: Annotated[str, Form(alias="next")] = "/",
+) -> Response:
+    """Exchange a link's secret, or a token, for a session of this browser."""
+    context.limits.failed_sign_ins.check(_address(request))
+    # A whole link may have been pasted.
+    secret = secret.strip().rstrip("/").rpartition("/")[2]
+    with context.store.transaction() as session:
+        opened = credentials.redeem(session, secret)
+        if opened is None:
+            identity = credentials.identify(session, secret, CredentialKind.TOKEN)
+            # A token that may not do everything does not become a browser that may.
+            if identity is not None and identity.scopes is not None and "sign-in" in identity.scopes:
+                opened = credentials.issue(session, identity.person_id, CredentialKind.SESSION, SESSION_LIFETIME)
+        if opened is not None and reader is not None:
+            credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
+    if opened is None:
+        context.limits.failed_sign_ins.spend(_address(request))
+        return page(request, reader, "sign_in.html", status_code=403, target=inside(target), refused=_REFUSED)
+    answer = RedirectResponse(inside(target), 303)
+    set_session(answer, context, opened)
+    return answer
+
+
+@router.post("/sign-out")
+def sign_out(reader: SignedIn, context: Context) -> Response:
+    """End the session of this browser."""
+    with context.store.transaction() as session:
+        credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
+    answer = RedirectResponse("/sign-in", 303)
+    answer.delete_cookie(SESSION_COOKIE, path="/")
+    return answer
+
+
+@router.post("/language")
+def choose_language(
+    code: Annotated[str, Form(max_length=20)], context: Context, target: Annotated[str, Form(alias="next")] = "/"
+) -> Response:
+    """Show the pages in this language from now on, in this browser."""
+    if code not in languages():
+        raise HTTPException(422, "There are no pages in this language.")
+    answer = RedirectResponse(inside(target), 303)
+    answer.set_cookie(
+        LANGUAGE_COOKIE, code, max_age=365 * 86_400, httponly=True, samesite="lax", secure=_secure(context)
+    )
+    return answer
+
+
+def set_session(answer: Response, context: WebContext, secret: str) -> None:
+    """Sign a browser in with the answer."""
+    seconds = int(SESSION_LIFETIME.total_seconds())
+    answer.set_cookie(
+        SESSION_COOKIE, secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=_secure(context)
+    )
+
+
+def _secure(context: WebContext) -> bool:
+    return context.settings.public_url.startswith("https:")
+
+
+def _address(request: Request) -> str:
+    return "" if request.client is None else request.client.host
+
+
+def inside(target: str) -> str:
+    """Where to go after, if that is a path of ours; browsers take a backslash for a slash, and forget line ends."""
+    parts = urlsplit(target)
+    is_ours = target.startswith("/") and not target.startswith("//") and not parts.netloc and not parts.scheme
+    return target if is_ours and "\\" not in target and target.isprintable() else "/"

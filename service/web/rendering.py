@@ -1,0 +1,120 @@
+"""Pages from templates: escaped, in the reader's language, in the one frame. Decides nothing about what is shown."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from datetime import datetime
+from decimal import Decimal
+from functools import lru_cache
+from importlib.resources import files
+from types import MappingProxyType
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from service.reports.html import report_script, report_style
+from service.reports.readable import number, readable
+from service.store.states import Role
+from service.web.access import Reader
+from service.web.language import language_of, languages, translations
+
+_LONGEST_TEXT = 20_000
+
+
+def page(
+    request: Request, reader: Reader | None, template: str, *, status_code: int = 200, **context: object
+) -> HTMLResponse:
+    """A page of ``templates`` for somebody, or for anybody."""
+    code = language_of(request)
+    told = {
+        "request": request,
+        "reader": reader,
+        "language": code,
+        "languages": languages(),
+        "statics": statics(),
+        "Role": Role,
+        **context,
+    }
+    return HTMLResponse(_environment(code).get_template(template).render(told), status_code=status_code)
+
+
+def words(request: Request, sentence: str) -> str:
+    """A sentence of ours in the reader's language."""
+    return translations(language_of(request)).gettext(sentence)
+
+
+def wants_part(request: Request) -> bool:
+    """Whether htmx asks, which puts a part of a page in place of the one it shows."""
+    return request.headers.get("hx-request") == "true"
+
+
+@lru_cache(maxsize=1)
+def static_files() -> Mapping[str, tuple[str, bytes]]:
+    """The files that pages load, by the name they are served under, which has their hash: media type and content."""
+    web = files("service.web").joinpath("static")
+    contents = {
+        "htmx.js": web.joinpath("htmx.min.js").read_text(encoding="utf-8"),
+        "replay.js": report_script(),
+        "robomark.css": report_style() + web.joinpath("robomark.css").read_text(encoding="utf-8"),
+        "robomark.js": web.joinpath("robomark.js").read_text(encoding="utf-8"),
+    }
+    types = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
+    named = {}
+    for name, text in contents.items():
+        stem, kind = name.rsplit(".", 1)
+        data = text.encode()
+        named[f"{stem}.{hashlib.sha256(data).hexdigest()[:12]}.{kind}"] = (types[kind], data)
+    return MappingProxyType(named)
+
+
+@lru_cache(maxsize=1)
+def statics() -> Mapping[str, str]:
+    """Where each file is, by its name without the hash: ``robomark.css``."""
+    return MappingProxyType(
+        {f"{name.split('.')[0]}.{name.rsplit('.', 1)[1]}": f"/static/{name}" for name in static_files()}
+    )
+
+
+@lru_cache(maxsize=16)
+def _environment(code: str) -> Environment:
+    environment = Environment(
+        loader=PackageLoader("service.web"),
+        autoescape=True,
+        finalize=_shown,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
+    )
+    environment.install_gettext_translations(translations(code), newstyle=True)  # type: ignore[attr-defined]
+    environment.filters["marks"] = _marks
+    environment.filters["moment"] = _moment
+    environment.filters["share"] = _share
+    return environment
+
+
+def _shown(value: object) -> object:
+    """Applied to every expression of a template, before it is escaped."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return readable(value, _LONGEST_TEXT, lines=400)
+    return value
+
+
+def _marks(value: Decimal | None) -> str:
+    return "–" if value is None else number(value)
+
+
+def _moment(value: datetime | None) -> Markup | str:
+    """A moment for people, and for programs that read the page."""
+    if value is None:
+        return "–"
+    here = value.astimezone()
+    return Markup('<time datetime="{}">{}</time>').format(here.isoformat(), f"{here:%Y-%m-%d %H:%M}")
+
+
+def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:
+    """So much of a hundred."""
+    return 0.0 if not marks or not max_marks else round(100 * float(marks / max_marks), 1)

@@ -1,0 +1,94 @@
+"""A web application with a database of its own, and browsers and programs that are signed in to it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI
+from httpx2 import Response
+from starlette.testclient import TestClient
+
+from builders import settings_in
+from service.queue.broker import broker_url
+from service.settings import Settings
+from service.store import credentials, people
+from service.store.engine import Store, open_store
+from service.store.people import Member
+from service.store.states import CredentialKind
+from service.web.app import make_app
+from submissions.people import Student
+
+COURSE = "default"
+
+
+@dataclass(frozen=True, slots=True)
+class Web:
+    """The application and its store."""
+
+    settings: Settings
+    store: Store
+    app: FastAPI
+
+    def browser(self, member: Member | None = None, **options: Any) -> TestClient:
+        """A browser on this machine, signed in as somebody or nobody."""
+        client = TestClient(self.app, base_url="http://localhost", follow_redirects=False, **options)
+        if member is not None:
+            answer = client.post("/sign-in", data={"secret": self.link(member)})
+            assert answer.status_code == 303, answer.text
+        return client
+
+    def link(self, member: Member) -> str:
+        with self.store.transaction() as session:
+            return credentials.issue(session, member.person_id, CredentialKind.LINK, timedelta(hours=1))
+
+    def token(self, member: Member, *scopes: str) -> dict[str, str]:
+        """The header of a program that may do this."""
+        with self.store.transaction() as session:
+            secret = credentials.issue(
+                session, member.person_id, CredentialKind.TOKEN, timedelta(hours=1), name="test", scopes=scopes
+            )
+        return {"authorization": f"Bearer {secret}"}
+
+    def instructor(self, who: str = "grace", course: str = COURSE) -> Member:
+        with self.store.transaction() as session:
+            return people.make_instructor(session, course, Student(who, who.capitalize()))
+
+    def student(self, who: str = "ada", course: str = COURSE) -> Member:
+        with self.store.transaction() as session:
+            return people.make_student(session, course, Student(who, who.capitalize()))
+
+    def operator(self, who: str = "root") -> Member:
+        member = self.instructor(who, "operators")
+        with self.store.transaction() as session:
+            people.make_operator(session, member.person_id)
+        return member
+
+
+@contextmanager
+def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
+    """An application whose home is ``folder``."""
+    settings = settings_in(folder, **changes)
+    if not settings.broker_url:
+        settings = settings.with_broker(broker_url(settings))
+    with open_store(settings) as store:
+        yield Web(settings, store, make_app(settings, store))
+
+
+def csrf(answer: Response) -> str:
+    """The word that the forms of a page carry."""
+    found = re.search(r'name="csrf" value="([0-9a-f]+)"', answer.text)
+    assert found, answer.text[:2000]
+    return unescape(found[1])
+
+
+def submit(client: TestClient, path: str, data: dict[str, Any] | None = None, **options: Any) -> Response:
+    """Post a form as the page it stands on would."""
+    word = csrf(client.get("/account"))
+    return client.post(path, data={**(data or {}), "csrf": word}, **options)

@@ -1,0 +1,55 @@
+"""A course with one of everything, made once for tests that go through all routes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import report_builders
+from builders import grading_request
+from service.store import credentials, intake, jobs, results
+from service.store.people import Member
+from service.web.rendering import statics
+from web import COURSE, Web
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """Ada's submission in Grace's course, and what paths call each thing there is."""
+
+    ada: Member
+    grace: Member
+    values: dict[str, str]
+
+
+def make_world(web: Web) -> World:
+    """One of everything."""
+    ada, grace = web.student("ada"), web.instructor("grace")
+    batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
+    _grade_all(web)
+    web.token(ada, "read")
+    with web.store.reading() as session:
+        (token,) = credentials.tokens(session, ada.person_id)
+    values = {
+        "course_id": "1",
+        "batch_id": batch.id,
+        "job_id": batch.jobs[0].job_id,
+        "submission_id": "1",
+        "assignment": "echo-responder",
+        "name": statics()["robomark.css"].rpartition("/")[2],
+        "link": web.link(ada),
+        "token_id": token.id,
+    }
+    return World(ada, grace, values)
+
+
+def filled(path: str, values: dict[str, str]) -> str:
+    """A route's path with the names in it replaced by what there is."""
+    return re.sub(r"\{(\w+)(:\w+)?\}", lambda found: values[found[1]], path)
+
+
+def _grade_all(web: Web) -> None:
+    """What waits is graded at once, by hand."""
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))

@@ -1,0 +1,134 @@
+"""Every route against every kind of reader: ``tests/data/access`` says who may come near which.
+
+A route that is in no table fails, and so does a row of a table that no route has.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from fastapi.routing import iter_route_contexts
+from httpx2 import Response
+from starlette.testclient import TestClient
+
+from paths import DATA
+from web import Web, csrf, web_in
+from web_world import filled, make_world
+
+API = "/api/v1/"
+_TABLES = sorted((DATA / "access").glob("*.toml"))
+ROUTES = {route: who for table in _TABLES for route, who in tomllib.loads(table.read_text()).items()}
+#: What pages post; other sites may post what says so, and programs have no forms.
+_CHANGING = [
+    route
+    for route, who in ROUTES.items()
+    if not route.startswith("GET ") and API not in route and not who.endswith(" cross-site")
+]
+READERS = ("nobody", "owner", "other student", "instructor", "other instructor", "operator")
+#: Who of the readers each word of the tables means.
+ALLOWED = {
+    "anybody": set(READERS),
+    "signed-in": set(READERS) - {"nobody"},
+    "instructor": {"instructor"},
+    "student": {"owner", "other student"},
+    "owner": {"owner"},
+    "operator": {"operator"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Signed:
+    """What each reader asks with, and what the paths are filled with."""
+
+    browsers: dict[str, TestClient]
+    tokens: dict[str, dict[str, str]]
+    words: dict[str, str]
+    values: dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Signed]]:
+    with web_in(tmp_path_factory.mktemp("home")) as web:
+        world = make_world(web)
+        members = {
+            "owner": world.ada,
+            "other student": web.student("bob"),
+            "instructor": world.grace,
+            "other instructor": web.instructor("mallory", "another course"),
+            "operator": web.operator(),
+        }
+        browsers = {"nobody": web.browser(), **{who: web.browser(member) for who, member in members.items()}}
+        words = {who: csrf(browser.get("/account")) for who, browser in browsers.items() if who != "nobody"}
+        everything = ("read", "submit", "mark", "manage")
+        tokens = {who: web.token(member, *everything) for who, member in members.items()}
+        yield web, Signed(browsers, tokens, words, world.values)
+
+
+def _routes(web: Web) -> set[str]:
+    return {
+        f"{method} {route.path}"
+        for route in iter_route_contexts(web.app.routes)
+        for method in route.methods or ()
+        if method != "HEAD"
+    }
+
+
+def test_every_route_is_in_a_table(signed: tuple[Web, Signed]) -> None:
+    assert _routes(signed[0]) == set(ROUTES)
+
+
+@pytest.mark.parametrize("route", sorted(ROUTES))
+def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
+    _, asked = signed
+    method, path = route.split(" ", 1)
+    allowed = ALLOWED[ROUTES[route].split(" ")[0]]
+    # Who may not first: whoever may could end what is asked for.
+    for who in sorted(READERS, key=lambda each: each in allowed):
+        answer = _ask(asked, who, method, filled(path, asked.values))
+        if who in allowed:
+            assert answer.status_code not in (401, 404, 403, 500), (who, answer.status_code, answer.text[-2000:])
+            assert not (answer.status_code == 303 and answer.headers["location"].startswith("/sign-in?")), who
+        elif who != "nobody":
+            assert answer.status_code == 404, (who, answer.status_code, answer.text[-2000:])
+        elif path.startswith(API):
+            assert answer.status_code == 401
+        else:
+            assert answer.status_code == 303, answer.text
+            assert answer.headers["location"].startswith("/sign-in")
+
+
+@pytest.mark.parametrize("route", sorted(route for route in ROUTES if API in route and " " in ROUTES[route]))
+def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: str) -> None:
+    web, asked = signed
+    method, path = route.split(" ", 1)
+    who, scope = ROUTES[route].split(" ")
+    reader = {"signed-in": "owner", "student": "owner"}.get(who, who)
+    members = {"owner": web.student("ada"), "instructor": web.instructor(), "operator": web.operator()}
+    token = web.token(members[reader], *({"read", "submit", "mark", "manage"} - {scope}))
+    answer = asked.browsers["nobody"].request(method, filled(path, asked.values), headers=token)
+    assert answer.status_code == 403, answer.text
+    assert scope in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("route", sorted(_CHANGING))
+def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signed], route: str) -> None:
+    method, path = route.split(" ", 1)
+    _, asked = signed
+    for who in asked.words:
+        answer = asked.browsers[who].request(method, filled(path, asked.values), data={"csrf": "0" * 64})
+        assert answer.status_code in (403, 404), (who, answer.status_code)
+        other = {"sec-fetch-site": "cross-site", "x-csrf-token": asked.words[who]}
+        assert asked.browsers[who].request(method, filled(path, asked.values), headers=other).status_code in (403, 404)
+
+
+def _ask(asked: Signed, who: str, method: str, path: str) -> Response:
+    if path.startswith(API):
+        return asked.browsers["nobody"].request(method, path, headers=asked.tokens.get(who, {}))
+    # A session ends with the browser's leave; this one is needed again.
+    if path == "/sign-out" and who != "nobody":
+        return asked.browsers[who].get("/account")
+    headers = {"x-csrf-token": asked.words[who]} if who in asked.words else {}
+    return asked.browsers[who].request(method, path, headers=headers)
