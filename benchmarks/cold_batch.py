@@ -17,7 +17,8 @@ from typing import Any
 
 from benchmarks.commands import ROBOMARK
 from benchmarks.measurement import RATIO, SECONDS, Measurement, median, users_environment, wall_seconds
-from submissions.assignment.examples import REFERENCE, examples
+from submissions.assignment.examples import examples
+from submissions.assignment.folder import REFERENCE
 
 _ASSIGNMENT = "echo-responder"
 _SUBMISSIONS = 10

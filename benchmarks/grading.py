@@ -7,7 +7,8 @@ import tempfile
 from benchmarks.calibration import loop_seconds
 from benchmarks.commands import ROBOMARK
 from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, median
-from submissions.assignment.examples import REFERENCE, examples
+from submissions.assignment.examples import examples
+from submissions.assignment.folder import REFERENCE
 
 _ASSIGNMENT = "echo-responder"
 #: One second where the loop takes 0.6.

@@ -13,7 +13,8 @@ from service.grading.trial_runner import TrialRunner
 from service.plotting import draw
 from service.reports.html import report
 from service.reports.view import student_view
-from submissions.assignment.examples import REFERENCE, examples
+from submissions.assignment.examples import examples
+from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
