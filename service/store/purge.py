@@ -15,6 +15,7 @@ from service.store import audit
 from service.store.engine import Store
 from service.store.models import AssignmentVersion, Batch, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.states import UNFINISHED
+from service.store.web_tables import Appeal, Comment, Override
 
 _TEMPORARY = MetaData()
 #: Submissions and enrolments that go; there may be more of them than a statement takes as values.
@@ -78,6 +79,8 @@ def _remove(session: Session) -> None:
     session.execute(update(Job).where(of_them).values(copied_from=None, regrade_of=None))
     # Its trials, results and artifacts go with a job.
     session.execute(delete(Job).where(of_them))
+    for table in (Override, Comment, Appeal):
+        session.execute(delete(table).where(table.submission_id.in_(_going)))
     session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(_going)))
     used = (
         Batch.id.in_(select(Job.batch_id).where(Job.batch_id.is_not(None))),
