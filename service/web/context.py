@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -10,6 +10,7 @@ from fastapi import Depends, Request
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
+from service.web.rate_limits import RateLimit
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,8 @@ class WebContext:
     settings: Settings
     store: Store
     notifier: Notifier
+    #: How often one person may submit, whatever the course and the way.
+    submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
 
 
 def _context(request: Request) -> WebContext:
