@@ -6,14 +6,17 @@ renders a view asks no more who reads it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from types import MappingProxyType
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
 from service.similarity.pairs import Similarity
+from sim.errors import UsageError
 from sim.recording import Verdict
+from submissions.assignment.examples import REFERENCE
 
 #: What a student sees before anything is published.
 BEFORE_PUBLICATION = frozenset({"visible"})
@@ -40,10 +43,22 @@ class GradebookView:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherTrials:
+    """What may be drawn over the trials of a view: whose it is, and by a trial's index the one that lies over it."""
+
+    name: str
+    trials: Mapping[int, TrialResult]
+
+
+@dataclass(frozen=True, slots=True)
 class SimilarityView:
     """What is alike in a batch, as staff may see it; a student has no view of it, and no grade has anything of it."""
 
     found: tuple[Similarity, ...]
+
+
+#: Where no trial lies over another.
+NO_OTHERS = OtherTrials("", MappingProxyType({}))
 
 
 def staff_similarity(found: Sequence[Similarity]) -> SimilarityView:
@@ -77,6 +92,31 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     )
     withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
     return View(left, staff=False, withheld=withheld)
+
+
+def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OtherTrials:
+    """The trials of ``other`` that were run as those of the view were, as far as its reader may see them.
+
+    Staff see all. Students see their own, and the reference's (who is called as that example is) once the grade that
+    they read is published; of both what has a visibility in ``released``. Raises UsageError where nothing is left.
+    """
+    if view.staff:
+        seen = other.trials
+    elif other.student == view.grade.student or (other.student == REFERENCE and "after_published" in released):
+        seen = student_view(other, released).grade.trials
+    elif other.student == REFERENCE:
+        raise UsageError("the reference is shown over a student's trials once the grade is published, not before")
+    else:
+        raise UsageError("this is another student's grade; expected one of the same student, or the reference's")
+    same = other.assignment == view.grade.assignment
+    run_as = {_circumstances(trial): trial for trial in seen} if same else {}
+    pairs = ((index, run_as.get(_circumstances(trial))) for index, trial in enumerate(view.grade.trials))
+    trials = {index: trial for index, trial in pairs if trial is not None}
+    if not trials:
+        raise UsageError(
+            "no trial of both grades has the same scenario, seed, place and floor, so none lies over another"
+        )
+    return OtherTrials(name, trials)
 
 
 def gradebook_view(grade: Grade) -> GradebookView:
@@ -117,6 +157,14 @@ def worst_trial(grade: Grade, scenario: str) -> int:
 def scenarios(grade: Grade) -> tuple[str, ...]:
     """The scenarios of the grade's trials, in the order they were run."""
     return tuple(dict.fromkeys(trial.scenario for trial in grade.trials))
+
+
+def _circumstances(trial: TrialResult) -> Hashable:
+    """What two trials share of which one can lie over the other: another version may have changed any of it."""
+    recording = trial.recording
+    ground = (recording.background, recording.label_patches, recording.sheet, recording.obstacles)
+    noise = (trial.light_noise, trial.motor_noise, trial.sweep)
+    return trial.scenario, trial.index, trial.seed, trial.place, noise, ground
 
 
 def _told(grade: Grade, result: CriterionResult) -> CriterionResult:

@@ -103,6 +103,34 @@ def find_job(session: Session, start: str) -> str:
     return _find(session, Job.id, Job.queued_at, start, "grade")
 
 
+def job_before(session: Session, job_id: str) -> str:
+    """The id of the grade that stands for the same student's last attempt before this job's.
+
+    Raises UsageError where there is none; what is for staff alone, or not to be trusted, is passed over.
+    """
+    mine = session.execute(
+        select(SubmissionRow).join(Job, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
+    ).scalar_one()
+    found = session.scalar(
+        select(Job.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .where(
+            SubmissionRow.enrolment_id == mine.enrolment_id,
+            SubmissionRow.assignment == mine.assignment,
+            SubmissionRow.attempt < mine.attempt,
+            SubmissionRow.staff_only.is_(None),
+            Job.state == JobState.DONE,
+            Job.standing == Standing.STANDS,
+            Job.suspect.is_(None),
+        )
+        .order_by(SubmissionRow.attempt.desc())
+        .limit(1)
+    )
+    if found is None:
+        raise UsageError(f"no grade of the same student for the same assignment comes before {job_id}")
+    return found
+
+
 def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
     """The newest batches first."""
     rows = session.scalars(select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()

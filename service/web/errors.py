@@ -15,14 +15,16 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
+from service.lti.fetching import PlatformError
 from service.web.access import SignInNeeded, reader_of
+from service.web.language import translatable
 from service.web.rendering import page
 from sim.errors import HostError, RobomarkError, UsageError
 
 _log = structlog.get_logger(__name__)
 API = "/api/"
-_OURS = "Something went wrong here, not with you; it is written down. Try again in a minute."
-_NO_DATABASE = "The database does not answer; nothing was changed. Try again in a minute."
+_OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -31,6 +33,7 @@ def add_error_pages(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(RequestValidationError, _misread)
     app.add_exception_handler(UsageError, _usage)
+    app.add_exception_handler(PlatformError, _platform)
     app.add_exception_handler(HostError, _host)
     app.add_exception_handler(SQLAlchemyError, _no_database)
     app.add_exception_handler(Exception, _surprise)
@@ -66,6 +69,10 @@ async def _usage(request: Request, error: Exception) -> Response:
 async def _host(request: Request, error: Exception) -> Response:
     _log.error("web.host_error", path=request.url.path, error=str(error))
     return answer(request, 503, _OURS)
+
+
+async def _platform(request: Request, error: Exception) -> Response:
+    return answer(request, 502, sentence_of(error))
 
 
 async def _no_database(request: Request, error: Exception) -> Response:

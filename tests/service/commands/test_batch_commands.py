@@ -111,6 +111,31 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     assert [source["name"] for source in replay["sources"]] == ["robot.py", "responder.py"]
 
 
+def test_show_lays_one_grade_over_another_and_films_a_trial(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
+    home, ended, _ = graded
+    reference, flawed = (
+        re.search(rf"^{who} .* (\w{{12}})$", ended.out, re.MULTILINE)[1]  # type: ignore[index]
+        for who in ("reference", "flawed")
+    )
+    film = tmp_path / "film.gif"
+    shown = robomark(home, "show", flawed, "--over", flawed, "--replay", tmp_path / "own.json", "--film", film)
+    assert shown.status == 0
+    assert f"film: {film}" in shown.err
+    assert film.read_bytes().startswith(b"GIF89a")
+    (over,) = {trial["over"]["parted"] for trial in json.loads((tmp_path / "own.json").read_text())["trials"]}
+    assert over is None
+    for given, sentence in (
+        (("--over", reference, "--replay", tmp_path / "r.html"), "once the grade is published, not before"),
+        (("--over", "before", "--replay", tmp_path / "r.html"), "no grade of the same student"),
+        (("--over", flawed), "expected --replay or --output too"),
+        (("--trial", "1"), "expected --film too"),
+        (("--film", tmp_path / "film.mp4"), "expected a name that ends in .gif"),
+    ):
+        refused = robomark(home, "show", flawed, *given)
+        assert (refused.status, sentence in refused.err) == (2, True), given
+    assert not (tmp_path / "r.html").exists()
+
+
 def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
     home, ended, _ = graded
     copy = tmp_path / "copy.db"

@@ -201,3 +201,25 @@ def test_run_says_how_long_a_responder_may_compute(tmp_path: Path) -> None:
     arguments = ("run", program, "--responder", tmp_path / "responder.py", "--responder-cpu", "0.5")
     ended = robomark(*arguments)
     assert "it computed for more than 0.5 seconds of CPU time" in ended.stderr
+
+
+def test_one_program_is_run_over_another_and_filmed(tmp_path: Path) -> None:
+    one, other = tmp_path / "robot.py", tmp_path / "other.py"
+    drives = "tank_drive.on_for_seconds(SpeedPercent(30), SpeedPercent({}), 1)\n"
+    one.write_text(drives.format(30) + "print('one')\n")
+    other.write_text(drives.format(20) + "print('another')\n")
+    replay, film = tmp_path / "run.json", tmp_path / "run.gif"
+    ran = robomark("run", one, "-b", "Loop", "--replay", replay, "--over", other, "--film", film)
+    assert ran.returncode == 0
+    assert "another" not in ran.stdout
+    (trial,) = json.loads(replay.read_text())["trials"]
+    assert trial["robots"][0]["start"] == trial["over"]["robots"][0]["start"]
+    assert (trial["over"]["name"], [event["text"] for event in trial["over"]["events"]]) == ("other.py", ["another"])
+    assert 0 < trial["over"]["parted"] < 1
+    assert film.read_bytes().startswith(b"GIF89a")
+    assert "expected --replay too" in robomark("run", one, "--over", other).stderr
+    notebook = tmp_path / "n.ipynb"
+    cell = {"cell_type": "code", "source": "x = 1", "metadata": {}}
+    notebook.write_text(json.dumps({"cells": [cell], "nbformat": 4}))
+    refused = robomark("run", one, "--replay", replay, "--over", notebook)
+    assert (refused.returncode, "n.ipynb is a notebook" in refused.stderr) == (2, True)
