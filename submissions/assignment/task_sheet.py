@@ -11,14 +11,7 @@ from decimal import Decimal
 
 from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SECOND_PROGRAM
-
-
-@dataclass(frozen=True, slots=True)
-class AskedFile:
-    """A file that a student is to submit, and what it is."""
-
-    name: str
-    what: str
+from submissions.bundle import PART_FILES
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +22,7 @@ class TaskSheet:
     title: str
     section: str
     description: str
-    asked: tuple[AskedFile, ...]
+    asked: tuple[str, ...]  # files, by name
     notebook: bool  # whether one notebook will do for all that is asked
     criteria: tuple[tuple[str, Decimal], ...]
     max_marks: Decimal  # of these
@@ -62,14 +55,9 @@ def task_sheet(assignment: Assignment) -> TaskSheet:
     )
 
 
-def _asked(assignment: Assignment) -> tuple[AskedFile, ...]:
+def _asked(assignment: Assignment) -> tuple[str, ...]:
     parts = assignment.parts
-    asked = []
-    if parts.program == "student":
-        asked.append(AskedFile("robot.py", "the robot program"))
-    if parts.second_program == "student":
-        asked.append(AskedFile(SECOND_PROGRAM, "the second robot's program"))
-    if parts.responder == "student":
-        asked.append(AskedFile("responder.py", "what answers its messages"))
-    asked += [AskedFile(f"{name}.py", "an agent") for name, who in parts.agents.items() if who == "student"]
-    return tuple(asked)
+    files = {PART_FILES["program"]: parts.program, SECOND_PROGRAM: parts.second_program}
+    files |= {PART_FILES["responder"]: parts.responder}
+    files |= {f"{name}.py": who for name, who in parts.agents.items()}
+    return tuple(name for name, who in files.items() if who == "student")

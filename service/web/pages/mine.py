@@ -107,8 +107,8 @@ def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[st
     """What a form carried: the files chosen, and each text under the name of the file that it stands for."""
     chosen = [SentFile(each.filename, each.file) for each in files if each.filename]
     typed = [
-        SentFile(asked.name, BytesIO(text.replace("\r\n", "\n").encode()))
-        for asked, text in zip(sheet.asked, texts, strict=False)
+        SentFile(name, BytesIO(text.replace("\r\n", "\n").encode()))
+        for name, text in zip(sheet.asked, texts, strict=False)
         if text.strip()
     ]
     return [*chosen, *typed]
