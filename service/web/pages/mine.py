@@ -19,6 +19,7 @@ from service import own_work
 from service.own_work import OwnSubmission
 from service.reports.readable import flowing
 from service.store import intake, open_assignments
+from service.trying import tryout_assignment
 from service.web.access import InCourse, Studying, enrolment_in, nothing_here
 from service.web.attachments import attachment
 from service.web.context import Context, WebContext
@@ -127,11 +128,13 @@ def _shown(
     request: Request, here: InCourse, context: WebContext, assignment: str, refused: _Refused | None
 ) -> Response:
     with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here, assignment))
+        seen = seen_assignment(session, here, assignment)
+        sheet = task_sheet(seen)
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
         attempts = own_work.own_submissions(session, enrolment_id, assignment)
         allowance = own_work.allowance(session, enrolment_id, assignment)
         prepared = open_assignments.of_course(session, here.course_id)
+    is_open = any(each.assignment == assignment and each.open for each in prepared)
     shown = page(
         request,
         here.reader,
@@ -143,7 +146,8 @@ def _shown(
         attempts=attempts,
         curve=curve(attempts),
         allowance=allowance,
-        is_open=any(each.assignment == assignment and each.open for each in prepared),
+        is_open=is_open,
+        can_try=is_open and tryout_assignment(seen) is not None,
         refused=refused,
     )
     shown.headers.update(refused.headers if refused else {})
