@@ -15,9 +15,11 @@ from service.plotting import own_floors
 from service.reports.faults import fault_groups
 from service.reports.readable import readable
 from service.reports.replay.document import packed, replay_of_grade
+from service.reports.replay.trial import moment_hash
 from service.reports.transcript import transcript
 from service.reports.view import student_view
 from service.reports.words import grade_words
+from sim.recorded import faults_of
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
@@ -88,6 +90,7 @@ def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, ob
 def _words(run: Grade, submission: Submission) -> dict[str, Any]:
     ended = grade_words(run)
     notes = (*run.notes, *(note for trial in run.trials for note in trial.recording.notes))
+    faults = [fault for trial in run.trials for fault in faults_of(trial.recording)]
     lines = [line for trial in run.trials for line in transcript(trial.recording)]
     return {
         "tone": ended.tone,
@@ -100,5 +103,6 @@ def _words(run: Grade, submission: Submission) -> dict[str, Any]:
             {"where": fault.where, "message": fault.message, "hint": fault.hint}
             for fault in fault_groups(run, submission)
         ],
+        "failed": moment_hash(1, faults[0].t) if faults else "",
         "notes": [readable(text, _LONGEST_LINE) for text in notes],
     }

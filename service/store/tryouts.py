@@ -27,6 +27,7 @@ MOST_AN_HOUR = 30
 #: A worker that dies with one loses nothing; the second death is taken to be the program's doing.
 MOST_ATTEMPTS = 2
 _KEPT = timedelta(days=1)
+_SILENT = "Whatever ran it fell silent twice; whoever runs the installation finds more in its log."
 _UNFINISHED = (TryoutState.QUEUED.value, TryoutState.RUNNING.value)
 
 
@@ -98,9 +99,6 @@ def claim(store: Store, lease_seconds: float) -> TryoutClaim | None:
         taken = update(Tryout).where(Tryout.id == found.id)
         session.execute(taken.values(state=TryoutState.RUNNING.value, **lease))
         return claimed
-
-
-_SILENT = "Whatever ran it fell silent twice; whoever runs the installation finds more in its log."
 
 
 def keep(store: Store, claimed: TryoutClaim, lease_seconds: float) -> bool:
