@@ -15,9 +15,11 @@ from service.settings import Settings
 from service.store import tryouts
 from service.store.engine import Store
 from service.store.tryouts import TryoutClaim
+from service.store.versions import assignment_from_bytes
 from service.trying import run_tryout, tryout_assignment
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recording import Verdict
+from submissions.bundle import unpack_submission
 
 _log = structlog.get_logger(__name__)
 
@@ -44,11 +46,12 @@ def try_next(store: Store, settings: Settings, runner: TrialRunner) -> bool:
 
 def _run(store: Store, settings: Settings, runner: TrialRunner, claimed: TryoutClaim) -> None:
     with store.reading() as session:
-        submission, assignment = tryouts.load(session, claimed.id)
+        packed, content = tryouts.kept(session, claimed.id)
+    assignment = assignment_from_bytes(content)
     once = tryout_assignment(assignment)
     if once is None:
         raise UsageError(f"{assignment.id} has nothing to try: no robot is run that you see.")
-    result = run_tryout(submission, once, runner, _LeaseOfTryout(store, settings, claimed))
+    result = run_tryout(unpack_submission(packed), once, runner, _LeaseOfTryout(store, settings, claimed))
     if result.verdict is Verdict.HOST_ERROR:
         raise HostError("a trial ended by a fault of the machine")
     tryouts.finish(store, claimed, result.words, result.replay)

@@ -15,12 +15,8 @@ from sqlalchemy.orm import Session
 from service.store.engine import Store, now
 from service.store.models import AssignmentVersion
 from service.store.states import TryoutState
-from service.store.versions import assignment_from_bytes
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
-from submissions.bundle import unpack_submission
-from submissions.submission import Submission
 
 #: What one student may try within an hour.
 MOST_AN_HOUR = 30
@@ -129,13 +125,13 @@ def due(store: Store) -> int:
         return session.scalar(select(func.count()).where(_due(now(session)))) or 0
 
 
-def load(session: Session, tryout_id: str) -> tuple[Submission, Assignment]:
-    """What is to be run, and in which assignment's world."""
-    kept = select(Tryout.packed, AssignmentVersion.content).join(
+def kept(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
+    """What is to be run, packed, and the assignment that it is run for, as ``versions`` keeps it."""
+    query = select(Tryout.packed, AssignmentVersion.content).join(
         AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id
     )
-    packed, content = session.execute(kept.where(Tryout.id == tryout_id)).one()
-    return unpack_submission(packed), assignment_from_bytes(content)
+    packed, content = session.execute(query.where(Tryout.id == tryout_id)).one()
+    return packed, content
 
 
 def newest(session: Session, enrolment_id: int, assignment: str) -> str | None:
@@ -175,11 +171,6 @@ def line(session: Session, enrolment_id: int, tryout_id: str) -> TryoutLine | No
 def replay_of(session: Session, tryout_id: str) -> bytes | None:
     """What the replay plays, compressed; None where there is nothing to play."""
     return session.scalar(select(Tryout.replay).where(Tryout.id == tryout_id))
-
-
-def source_of(session: Session, tryout_id: str) -> Submission:
-    """What was tried."""
-    return unpack_submission(session.scalars(select(Tryout.packed).where(Tryout.id == tryout_id)).one())
 
 
 def _due(at: datetime) -> ColumnElement[bool]:

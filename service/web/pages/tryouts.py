@@ -19,7 +19,7 @@ from service.web.rendering import page, wants_part
 from service.web.submitting import try_out
 from sim.errors import UsageError
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
-from submissions.bundle import PART_FILES
+from submissions.bundle import PART_FILES, unpack_submission
 from submissions.submission import Submission
 
 router = APIRouter()
@@ -74,7 +74,7 @@ def _shown(
         newest = tryouts.newest(session, enrolment_id, assignment)
         line = tryouts.line(session, enrolment_id, newest) if newest else None
         replay = tryouts.replay_of(session, newest) if newest else None
-        tried = tryouts.source_of(session, newest) if newest else None
+        tried = unpack_submission(tryouts.kept(session, newest)[0]) if newest else None
     sheet, once = task_sheet(seen), tryout_assignment(seen)
     shown = page(
         request,

@@ -13,7 +13,7 @@ from service.store.engine import Store, now
 from service.store.states import TryoutState
 from service.store.students import Students, course_of
 from service.store.tryouts import MOST_AN_HOUR, TryoutLine
-from service.store.versions import freeze, keep
+from service.store.versions import assignment_from_bytes, freeze, keep
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
 from submissions.bundle import pack_submission
@@ -57,8 +57,8 @@ def test_they_are_run_in_turn_and_each_student_sees_their_own(store: Store) -> N
     assert claimed is not None
     assert (claimed.id, tryouts.due(store)) == (first, 1)
     with store.reading() as session:
-        submission, assignment = tryouts.load(session, first)
-        assert (submission.sha256, assignment.id) == (grading_request().submission.sha256, echo().id)
+        packed, content = tryouts.kept(session, first)
+        assert (packed, assignment_from_bytes(content).id) == (PACKED, echo().id)
         assert tryouts.line(session, bob, first) is None
     assert tryouts.finish(store, claimed, {"happened": "it ran"}, b"replay")
     done = _line(store, ada, first)
