@@ -35,7 +35,7 @@ from service.store.states import JobState, PlotState, Standing
 from sim.errors import UsageError
 from sim.floors import names
 from sim.recording import Verdict
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
 from submissions.people import Refusal
 
 _INDEX = "index.html"

@@ -10,13 +10,16 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
-from service.similarity.pairs import Similarity
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
+
+if TYPE_CHECKING:
+    from service.similarity.pairs import Similarity
 
 #: What a student sees before anything is published.
 BEFORE_PUBLICATION = frozenset({"visible"})

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
+from service.commands.batch.words import remarks
 from service.commands.shown import table
-from service.store.policies import in_days
-from service.store.states import BatchState, JobState, Standing
+from service.store.states import JobState, Standing
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -21,23 +21,13 @@ if TYPE_CHECKING:
 
     from service.grading.ranks import RankTable
     from service.store.audit import AuditEntry
-    from service.store.batches import BatchLine, JobLine
+    from service.store.batches import JobLine
     from service.store.regrades import Change, CriterionChange
     from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
 )
-
-#: Students that a sentence names.
-_MOST_NAMED = 10
-
-
-def summary(line: BatchLine) -> str:
-    """How many jobs of a batch are in each state."""
-    parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
-    return held + (", ".join(parts) or "empty")
 
 
 def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> Table:
@@ -109,31 +99,6 @@ def history_table(history: Sequence[AuditEntry]) -> Table:
         when = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
         made.add_row(when, entry.actor, entry.action, detail)
     return made
-
-
-def remarks(line: JobLine) -> list[str]:
-    """What else is to be known of a grade, beside its marks."""
-    told = {
-        f"same as {line.copied_from}": line.copied_from is not None,
-        f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
-        f"staff only: {line.staff_only}": line.staff_only is not None,
-        f"no {line.missing}": bool(line.missing),
-        f"{line.unjudged} criteria not judged": line.unjudged > 0,
-        f"{line.surprises} trials that the log explains": line.surprises > 0,
-        "suspect": line.suspect is not None,
-        "published": line.published_at is not None,
-    }
-    return [remark for remark, holds in told.items() if holds]
-
-
-def unjudged_words(lines: Sequence[JobLine]) -> str:
-    """Whose grades lack the judgement of a criterion; empty where none does."""
-    students = [line.student for line in lines if line.unjudged]
-    if not students:
-        return ""
-    told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
-    whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
-    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
 
 
 def _worth_a_row(change: Change) -> bool:
