@@ -15,7 +15,7 @@ from service.store import audit
 from service.store.engine import Store
 from service.store.models import AssignmentVersion, Batch, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.states import UNFINISHED
-from service.store.web_tables import Appeal, Comment, Override
+from service.store.web_tables import Appeal, Comment, OpenAssignment, Override, Tryout
 
 _TEMPORARY = MetaData()
 #: Submissions and enrolments that go; there may be more of them than a statement takes as values.
@@ -90,9 +90,11 @@ def _remove(session: Session) -> None:
     session.execute(delete(Batch).where(~or_(*used), Batch.regrade_of.is_not(None)))
     regraded = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
     session.execute(delete(Batch).where(~or_(*used), Batch.id.not_in(regraded)))
-    session.execute(delete(AssignmentVersion).where(AssignmentVersion.id.not_in(select(Job.assignment_version_id))))
+    needed = (Job.assignment_version_id, OpenAssignment.assignment_version_id, Tryout.assignment_version_id)
+    session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(select(each)) for each in needed)))
     people = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_leaving))))
     session.execute(delete(Extension).where(Extension.enrolment_id.in_(_leaving)))
+    session.execute(delete(Tryout).where(Tryout.enrolment_id.in_(_leaving)))
     session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
     in_a_course = select(Enrolment.person_id)
     for start in range(0, len(people), _AT_ONCE):
