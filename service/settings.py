@@ -62,6 +62,10 @@ class Settings(BaseSettings):
     log_level: str = "WARNING"
     #: Where browsers find the web server, when others than this machine are to reach it.
     public_url: str = ""
+    #: How often a token may call the API; as often again at once, after a rest.
+    api_calls_per_minute: float = Field(default=600.0, ge=1, le=1_000_000)
+    #: Whether webhooks may lead to addresses of the own network, which else are refused.
+    webhooks_inside: bool = False
     #: Wins over the database's own; empty where there is none.
     secret: SecretStr = SecretStr("")
 

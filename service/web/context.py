@@ -10,6 +10,7 @@ from fastapi import Depends, Request
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
+from service.web.rate_limits import RateLimit
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,7 @@ class WebContext:
     settings: Settings
     store: Store
     notifier: Notifier
+    api_calls: RateLimit  # of each token
 
 
 def _context(request: Request) -> WebContext:
