@@ -39,6 +39,7 @@ class Accepted:
     """A submission that is now a job."""
 
     job_id: str
+    submission_id: int
     student: str
     attempt: int
     copied_from: str | None = None  # the identical grade that it has already
@@ -329,4 +330,4 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     )
     if source is not None:
         jobs.copy(session, job_id, source, at)
-    return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
+    return Accepted(job_id, row.id, submission.student, row.attempt, source, ruling.over)

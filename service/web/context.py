@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -21,6 +21,8 @@ class WebContext:
     store: Store
     notifier: Notifier
     api_calls: RateLimit  # of each token
+    #: How often one person may submit, whatever the course and the way.
+    submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
 
 
 def _context(request: Request) -> WebContext:
