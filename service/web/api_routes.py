@@ -6,10 +6,10 @@ What a route does is told in ``api/``; how the whole is described in ``api_descr
 from __future__ import annotations
 
 import base64
-import binascii
 import hashlib
 import json
 from collections.abc import Awaitable, Callable, Sequence
+from datetime import UTC, datetime
 from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import APIRouter, Query, Request
@@ -42,14 +42,15 @@ class Listed(BaseModel, Generic[_Item]):
     next: str | None = Field(description="Ask for `after=` this to have what follows; null at the end.", default=None)
 
 
-def page_of(found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int]]) -> Listed[_Item]:
+def page_of(found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]) -> Listed[_Item]:
     """The page of a list of which one more than ``limit`` was looked for; ``place`` says where in it something is."""
     more = len(found) > limit
     return Listed(items=list(found[:limit]), next=_cursor(place(found[limit - 1])) if more else None)
 
 
-def _cursor(place: Sequence[str | int]) -> str:
-    return base64.urlsafe_b64encode(json.dumps(list(place)).encode()).decode().rstrip("=")
+def _cursor(place: Sequence[str | int | datetime]) -> str:
+    told = [part.isoformat() if isinstance(part, datetime) else part for part in place]
+    return base64.urlsafe_b64encode(json.dumps(told).encode()).decode().rstrip("=")
 
 
 def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
@@ -58,11 +59,17 @@ def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
         return None
     try:
         place = json.loads(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
-        assert isinstance(place, list)
-        assert [type(part) for part in place] == list(kinds)
-    except (binascii.Error, ValueError, AssertionError):
+        return tuple(_part(part, kind) for part, kind in zip(place, kinds, strict=True))
+    except (ValueError, TypeError, OverflowError):
         raise HTTPException(422, "after: expected the `next` of the page before.") from None
-    return tuple(place)
+
+
+def _part(part: object, kind: type) -> object:
+    if kind is datetime and isinstance(part, str):
+        return datetime.fromisoformat(part).astimezone(UTC)
+    if type(part) is not kind or (isinstance(part, int) and not 0 <= part < 2**31):
+        raise TypeError(kind)
+    return part
 
 
 def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Response:

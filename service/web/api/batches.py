@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Depends, Query
 from pydantic import Field
 
-from service.batch_upload import upload_batch
 from service.grading.statistics import statistics_of
 from service.store import batch_control, batches, metrics, regrades
 from service.store.marked import marked
 from service.store.states import Role
 from service.web.access import RowName, batch_in
-from service.web.api.shapes import BatchShape, JobShape, RefusalShape, Shape, like
+from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
 from service.web.api_uploads import ZIP_BODY, Uploaded
+from service.web.batch_uploads import upload_batch
 from service.web.context import Context, WebContext
 
 router = api_router("batches")
@@ -80,7 +80,13 @@ class WholeBatchShape(BatchShape):
     statistics: list[StatisticsShape]
     unpublished_regrades: int
 
-    model_config = like()
+    model_config = like(
+        **BATCH_EXAMPLE,
+        progress={"jobs": 20, "ended": 18, "partial": 0.7, "plots_due": 3},
+        pace={"per_minute": 60, "left_seconds": 2},
+        statistics=[],
+        unpublished_regrades=0,
+    )
 
 
 class KnownShape(Shape):
@@ -136,12 +142,11 @@ class RetriedShape(Shape):
 @router.get("/courses/{course_id}/batches")
 def list_batches(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
     """The batches of the course, the newest first."""
-    place = place_after(after, float, str)
-    since = None if place is None else (_moment(place[0]), place[1])
+    place = place_after(after, datetime, str)
     with context.store.reading() as session:
-        found = batches.batches_of(session, here.course_id, limit + 1, since)
+        found = batches.batches_of(session, here.course_id, limit + 1, place and (place[0], place[1]))
     shown = [BatchShape.model_validate(line) for line in found]
-    return page_of(shown, limit, lambda each: [each.created_at.timestamp(), each.id])
+    return page_of(shown, limit, lambda each: [each.created_at, each.id])
 
 
 @router.post("/courses/{course_id}/batches", status_code=201, openapi_extra=ZIP_BODY)
@@ -156,7 +161,7 @@ def submit_batch(
     again: Annotated[bool, Query(description="Grade again what was submitted already.")] = False,
 ) -> TakenShape:
     """Hand over a zip with a submission for each student, as `robomark batch submit` takes it."""
-    taken = upload_batch(context.notifier, here.course_id, upload, name, assignment, again=again)
+    taken = upload_batch(context, here.course_id, upload, name, assignment, again=again)
     jobs = () if taken.accepted.batch is None else taken.accepted.batch.jobs
     return TakenShape(
         batch=None if taken.accepted.batch is None else taken.accepted.batch.id,

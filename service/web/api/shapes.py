@@ -5,7 +5,9 @@ What only one subject answers is told in its module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -22,6 +24,20 @@ class Shape(BaseModel):
 def like(**example: Any) -> ConfigDict:
     """A shape with an example."""
     return ConfigDict(from_attributes=True, json_schema_extra={"examples": [example]})
+
+
+BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
+    {
+        "id": "0c5w1r8zt3ye",
+        "name": "week one",
+        "state": "open",
+        "created_at": "2026-11-02T09:00:00Z",
+        "jobs": 20,
+        "states": {"done": 18, "running": 2},
+        "refusals": [{"source": "bob", "sentence": "bob: holds no robot program.", "assignment": "shape-recognition"}],
+        "regrade_of": None,
+    }
+)
 
 
 class CourseShape(Shape):
@@ -104,16 +120,7 @@ class BatchShape(Shape):
     refusals: list[RefusalShape]
     regrade_of: str | None = Field(description="The batch whose submissions these are.")
 
-    model_config = like(
-        id="0c5w1r8zt3ye",
-        name="week one",
-        state="open",
-        created_at="2026-11-02T09:00:00Z",
-        jobs=20,
-        states={"done": 18, "running": 2},
-        refusals=[{"source": "bob", "sentence": "bob: holds no robot program.", "assignment": "shape-recognition"}],
-        regrade_of=None,
-    )
+    model_config = like(**BATCH_EXAMPLE)
 
 
 class CriterionShape(Shape):
