@@ -1,0 +1,62 @@
+"""The jobs that could not be graded, for whoever runs the installation. Only reads; retrying is ``batch_control``'s."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from service.store.models import Batch, Course, Enrolment, Job
+from service.store.states import JobState, Lane
+
+#: The newest that are listed.
+MOST = 100
+
+
+@dataclass(frozen=True, slots=True)
+class DeadLetter:
+    """One job that was given up."""
+
+    job_id: str
+    course: str
+    batch_id: str | None
+    batch: str  # its name
+    lane: Lane
+    error: str
+    attempts: int
+    worker: str
+    finished_at: datetime | None
+
+
+def dead_letters(session: Session) -> list[DeadLetter]:
+    """The newest of them first."""
+    query = (
+        select(Job, Course.name, Batch.name)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(Course, Enrolment.course_id == Course.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(Job.state == JobState.DEAD)
+        .order_by(Job.finished_at.desc(), Job.id)
+        .limit(MOST)
+    )
+    return [
+        DeadLetter(
+            job.id,
+            course,
+            job.batch_id,
+            batch or "",
+            job.lane,
+            job.error or "",
+            job.attempt,
+            job.worker or "",
+            job.finished_at,
+        )
+        for job, course, batch in session.execute(query)
+    ]
+
+
+def count(session: Session) -> int:
+    """How many there are."""
+    return session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.DEAD)) or 0
