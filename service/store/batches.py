@@ -36,6 +36,7 @@ class JobLine:
     """One job, as a table shows it."""
 
     id: str
+    submission_id: int
     student: str
     name: str  # the student's
     email: str
@@ -127,12 +128,10 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     return _batch_lines(session, [row])[0]
 
 
-def job_lines(
-    session: Session, batch_id: str, limit: int | None = None, after: tuple[str, str] | None = None
-) -> list[JobLine]:
+def job_lines(session: Session, batch_id: str, limit: int | None = None, after: str | None = None) -> list[JobLine]:
     """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs.
 
-    Where only some are wanted, those that follow on this student and id.
+    Where only some are wanted, those that follow on the job of this id.
     """
     which: tuple[ColumnElement[bool], ...]
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
@@ -142,7 +141,8 @@ def job_lines(
         which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
     query = _job_lines().where(*which).order_by(Enrolment.student, Job.id).limit(limit)
     if after is not None:
-        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(*after))
+        own = select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == after)
+        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(own.scalar_subquery(), after))
     return [_line(row) for row in session.execute(query)]
 
 
@@ -247,6 +247,7 @@ def _line(
     job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
     return JobLine(
         id=job.id,
+        submission_id=job.submission_id,
         student=student,
         name=name,
         email=email or "",

@@ -1,4 +1,4 @@
-"""What was answered to requests that had a key, so that the same request again is answered the same and changes nothing.
+"""What was answered to requests that had a key, so that the same again is answered the same and changes nothing.
 
 Which requests have keys, and what they are alike in, is the web's to say.
 """
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 from sqlalchemy import delete, select, update
-from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now
 from service.store.inserting import insert_if_new

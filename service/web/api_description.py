@@ -16,8 +16,8 @@ from service.web.security import LARGEST_BODY
 _ABOUT = f"""
 Everything that the pages do, for programs.
 
-**Sign in** with a token of `/account` or of `robomark user token`: `Authorization: Bearer rmt_...`. A token does what its
-owner may do, and of that what its scopes name. What somebody may not see answers 404, as what there is not.
+**Sign in** with a token of `/account` or of `robomark user token`: `Authorization: Bearer rmt_...`. A token does what
+its owner may do, and of that what its scopes name. What somebody may not see answers 404, as what there is not.
 
 **Ask again** without harm: a POST with an `Idempotency-Key` is done once, and answered the same for 24 hours.
 

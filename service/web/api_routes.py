@@ -42,7 +42,9 @@ class Listed(BaseModel, Generic[_Item]):
     next: str | None = Field(description="Ask for `after=` this to have what follows; null at the end.", default=None)
 
 
-def page_of(found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]) -> Listed[_Item]:
+def page_of(
+    found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]
+) -> Listed[_Item]:
     """The page of a list of which one more than ``limit`` was looked for; ``place`` says where in it something is."""
     more = len(found) > limit
     return Listed(items=list(found[:limit]), next=_cursor(place(found[limit - 1])) if more else None)

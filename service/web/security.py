@@ -94,7 +94,6 @@ def _counted(receive: Receive) -> Receive:
     return counted
 
 
-
 def _too_much(path: str) -> Response:
     error = TooMuch()
     if path.startswith(API):

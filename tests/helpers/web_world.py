@@ -37,6 +37,7 @@ def make_world(web: Web) -> World:
         "job_id": batch.jobs[0].job_id,
         "submission_id": "1",
         "assignment": "echo-responder",
+        "enrolment_id": str(ada.enrolment_id),
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,

@@ -9,10 +9,11 @@ from fastapi import Depends, Query
 from pydantic import Field
 
 from service.grading.statistics import statistics_of
-from service.store import batch_control, batches, metrics, regrades
+from service.store import batch_control, batches, metrics, open_assignments, regrades
 from service.store.marked import marked
-from service.store.states import Role
+from service.store.states import Lane, Role
 from service.web.access import RowName, batch_in
+from service.web.api.grades import nameless
 from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
@@ -116,7 +117,12 @@ class TakenShape(Shape):
     refusals: list[RefusalShape]
 
     model_config = like(
-        batch="0c5w1r8zt3ye", queued=19, copied=1, known=[], for_staff=[], refusals=[{"source": "bob", "sentence": "..."}]
+        batch="0c5w1r8zt3ye",
+        queued=19,
+        copied=1,
+        known=[],
+        for_staff=[],
+        refusals=[],
     )
 
 
@@ -144,7 +150,7 @@ def list_batches(here: Reads, context: Context, limit: Limit = 50, after: After 
     """The batches of the course, the newest first."""
     place = place_after(after, datetime, str)
     with context.store.reading() as session:
-        found = batches.batches_of(session, here.course_id, limit + 1, place and (place[0], place[1]))
+        found = batches.batches_of(session, here.course_id, limit + 1, (place[0], place[1]) if place else None)
     shown = [BatchShape.model_validate(line) for line in found]
     return page_of(shown, limit, lambda each: [each.created_at, each.id])
 
@@ -180,11 +186,15 @@ def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchSha
         batch_in(session, here.course_id, batch_id)
         line = batches.batch(session, batch_id)
         pace = metrics.pace(session, batch_id)
-        statistics = statistics_of(marked(session, batches.job_lines(session, batch_id)))
+        hidden = open_assignments.with_names_hidden(session, here.course_id)
+        lines = [nameless(each, hidden) for each in batches.job_lines(session, batch_id)]
+        statistics = statistics_of(marked(session, lines))
         return WholeBatchShape(
             **BatchShape.model_validate(line).model_dump(),
             progress=ProgressShape.model_validate(batches.progress(session, batch_id)),
-            pace=pace and PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
+            pace=None
+            if pace is None
+            else PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
             statistics=[StatisticsShape.model_validate(each) for each in statistics],
             unpublished_regrades=0 if line.regrade_of else regrades.unpublished_regrades(session, batch_id),
         )
@@ -195,11 +205,13 @@ def batch_grades(
     here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[JobShape]:
     """The submissions of a batch, by student, each with the grade that stands or why it has none."""
-    place = place_after(after, str, str)
+    place = place_after(after, str)
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
-        found = batches.job_lines(session, batch_id, limit + 1, place and (place[0], place[1]))
-    return page_of([JobShape.model_validate(line) for line in found], limit, lambda each: [each.student, each.id])
+        found = batches.job_lines(session, batch_id, limit + 1, place[0] if place else None)
+        hidden = open_assignments.with_names_hidden(session, here.course_id)
+    page = page_of(found, limit, lambda each: [each.id])
+    return Listed(items=[JobShape.model_validate(nameless(each, hidden)) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")
@@ -227,7 +239,9 @@ def cancel(here: Submits, context: Context, batch_id: RowName) -> ControlledShap
 def retry(here: Submits, context: Context, batch_id: RowName) -> RetriedShape:
     """Queue again what of a batch could not be graded."""
     _look_for(context, here, batch_id)
-    return RetriedShape.model_validate(batch_control.retry(context.store, batch_id, actor=here.actor))
+    retried = batch_control.retry(context.store, batch_id, actor=here.actor)
+    context.notifier.grade(Lane.BATCH, retried.queued)
+    return RetriedShape.model_validate(retried)
 
 
 def _look_for(context: WebContext, here: CallerInCourse, batch_id: str) -> None:
