@@ -92,5 +92,5 @@ def _complete(method: str, operation: dict[str, Any]) -> None:
     content = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     for status, sentence in sentences.items():
         operation["responses"][status] = {"description": sentence, "content": content}
-    if method == "post":
+    if method == "post" and not operation.pop("x-no-key", False):
         operation.setdefault("parameters", []).append(_KEY)

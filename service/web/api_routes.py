@@ -8,8 +8,9 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from types import MappingProxyType
 from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import APIRouter, Query, Request
@@ -27,6 +28,8 @@ from service.web.context import WebContext
 
 KEY_HEADER = "idempotency-key"
 LONGEST_KEY = 200
+#: For a route that takes no key: it changes nothing, or answers a secret that is to be kept nowhere.
+NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
 
 Limit = Annotated[int, Query(ge=1, le=200, description="How many at most.")]
@@ -93,7 +96,7 @@ class RepeatableRoute(APIRoute):
 
         async def handler(request: Request) -> Response:
             key = request.headers.get(KEY_HEADER)
-            if key is None or request.method != "POST":
+            if key is None or request.method != "POST" or NO_KEY.keys() <= (self.openapi_extra or {}).keys():
                 return await run(request)
             return await _once(request, key, run)
 

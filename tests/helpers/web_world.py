@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import report_builders
 from builders import grading_request
-from service.store import credentials, intake, jobs, results
+from service.store import credentials, intake, jobs, results, webhooks
 from service.store.people import Member
 from service.web.rendering import statics
 from web import COURSE, Web
@@ -31,6 +31,8 @@ def make_world(web: Web) -> World:
     web.token(ada, "read")
     with web.store.reading() as session:
         (token,) = credentials.tokens(session, ada.person_id)
+    with web.store.transaction() as session:
+        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"], "grace")
     values = {
         "course_id": "1",
         "batch_id": batch.id,
@@ -41,6 +43,7 @@ def make_world(web: Web) -> World:
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "webhook_id": hook.id,
     }
     return World(ada, grace, values)
 

@@ -19,7 +19,7 @@ from service.store.versions import check_assignment
 from service.web.access import RowNumber, member_in
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context
 from sim.errors import UsageError
 from submissions.people import Student
@@ -142,7 +142,7 @@ def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
     return EnrolledShape(students=len(asked.students))
 
 
-@router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra={"x-no-key": True})
+@router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
 def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
     """A new link that signs a student of the course in once; instructors have theirs from whoever runs it all."""
     with context.store.transaction() as session:

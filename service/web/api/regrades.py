@@ -19,7 +19,7 @@ from service.web.access import RowName, batch_in
 from service.web.api.grades import nameless
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
 from service.web.batch_uploads import assignment_of
 from service.web.context import Context, WebContext
 
@@ -31,7 +31,7 @@ _LONGEST_WORKSHEET = 10 * 2**20
 _FILE: dict[int | str, dict[str, Any]] = {
     200: {"description": "The file.", "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}}}
 }
-_CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}}, "x-no-key": True}
+_CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}}, **NO_KEY}
 Form = Annotated[
     str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
 ]
