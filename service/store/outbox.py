@@ -118,8 +118,9 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
         )
         claimed = []
         for delivery, hook in session.execute(query):
-            delivery.attempts += 1
-            delivery.due_at = at + _LEASE
+            attempt = delivery.attempts + 1
+            mine = Delivery.id == delivery.id
+            session.execute(update(Delivery).where(mine).values(attempts=attempt, due_at=at + _LEASE))
             claimed.append(
                 ClaimedDelivery(
                     delivery.id,
@@ -128,7 +129,7 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
                     delivery.event,
                     delivery.payload,
                     delivery.made_at,
-                    delivery.attempts,
+                    attempt,
                 )
             )
         return claimed

@@ -47,7 +47,7 @@ class OpenShape(Shape):
         title="Shape recognition",
         max_marks=12,
         open=True,
-        limits={"due_at": None, "closed_at": None, "late_days": 0, "attempts": None, "cool_down_seconds": 0},
+        limits=LimitsShape(due_at=None, closed_at=None, late_days=0, attempts=None, cool_down_seconds=0).model_dump(),
     )
 
 
