@@ -6,7 +6,7 @@ Sending is the web server's, which addresses there are ``webhooks.py``'s. Where 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
@@ -156,7 +156,7 @@ def _grade_finished(session: Session, hooks: Sequence[Webhook], job_id: str) -> 
     query = select(Job.batch_id, Job.standing, SubmissionRow.id, SubmissionRow.assignment, SubmissionRow.attempt)
     found = session.execute(query.join(SubmissionRow, Job.submission_id == SubmissionRow.id).where(Job.id == job_id))
     batch_id, standing, submission_id, assignment, attempt = found.one()
-    told = {"job": job_id, "batch": batch_id, "standing": standing.value}
+    told: dict[str, object] = {"job": job_id, "batch": batch_id, "standing": standing.value}
     told |= {"submission": submission_id, "assignment": assignment, "attempt": attempt}
     _tell(session, hooks, WebhookEvent.GRADE_FINISHED, told)
 
@@ -188,9 +188,9 @@ def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | Non
         _tell(session, hooks, WebhookEvent.BATCH_FINISHED, told)
 
 
-def _tell(session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: dict[str, Any]) -> None:
+def _tell(session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: Mapping[str, object]) -> None:
     for hook in hooks:
         if event.value in hook.events:
             at = now(session)
-            payload = {"course": hook.course_id, "data": told}
+            payload = {"course": hook.course_id, "data": dict(told)}
             session.add(Delivery(webhook_id=hook.id, event=event.value, payload=payload, made_at=at, due_at=at))

@@ -40,6 +40,7 @@ def make_world(web: Web) -> World:
         "submission_id": "1",
         "assignment": "echo-responder",
         "enrolment_id": str(ada.enrolment_id),
+        "student_id": str(web.student("leaver").enrolment_id),
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
