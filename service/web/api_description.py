@@ -83,6 +83,10 @@ def described(app: FastAPI) -> dict[str, Any]:
         for operations in found["paths"].values():
             for method, operation in operations.items():
                 _complete(method, operation)
+        for schema in schemas.values():
+            # FastAPI leaves out what is null, of examples too.
+            for example in schema.get("examples", ()):
+                example.update({name: None for name in schema.get("required", ()) if name not in example})
         app.openapi_schema = found
     return app.openapi_schema
 

@@ -20,7 +20,7 @@ from service.store.states import JobState, Role, Standing
 from service.web.access import RowNumber, enrolment_in, nothing_here, own_submission
 from service.web.api.grades import HTML, REPLAY, ZIP, grade_answer, packed_answer, replay_answer
 from service.web.api.people import LimitsShape
-from service.web.api.shapes import GradeShape, Shape, like
+from service.web.api.shapes import GradeShape, Shape, example_of, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after, tagged
 from service.web.api_uploads import SENT_BODY, Sent
@@ -47,7 +47,7 @@ class OpenShape(Shape):
         title="Shape recognition",
         max_marks=12,
         open=True,
-        limits=LimitsShape(due_at=None, closed_at=None, late_days=0, attempts=None, cool_down_seconds=0).model_dump(),
+        limits=example_of(LimitsShape),
     )
 
 

@@ -40,6 +40,12 @@ BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
 )
 
 
+def example_of(shape: type[Shape]) -> Any:
+    """The example that a shape has."""
+    extra: Any = shape.model_config["json_schema_extra"]
+    return extra["examples"][0]
+
+
 class CourseShape(Shape):
     """A course, and what the token's owner is in it."""
 
