@@ -17,14 +17,25 @@ from service.plotting import draw, own_floors
 from service.reports.html import BatchRow, ReportParts, batch_index, refusal_page, report, report_parts
 from service.reports.replay.document import Pixels, replay_of_grade
 from service.reports.rows import ReportPage, missing_words
-from service.reports.view import View, staff_view, student_view
-from service.reports.written import file_stems, refused_stems, write_page, write_replay
+from service.reports.view import (
+    NO_OTHERS,
+    OtherTrials,
+    View,
+    other_trials,
+    scenarios,
+    staff_view,
+    student_view,
+    worst_trial,
+)
+from service.reports.written import file_stems, refused_stems, write_film, write_page, write_replay
 from service.store import intake, plots, policies, rankings, results
 from service.store.batches import JobLine
 from service.store.engine import Store
-from service.store.states import PlotState
+from service.store.states import JobState, PlotState, Standing
+from sim.errors import UsageError
 from sim.floors import names
 from sim.recording import Verdict
+from submissions.assignment.folder import REFERENCE
 from submissions.people import Refusal
 from submissions.submission import Submission
 
@@ -39,19 +50,44 @@ class Written:
     plots: Mapping[str, bytes]
 
 
-def write_report(store: Store, line: JobLine, grade: Grade, folder: Path, stem: str) -> Written:
-    """The page of one graded job, called by ``stem``. Raises UsageError when the folder cannot be written to."""
-    html, drawn = _page(store, line, grade)
+def write_report(
+    store: Store, line: JobLine, grade: Grade, folder: Path, stem: str, over: JobLine | None = None
+) -> Written:
+    """The page of one graded job, called by ``stem``; its replay has the trials of ``over`` over its own.
+
+    Raises UsageError when the folder cannot be written to, and where the reader may not see them.
+    """
+    html, drawn = _page(store, line, grade, over)
     return Written(write_page(folder, f"{stem}.html", html), drawn)
 
 
-def write_grade_replay(store: Store, line: JobLine, grade: Grade, path: Path) -> None:
-    """All trials of one graded job that its report may show. Raises UsageError when the file cannot be written."""
+def write_grade_replay(store: Store, line: JobLine, grade: Grade, path: Path, over: JobLine | None = None) -> None:
+    """All trials of one graded job that its report may show, with those of ``over`` over them.
+
+    Raises UsageError when the file cannot be written, and where the reader may not see them.
+    """
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         floors = own_floors(intake.load_assignment(session, line.id))
         view = _view(session, line, grade)
-    write_replay(path, replay_of_grade(view, submission, floors))
+        others = _others(session, line, view, over)
+    write_replay(path, replay_of_grade(view, submission, floors, others=others))
+
+
+def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, number: int | None) -> None:
+    """One trial that the report of a graded job may show, by its number there; without one, the one it opens with.
+
+    Raises UsageError when there is none, and when the file cannot be written.
+    """
+    with store.reading() as session:
+        floors = own_floors(intake.load_assignment(session, line.id))
+        seen = _view(session, line, grade).grade
+    if not seen.trials:
+        raise UsageError(f"{line.id} has no trial that may be shown, so no film")
+    if number is not None and not 1 <= number <= len(seen.trials):
+        raise UsageError(f"--trial {number}: expected 1 to {len(seen.trials)}, as the replay numbers them")
+    index = worst_trial(seen, scenarios(seen)[0]) if number is None else number - 1
+    write_film(path, seen.trials[index], floors)
 
 
 def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal]) -> Iterator[ReportPage]:
@@ -128,20 +164,48 @@ def _kept(store: Store, line: JobLine, view: View) -> tuple[Mapping[str, bytes],
     return drawn, submission, floors
 
 
-def _page(store: Store, line: JobLine, grade: Grade) -> tuple[str, Mapping[str, bytes]]:
+def _page(store: Store, line: JobLine, grade: Grade, over: JobLine | None = None) -> tuple[str, Mapping[str, bytes]]:
     """The page of one graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         view = _view(session, line, grade)
+        others = _others(session, line, view, over)
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
         built_in = {trial.recording.background for trial in grade.trials} <= set(names())
         assignment = None if drawn is not None and built_in else intake.load_assignment(session, line.id)
     if drawn is None and assignment is not None:
         drawn = draw(grade, assignment, submission)
     found = drawn or {}
-    return report(view, found, submission, own_floors(assignment) if assignment is not None else {}), found
+    floors = own_floors(assignment) if assignment is not None else {}
+    return report(view, found, submission, floors, others), found
 
 
 def _view(session: Session, line: JobLine, grade: Grade) -> View:
     """What the reader of the job's report may see."""
     return student_view(grade, policies.released(session, line.id)) if line.staff_only is None else staff_view(grade)
+
+
+def _others(session: Session, line: JobLine, view: View, over: JobLine | None) -> OtherTrials:
+    """The trials of ``over`` as far as the reader of the view may see them."""
+    if over is None:
+        return NO_OTHERS
+    reason = why_not_shown(over)
+    if not reason and over.standing is Standing.PROPOSED:
+        reason = "a regrade that is not published"
+    if reason and (over.state is not JobState.DONE or not view.staff):
+        raise UsageError(f"{over.id} cannot be shown over {line.id}: {reason}")
+    try:
+        return other_trials(
+            view, results.load(session, over.id), _called(over, line), policies.released(session, line.id)
+        )
+    except UsageError as error:
+        raise UsageError(f"{over.id} cannot be shown over {line.id}: {error}") from None
+
+
+def _called(over: JobLine, line: JobLine) -> str:
+    """What the other trials are called beside those of ``line``."""
+    if over.student == REFERENCE:
+        return "the reference"
+    if over.student != line.student:
+        return over.student
+    return f"attempt {over.attempt}" + (f", grade {over.id}" if over.attempt == line.attempt else "")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from service.commands import channel_flags
+from service.commands.film_option import FilmOption
 from sim.errors import UsageError
 
 RESPONDER_CPU = 10.0
@@ -70,6 +71,11 @@ def run(
     replay: Annotated[
         Path | None, typer.Option(help="Write a page that plays the run to this file; its data if it is a .json.")
     ] = None,
+    over: Annotated[
+        Path | None,
+        typer.Option(help="Run this program too, in the same world, and draw it over the first in --replay."),
+    ] = None,
+    film: FilmOption = None,
     trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None,
     image: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None,
     diagrams: Annotated[
@@ -82,6 +88,8 @@ def run(
     """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
     if image is not None and image.suffix.lower() != ".png":
         raise UsageError(f"--picture {image}: expected a name that ends in .png")
+    if over is not None and replay is None:
+        raise UsageError("--over draws over what a replay shows; expected --replay too")
     values = {
         "b": background,
         "r": robot_setup,
@@ -121,6 +129,8 @@ def run(
         seed=seed,
         sheet=sheet,
         replay=replay,
+        over=over,
+        film=film,
         trace_file=trace_file,
         image=image,
         diagrams=diagrams,

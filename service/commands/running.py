@@ -32,11 +32,12 @@ from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
-from service.reports.replay.document import replay_of_run
+from service.reports.replay.document import Pixels, replay_of_run
 from service.reports.replay.sources import Sources, sources_of_cells, sources_of_files
 from service.reports.robots import robots_of
 from service.reports.trace import storable, trace
-from service.reports.written import prepare_folder, write_replay
+from service.reports.view import NO_OTHERS, OtherTrials
+from service.reports.written import prepare_folder, write_film, write_replay
 from sim.errors import UsageError
 from sim.floors import Floor, floor, floor_from_image, names
 from sim.recorded import faults_of, floor_of
@@ -72,6 +73,8 @@ def run_program(
     seed: int,
     sheet: int | None,
     replay: Path | None,
+    over: Path | None,
+    film: Path | None,
     trace_file: Path | None,
     image: Path | None,
     diagrams: Path | None,
@@ -94,6 +97,8 @@ def run_program(
             raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
         if second is not None:
             raise UsageError(f"{program.name} is a notebook and starts its robots itself; leave --second out")
+        if over is not None:
+            raise UsageError(f"{program.name} is a notebook, which no other program is run over; leave --over out")
         last = LastRun(wanted, seed, seed if sheet is None else sheet, channel, own)
         limits = RunLimits(allowed, _PROGRAM, _OUTPUT_BYTES, seconds)
         with TrialRunner(NONE if unsafe else FULL) as runner:
@@ -105,7 +110,7 @@ def run_program(
         show_diagrams(notebook, diagrams)
         if executed.runs:
             recording = executed.runs[-1].recording
-            _keep(recording, program.name, seed, trace_file, image, own)
+            _keep(recording, program.name, seed, trace_file, image, film, own)
             _keep_replay(replay, recording, program.name, seed, sources_of_cells(notebook), own)
         return
     if diagrams is not None:
@@ -115,9 +120,7 @@ def run_program(
     flags = flags if own is None else flags.without("b")
     chosen = setup(flags)
     spec = TrialSpec(
-        program=ProgramSpec(
-            Code(program.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES, _modules_beside(program, text)
-        ),
+        program=_program_spec(program, flags, text),
         responder=_responder(responder, allowed),
         collaborative=chosen.collaborative or responder is not None or second is not None,
         floor=own or floor(chosen.background, seed=seed if sheet is None else sheet),
@@ -131,15 +134,31 @@ def run_program(
         pen_down=chosen.pen_down,
         partner=_partner(second),
     )
+    other = None if over is None else _other_program(over)
     for each in chosen.notes:
         note(f"note: {each}")
     with TrialRunner(NONE if unsafe else FULL) as runner:
         recording = runner.run(spec, chosen.obstacles, meter)
+        others = NO_OTHERS
+        if other is not None:
+            beside = runner.run(replace(spec, program=other), chosen.obstacles, meter)
+            others = OtherTrials(other.code.name, {0: _as_trial(beside, seed)})
     document(run=_told(recording), notes=chosen.notes)
     _show(recording)
-    _keep(recording, program.name, seed, trace_file, image, own)
+    _keep(recording, program.name, seed, trace_file, image, film, own)
     answering = None if spec.responder is None else spec.responder.code
-    _keep_replay(replay, recording, program.name, seed, sources_of_files(spec.program.code, answering), own)
+    _keep_replay(replay, recording, program.name, seed, sources_of_files(spec.program.code, answering), own, others)
+
+
+def _other_program(path: Path) -> ProgramSpec:
+    """A program that is run in the first one's world, whatever its own first line says of one."""
+    if _notebook(path) is not None:
+        raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
+    return _program_spec(path, *_program(path))
+
+
+def _program_spec(path: Path, flags: Flags, text: str) -> ProgramSpec:
+    return ProgramSpec(Code(path.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES, _modules_beside(path, text))
 
 
 def _partner(second: Path | None) -> PartnerSpec | None:
@@ -163,20 +182,41 @@ def _own_floor(background: str | None) -> Floor | None:
 
 
 def _keep(
-    recording: Recording, name: str, seed: int, trace_file: Path | None, image: Path | None, own: Floor | None
+    recording: Recording,
+    name: str,
+    seed: int,
+    trace_file: Path | None,
+    image: Path | None,
+    film: Path | None,
+    own: Floor | None,
 ) -> None:
     if trace_file is not None:
         _write(trace_file, json.dumps(trace(recording)).encode())
     if image is not None:
         _write(image, _drawn(recording, name, seed, own))
+    if film is not None:
+        write_film(film, _as_trial(recording, seed), _own_pixels(own))
 
 
 def _keep_replay(
-    path: Path | None, recording: Recording, name: str, seed: int, sources: Sources, own: Floor | None
+    path: Path | None,
+    recording: Recording,
+    name: str,
+    seed: int,
+    sources: Sources,
+    own: Floor | None,
+    others: OtherTrials = NO_OTHERS,
 ) -> None:
     if path is not None:
-        floors = {} if own is None else {own.name: own.pixels}
-        write_replay(path, replay_of_run(recording, name, seed, sources, floors))
+        write_replay(path, replay_of_run(recording, name, seed, sources, _own_pixels(own), others))
+
+
+def _own_pixels(own: Floor | None) -> dict[str, Pixels]:
+    return {} if own is None else {own.name: own.pixels}
+
+
+def _as_trial(recording: Recording, seed: int) -> TrialResult:
+    return TrialResult("run", 0, seed, 0, 0, "visible", recording)
 
 
 def _notebook(path: Path) -> Notebook | None:
@@ -305,6 +345,5 @@ def _told(recording: Recording) -> dict[str, Any]:
 
 
 def _drawn(recording: Recording, name: str, seed: int, own: Floor | None) -> bytes:
-    trial = TrialResult("run", 0, seed, 0, 0, "visible", recording)
     driven_on = own if own is not None and own.name == recording.background else floor_of(recording)
-    return png(draw_path(trial, name, driven_on.pixels if driven_on else None))
+    return png(draw_path(_as_trial(recording, seed), name, driven_on.pixels if driven_on else None))

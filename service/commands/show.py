@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from sqlalchemy.orm import Session
 
-from service.commands.batch.tables import remarks
+from service.commands.batch.words import remarks
+from service.commands.film_option import FilmOption
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
 from service.settings import load_settings
@@ -15,6 +17,10 @@ from service.store import batches
 from service.store.batches import JobLine
 from service.store.engine import open_store
 from service.store.states import JobState
+from sim.errors import UsageError
+
+#: No id begins so: none has an o.
+_BEFORE = "before"
 
 
 def show(
@@ -27,21 +33,35 @@ def show(
         Path | None,
         typer.Option("--replay", help="Write a page that plays its trials to this file; their data if it is a .json."),
     ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            help="Lay the trials of this grade over them there: an earlier one of the same student "
+            f"('{_BEFORE}': the last), or the reference's."
+        ),
+    ] = None,
+    film: FilmOption = None,
+    trial: Annotated[
+        int | None, typer.Option(help="Which trial the film shows, as the replay numbers them; else its first.")
+    ] = None,
 ) -> None:
     """A grade that is stored: its marks and what they rest on."""
+    if over is not None and output is None and replay is None:
+        raise UsageError("--over lays trials over those of a replay; expected --replay or --output too")
+    if trial is not None and film is None:
+        raise UsageError("--trial says which trial a film shows; expected --film too")
     with open_store(load_settings()) as store:
         with store.reading() as session:
             line = batches.job_line(session, batches.find_job(session, grade))
+            others = None if over is None else batches.job_line(session, _over(session, over, line))
         if line.state is not JobState.DONE:
             document(job=line, grade=None)
             tell(_not_graded(line))
             return
-        # A stored grade has its recordings, and a report its plots: they take longer to load than to ask for a grade.
-        from service.report_files import write_grade_replay, write_report
+        # A stored grade has its recordings, which take longer to load than to find that there is none.
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
-        from service.reports.written import file_stem
         from service.store import results
 
         with store.reading() as session:
@@ -50,18 +70,31 @@ def show(
         tell(plain_text(staff_view(graded)).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
+        if replay is None and film is None and output is None:
+            return
+        # A page draws plots that are not there yet.
+        from service.report_files import write_grade_film, write_grade_replay, write_report
+        from service.reports.written import file_stem
+
         if replay is not None:
-            write_grade_replay(store, line, graded, replay)
+            write_grade_replay(store, line, graded, replay, others)
             note(f"replay: {replay}")
+        if film is not None:
+            write_grade_film(store, line, graded, film, trial)
+            note(f"film: {film}")
         if output is None:
             return
-        written = write_report(store, line, graded, output, file_stem(line.student))
+        written = write_report(store, line, graded, output, file_stem(line.student), others)
         note(f"report: {written.path}")
         for name, data in written.plots.items():
             path = output / f"{line.id}-plot-{name}.png"
             with for_the_user():
                 path.write_bytes(data)
             note(f"plot: {path}")
+
+
+def _over(session: Session, over: str, line: JobLine) -> str:
+    return batches.job_before(session, line.id) if over == _BEFORE else batches.find_job(session, over)
 
 
 def _not_graded(line: JobLine) -> str:

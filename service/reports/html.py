@@ -27,7 +27,7 @@ from service.reports.page import page_of
 from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
 from service.reports.rows import TableRow
-from service.reports.view import View
+from service.reports.view import NO_OTHERS, OtherTrials, View
 from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
@@ -87,14 +87,15 @@ def report_parts(
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
+    others: OtherTrials = NO_OTHERS,
 ) -> ReportParts:
     """One grade, with its replay, and with the student's source if the submission is given.
 
     ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
-    built in, by name.
+    built in, by name; ``others`` lie over the trials in the replay.
     """
     images = {name: _data_uri(data) for name, data in plots.items()}
-    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES) if view.grade.trials else None
+    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
     played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
     body = _environment().get_template("report_body.html")
     told = body.render(
@@ -123,9 +124,10 @@ def report(
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
+    others: OtherTrials = NO_OTHERS,
 ) -> str:
     """The page of one grade: its parts in one file."""
-    parts = report_parts(view, plots, submission, own_floors)
+    parts = report_parts(view, plots, submission, own_floors, others)
     script = parts.script if view.grade.trials else ""
     return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body})
 

@@ -12,8 +12,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from service.grading.grade import Grade
+import numpy as np
+from numpy.typing import NDArray
+
+from service.grading.grade import Grade, TrialResult
 from service.home import for_the_user
+from service.reports.film import film
 from service.reports.html import replay_page, report
 from service.reports.plots.drawn import draw_all
 from service.reports.view import student_view
@@ -78,6 +82,11 @@ def write_replay(path: Path, replay: Mapping[str, Any]) -> None:
     """Write the page that plays it, or its data as JSON if the file is called so. Raises UsageError if it cannot be."""
     page = json.dumps(replay, allow_nan=False) if path.suffix.lower() == ".json" else replay_page(replay)
     write_file(path.parent, path.name, page.encode())
+
+
+def write_film(path: Path, trial: TrialResult, own_floors: Mapping[str, NDArray[np.uint8]]) -> None:
+    """Write a film of the trial. Raises UsageError if it cannot be written."""
+    write_file(path.parent, path.name, film(trial, own_floors))
 
 
 def write_file(folder: Path, name: str, data: bytes) -> Path:

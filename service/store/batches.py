@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Row, Select, and_, func, or_, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
+from service.store import overrides
 from service.store.codec import decode
 from service.store.models import (
     AssignmentVersion,
@@ -23,10 +24,16 @@ from service.store.models import (
     TrialRow,
 )
 from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
+from service.store.web_tables import Override
 from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 from submissions.people import Refusal
 
+#: What is read of each job; the last three count.
+_Asked = tuple[
+    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
+    int | None,
+]  # fmt: skip
 #: The newest of which one may have been meant by an id that there is not.
 _MOST_COMPARED = 1000
 
@@ -59,7 +66,8 @@ class JobLine:
     copied_from: str | None  # the identical grade that was run
     suspect: str | None  # why the grade is not to be trusted
     staff_only: str | None  # the limit that the submission was over
-    unjudged: int  # criteria that could not be judged
+    unjudged: int  # criteria that could not be judged, nor were set by hand
+    set_by_hand: int  # criteria that were
     surprises: int  # trials in which our own code stumbled over what a child sent
     days_late: int
     published_at: datetime | None
@@ -102,6 +110,34 @@ def find_batch(session: Session, start: str) -> str:
 def find_job(session: Session, start: str) -> str:
     """The id of the job that begins so. Raises UsageError where none or several do."""
     return _find(session, Job.id, Job.queued_at, start, "grade")
+
+
+def job_before(session: Session, job_id: str) -> str:
+    """The id of the grade that stands for the same student's last attempt before this job's.
+
+    Raises UsageError where there is none; what is for staff alone, or not to be trusted, is passed over.
+    """
+    mine = session.execute(
+        select(SubmissionRow).join(Job, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
+    ).scalar_one()
+    found = session.scalar(
+        select(Job.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .where(
+            SubmissionRow.enrolment_id == mine.enrolment_id,
+            SubmissionRow.assignment == mine.assignment,
+            SubmissionRow.attempt < mine.attempt,
+            SubmissionRow.staff_only.is_(None),
+            Job.state == JobState.DONE,
+            Job.standing == Standing.STANDS,
+            Job.suspect.is_(None),
+        )
+        .order_by(SubmissionRow.attempt.desc())
+        .limit(1)
+    )
+    if found is None:
+        raise UsageError(f"no grade of the same student for the same assignment comes before {job_id}")
+    return found
 
 
 def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
@@ -201,9 +237,7 @@ def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, sta
     return found[0]
 
 
-def _job_lines() -> Select[
-    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
-]:
+def _job_lines() -> Select[*_Asked]:
     accuracy = (
         select(CriterionResultRow.accuracy)
         .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None))
@@ -213,7 +247,12 @@ def _job_lines() -> Select[
     )
     unjudged = (
         select(func.count())
-        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
+        .where(CriterionResultRow.job_id == Job.id, overrides.waits_for_judgement())
+        .scalar_subquery()
+    )
+    by_hand = (
+        select(func.count())
+        .where(Override.submission_id == Job.submission_id, Override.withdrawn_at.is_(None))
         .scalar_subquery()
     )
     surprises = select(func.count()).where(TrialRow.job_id == Job.id, TrialRow.surprise.is_not(None)).scalar_subquery()
@@ -230,6 +269,7 @@ def _job_lines() -> Select[
             SubmissionRow.staff_only,
             SubmissionRow.days_late,
             unjudged,
+            by_hand,
             surprises,
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -239,12 +279,9 @@ def _job_lines() -> Select[
     )
 
 
-def _line(
-    row: Row[
-        Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
-    ],
-) -> JobLine:
-    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
+def _line(row: Row[*_Asked]) -> JobLine:
+    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, *counts = row
+    unjudged, by_hand, surprises = counts
     return JobLine(
         id=job.id,
         submission_id=job.submission_id,
@@ -256,7 +293,7 @@ def _line(
         state=job.state,
         verdict=job.verdict,
         marks=job.marks,
-        max_marks=version.max_marks,
+        max_marks=version.max_marks if job.max_marks is None else job.max_marks,
         accuracy=accuracy,
         attempt=attempt,
         error=job.error,
@@ -271,6 +308,7 @@ def _line(
         suspect=job.suspect,
         staff_only=staff_only,
         unjudged=unjudged or 0,
+        set_by_hand=by_hand or 0,
         surprises=surprises or 0,
         days_late=days_late,
         published_at=job.published_at,

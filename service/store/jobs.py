@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, cast
 from sqlalchemy import ColumnElement, CursorResult, Select, select, update
 from sqlalchemy.orm import Session
 
-from service.store import outbox, phases, plots, result_cache, workers
+from service.store import outbox, overrides, phases, plots, result_cache, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
@@ -101,6 +101,7 @@ def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
     if not _make(session, COPY, (Job.id == job_id,), at, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
+    overrides.recount(session, job_id)
     outbox.grade_copied(session, job_id)
 
 
@@ -175,8 +176,6 @@ def finish(
             "phases": phases.written(moments),
             "graded_at": graded_at,
             "verdict": grade.verdict.value,
-            "marks": grade.marks,
-            "max_marks": grade.max_marks,
             "grader_version": grade.grader_version,
             "grader_sha256": grader_sha256(),
             "secret_sha256": grade.secret_sha256,
@@ -192,6 +191,7 @@ def finish(
         _refuse_quarantined(session, claim)
         _make_held(session, FINISH, claim, at, values)
         results.insert(session, claim.job_id, prepared, at)
+        overrides.recount(session, claim.job_id)
         outbox.grade_finished(session, claim.job_id)
 
 
@@ -212,6 +212,7 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
         at = now(session)
         _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
         result_cache.copy_rows(session, source, claim.job_id)
+        overrides.recount(session, claim.job_id)
         outbox.grade_finished(session, claim.job_id)
         return True
 

@@ -21,6 +21,7 @@ from service.store.credentials import Identity
 from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
 from service.store.states import CredentialKind, Role
 from service.web.context import Context
+from service.web.language import translatable
 from sim.errors import RobomarkError
 
 SESSION_COOKIE = "robomark"
@@ -100,19 +101,21 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
     if request.method in _SAFE:
         return
     if request.headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
-        raise HTTPException(403, "This came from another site; open the page here and send it again.")
+        raise HTTPException(403, translatable("This came from another site; open the page here and send it again."))
     if reader is None:
         return
     word = request.headers.get(CSRF_HEADER)
     if word is None:
         word = str((await request.form()).get(CSRF_FIELD, ""))
     if not secrets.compare_digest(word.encode(), reader.csrf.encode()):
-        raise HTTPException(403, "This page was open for too long, or came from another site; load it and send again.")
+        raise HTTPException(
+            403, translatable("This page was open for too long, or came from another site; load it and send again.")
+        )
 
 
 def nothing_here() -> HTTPException:
     """What is answered where there is nothing, or nothing for this reader."""
-    return HTTPException(404, "There is nothing here, or nothing that you may see.")
+    return HTTPException(404, translatable("There is nothing here, or nothing that you may see."))
 
 
 def course_of_role(session: Session, identity: Identity, course_id: int, role: Role) -> Course:

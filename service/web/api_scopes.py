@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from service.web.language import translatable
+
 #: By name; a token does what its owner may do, and of that what its scopes name.
 SCOPES: Mapping[str, str] = MappingProxyType(
     {
-        "read": "read what its owner may see",
-        "submit": "submit, for oneself as a student, or batches as an instructor",
-        "mark": "override, comment, publish, regrade",
-        "manage": "open assignments, set policies, enrol, delete",
-        "sign-in": "sign a browser in",
+        "read": translatable("read what its owner may see"),
+        "submit": translatable("submit, for oneself as a student, or batches as an instructor"),
+        "mark": translatable("override, comment, publish, regrade"),
+        "manage": translatable("open assignments, set policies, enrol, delete"),
+        "sign-in": translatable("sign a browser in"),
     }
 )

@@ -1,7 +1,7 @@
 """The web application: pages for people, the API for programs, liveness, readiness and metrics.
 
 Holds no state of its own but how often somebody asked; everything it tells is in the database. A module of ``pages`` or
-``api`` that has a ``router`` is served.
+``api`` that has a ``router`` is served; what other sites may post to is in a page module's ``cross_site_router``.
 """
 
 from __future__ import annotations
@@ -55,8 +55,11 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
         return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
 
     for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
-        if router := getattr(importlib.import_module(module.name), "router", None):
+        found = importlib.import_module(module.name)
+        if router := getattr(found, "router", None):
             app.include_router(router, dependencies=[Depends(same_site)], include_in_schema=False)
+        if router := getattr(found, "cross_site_router", None):
+            app.include_router(router, include_in_schema=False)
     for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
         if router := getattr(importlib.import_module(module.name), "router", None):
             app.include_router(router, prefix="/api/v1")

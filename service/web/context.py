@@ -10,7 +10,7 @@ from fastapi import Depends, Request
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
-from service.web.rate_limits import RateLimit
+from service.web.rate_limits import RateLimit, RateLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,8 +21,7 @@ class WebContext:
     store: Store
     notifier: Notifier
     api_calls: RateLimit  # of each token
-    #: How often one person may submit, whatever the course and the way.
-    submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
+    limits: RateLimits = field(default_factory=RateLimits)
 
 
 def _context(request: Request) -> WebContext:

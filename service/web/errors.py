@@ -14,19 +14,21 @@ from fastapi.responses import RedirectResponse, Response
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
+from service.lti.fetching import PlatformError
 from service.web.access import SignInNeeded, reader_of
+from service.web.language import translatable
 from service.web.problems import API, problem
 from service.web.rendering import page
 from sim.errors import HostError, RobomarkError, UsageError
 
 _log = structlog.get_logger(__name__)
-_OURS = "Something went wrong here, not with you; it is written down. Try again in a minute."
 #: What the router says of paths and methods that there are not.
 _OF_THE_ROUTER = {
-    (404, "Not Found"): "There is nothing here, or nothing that you may see.",
-    (405, "Method Not Allowed"): "This can be asked for, but not by this method.",
+    (404, "Not Found"): translatable("There is nothing here, or nothing that you may see."),
+    (405, "Method Not Allowed"): translatable("This can be asked for, but not by this method."),
 }
-_NO_DATABASE = "The database does not answer; nothing was changed. Try again in a minute."
+_OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -35,6 +37,7 @@ def add_error_pages(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(RequestValidationError, _misread)
     app.add_exception_handler(UsageError, _usage)
+    app.add_exception_handler(PlatformError, _platform)
     app.add_exception_handler(HostError, _host)
     app.add_exception_handler(SQLAlchemyError, _no_database)
     app.add_exception_handler(Exception, _surprise)
@@ -71,6 +74,10 @@ async def _usage(request: Request, error: Exception) -> Response:
 async def _host(request: Request, error: Exception) -> Response:
     _log.error("web.host_error", path=request.url.path, error=str(error))
     return answer(request, 503, _OURS)
+
+
+async def _platform(request: Request, error: Exception) -> Response:
+    return answer(request, 502, _sentence(error))
 
 
 async def _no_database(request: Request, error: Exception) -> Response:

@@ -38,6 +38,11 @@ def translations(code: str) -> gettext.NullTranslations:
     return gettext.GNUTranslations(compiled)
 
 
+def translatable(sentence: str) -> str:
+    """The sentence itself: marks one that a page will show in the reader's language."""
+    return sentence
+
+
 def language_of(request: Request) -> str:
     """What the reader chose, else what the browser asks for, else English."""
     chosen = request.cookies.get(COOKIE, "")

@@ -6,6 +6,8 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NoReturn
 
 from starlette.exceptions import HTTPException
 
@@ -22,15 +24,39 @@ class RateLimit:
         self._lock = threading.Lock()
         self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # what is left, and when that was
 
-    def spend(self, who: str) -> None:
-        """Count one for ``who``. Raises HTTPException 429, which says when to come again."""
+    def check(self, who: str) -> None:
+        """Raises HTTPException 429, which says when to come again, where ``who`` has nothing left."""
         with self._lock:
-            at = self._clock()
-            left, since = self._left.pop(who, (self._burst, at))
-            left = min(self._burst, left + (at - since) * self._per_second)
+            left, _ = self._now(who)
+        if left < 1:
+            self._refuse(left)
+
+    def spend(self, who: str) -> None:
+        """Count one for ``who``; raises as ``check`` does."""
+        with self._lock:
+            left, at = self._now(who)
+            self._left.pop(who, None)
             self._left[who] = (max(0.0, left - 1), at)
             if len(self._left) > _MOST_KNOWN:
                 self._left.popitem(last=False)
         if left < 1:
-            seconds = max(1, round((1 - left) / self._per_second))
-            raise HTTPException(429, f"That is too often; come again in {seconds} s.", {"retry-after": str(seconds)})
+            self._refuse(left)
+
+    def _now(self, who: str) -> tuple[float, float]:
+        at = self._clock()
+        left, since = self._left.get(who, (self._burst, at))
+        return min(self._burst, left + (at - since) * self._per_second), at
+
+    def _refuse(self, left: float) -> NoReturn:
+        seconds = max(1, round((1 - left) / self._per_second))
+        raise HTTPException(429, f"That is too often; come again in {seconds} s.", {"retry-after": str(seconds)})
+
+
+@dataclass(frozen=True, slots=True)
+class RateLimits:
+    """Those of one web server, by what they count."""
+
+    #: Tries to sign in that failed, by address; behind a proxy all come from one.
+    failed_sign_ins: RateLimit = field(default_factory=lambda: RateLimit(burst=30, per_minute=30))
+    #: Launches from learning platforms, by address.
+    launches: RateLimit = field(default_factory=lambda: RateLimit(burst=300, per_minute=300))

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from report_builders import line_follower_recording
-from sim.recording import COLUMNS, Image, Pose, Recording, Ticks
+from report_builders import line_follower_grade, line_follower_recording
+from service.grading.grade import Grade, TrialResult
+from sim.recording import COLUMNS, Image, Line, Pose, Recording, Ticks
 
 #: What is no student's text, in a replay's data and in a grade.
 _NO_TEXTS = {
@@ -69,3 +70,32 @@ def poisoned(told: Any, text: str, key: str = "") -> Any:
     if isinstance(told, list | tuple):
         return type(told)(poisoned(value, text, key) for value in told)
     return text if type(told) is str and key not in _NO_TEXTS else told
+
+
+def parting_grade(after: int = 90) -> Grade:
+    """The line follower's grade as another attempt would have it: from that tick on it goes straight on for 12 s."""
+    grade = line_follower_grade()
+
+    def other(trial: TrialResult) -> TrialResult:
+        recording = trial.recording
+        old, steps = recording.ticks, np.arange(1, 361 - after)
+        way = [old.x[after - 1] - old.x[after - 2], old.y[after - 1] - old.y[after - 2]]
+        straight = {
+            "x": old.x[after - 1] + way[0] * steps,
+            "y": old.y[after - 1] + way[1] * steps,
+            "heading": np.full(len(steps), old.heading[after - 1]),
+        }
+        columns = {
+            each.name: np.concatenate([getattr(old, each.name)[:after], straight[each.name]])
+            if each.name in straight
+            else np.resize(getattr(old, each.name), (360, *getattr(old, each.name).shape[1:]))
+            for each in COLUMNS
+        }
+        end = Pose(*(float(columns[name][-1]) for name in ("x", "y", "heading")))
+        said = (Line(0.5, "off I go"), Line(3.5, "straight on"), Line(11.5, "there"))
+        ticks = Ticks(**columns)
+        return replace(
+            trial, recording=replace(recording, ticks=ticks, end=end, end_t=12.0, printed=(), spoken=said, touches=())
+        )
+
+    return replace(grade, trials=tuple(other(trial) for trial in grade.trials))

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import report_builders
 from builders import grading_request
-from service.store import credentials, intake, jobs, results, webhooks
+from service.store import appeals, credentials, intake, jobs, results, webhooks
 from service.store.people import Member
 from service.web.rendering import statics
 from web import COURSE, Web
@@ -29,9 +29,9 @@ def make_world(web: Web) -> World:
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
     web.token(ada, "read")
-    with web.store.reading() as session:
-        (token,) = credentials.tokens(session, ada.person_id)
     with web.store.transaction() as session:
+        (token,) = credentials.tokens(session, ada.person_id)
+        appeal = appeals.ask(session, 1, "Please look again.")
         hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"], "grace")
     values = {
         "course_id": "1",
@@ -45,6 +45,7 @@ def make_world(web: Web) -> World:
         "link": web.link(ada),
         "token_id": token.id,
         "webhook_id": hook.id,
+        "appeal_id": str(appeal),
     }
     return World(ada, grace, values)
 

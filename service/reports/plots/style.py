@@ -37,8 +37,8 @@ FAULT = "#a3162a"
 SAID = "#3f7d3c"
 SECOND_ROBOT = "#7a3e9d"
 
-_FONT = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-_BOLD = _FONT.with_name("DejaVuSans-Bold.ttf")
+FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+_BOLD = FONT_FILE.with_name("DejaVuSans-Bold.ttf")
 
 
 def new_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
@@ -97,7 +97,7 @@ def set_tick_type(axes: Axes, size: float = 8) -> None:
 @lru_cache(maxsize=64)
 def font(size: float, *, bold: bool = False) -> FontProperties:
     """The type that comes with matplotlib, whatever the machine has installed."""
-    return FontProperties(fname=str(_BOLD if bold else _FONT), size=size)
+    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=size)
 
 
 def drawable(text: str) -> str:
@@ -144,4 +144,4 @@ def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
 @lru_cache(maxsize=1)
 def _known_characters() -> frozenset[int]:
     # Both cuts are drawn with, and the bold one has fewer characters.
-    return frozenset(get_font(str(_FONT)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())
+    return frozenset(get_font(str(FONT_FILE)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())

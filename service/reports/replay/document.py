@@ -10,7 +10,7 @@ import io
 import json
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
@@ -21,9 +21,10 @@ from PIL import Image
 
 from service.grading.grade import TrialResult
 from service.reports.readable import one_line
+from service.reports.replay.over import over_data
 from service.reports.replay.sources import Sources, sources_of
 from service.reports.replay.trial import trial_data
-from service.reports.view import View, scenarios, worst_trial
+from service.reports.view import NO_OTHERS, OtherTrials, View, scenarios, worst_trial
 from sim.floors import floor, names
 from sim.recording import Recording
 from submissions.submission import Submission
@@ -41,11 +42,12 @@ def replay_of_grade(
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _OWN,
     most_bytes: float = math.inf,
+    others: OtherTrials = NO_OTHERS,
 ) -> dict[str, Any]:
     """The trials that the view has: first the worst of each scenario, then the others.
 
     They are as many as fit into ``most_bytes`` when they are compressed, and at least one. ``own_floors`` are those
-    that are not built in, by name.
+    that are not built in, by name. Each of ``others`` lies over the trial that it is of.
     """
     grade = view.grade
     worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
@@ -54,7 +56,7 @@ def replay_of_grade(
     chosen: dict[int, dict[str, Any]] = {}
     left = most_bytes
     for index in order:
-        told = trial_data(grade.trials[index], sources, grade.criteria, index)
+        told = {**trial_data(grade.trials[index], sources, grade.criteria, index), **_over(grade.trials, index, others)}
         left -= len(packed(told)) if most_bytes < math.inf else 0
         if left < 0 and chosen:
             break
@@ -67,17 +69,27 @@ def replay_of_grade(
 
 
 def replay_of_run(
-    recording: Recording, name: str, seed: int, sources: Sources, own_floors: Mapping[str, Pixels]
+    recording: Recording,
+    name: str,
+    seed: int,
+    sources: Sources,
+    own_floors: Mapping[str, Pixels],
+    others: OtherTrials = NO_OTHERS,
 ) -> dict[str, Any]:
     """One run, of which nothing was marked."""
     trial = TrialResult(name, 0, seed, 0, 0, "visible", recording)
-    told = {**trial_data(trial, sources), "name": one_line(name, 60)}
+    told = {**trial_data(trial, sources), **_over((trial,), 0, others), "name": one_line(name, 60)}
     return {**_document(name, [(trial, told)], sources, own_floors), "of": 1, "first": 0}
 
 
 def packed(document: Mapping[str, Any]) -> bytes:
     """The document's JSON, compressed as every browser can read it."""
     return zlib.compress(json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii"), 6)
+
+
+def _over(trials: Sequence[TrialResult], index: int, others: OtherTrials) -> dict[str, Any]:
+    other = others.trials.get(index)
+    return {} if other is None else {"over": over_data(trials[index], other, others.name)}
 
 
 def _document(

@@ -15,28 +15,27 @@ from service.store.states import CredentialKind
 from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
 from service.web.context import Context, WebContext
 from service.web.language import COOKIE as LANGUAGE_COOKIE
-from service.web.language import languages
-from service.web.rate_limits import RateLimit
+from service.web.language import languages, translatable
 from service.web.rendering import page
 
 router = APIRouter()
-_TRIES = RateLimit(burst=20, per_minute=20)
-_REFUSED = "This link or token does not count, or not any more; ask for a new one."
+_REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
 
 
 @router.get("/sign-in")
 def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Query(alias="next")] = "/") -> Response:
     """Where a link or a token is asked for."""
-    return page(request, reader, "sign_in.html", target=_inside(target), refused="")
+    return page(request, reader, "sign_in.html", target=inside(target), refused="")
 
 
 @router.get("/sign-in/{link}")
 def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
     """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
-    _TRIES.spend(_address(request))
+    context.limits.failed_sign_ins.check(_address(request))
     with context.store.reading() as session:
         name = credentials.owner(session, link)
     if name is None:
+        context.limits.failed_sign_ins.spend(_address(request))
         return page(request, reader, "sign_in.html", status_code=410, target="/", refused=_REFUSED)
     return page(request, reader, "sign_in_link.html", link=link, name=name)
 
@@ -50,7 +49,7 @@ def sign_in(
     target: Annotated[str, Form(alias="next")] = "/",
 ) -> Response:
     """Exchange a link's secret, or a token, for a session of this browser."""
-    _TRIES.spend(_address(request))
+    context.limits.failed_sign_ins.check(_address(request))
     # A whole link may have been pasted.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
     with context.store.transaction() as session:
@@ -63,8 +62,9 @@ def sign_in(
         if opened is not None and reader is not None:
             credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
     if opened is None:
-        return page(request, reader, "sign_in.html", status_code=403, target=_inside(target), refused=_REFUSED)
-    answer = RedirectResponse(_inside(target), 303)
+        context.limits.failed_sign_ins.spend(_address(request))
+        return page(request, reader, "sign_in.html", status_code=403, target=inside(target), refused=_REFUSED)
+    answer = RedirectResponse(inside(target), 303)
     set_session(answer, context, opened)
     return answer
 
@@ -86,7 +86,7 @@ def choose_language(
     """Show the pages in this language from now on, in this browser."""
     if code not in languages():
         raise HTTPException(422, "There are no pages in this language.")
-    answer = RedirectResponse(_inside(target), 303)
+    answer = RedirectResponse(inside(target), 303)
     answer.set_cookie(
         LANGUAGE_COOKIE, code, max_age=365 * 86_400, httponly=True, samesite="lax", secure=_secure(context)
     )
@@ -109,7 +109,7 @@ def _address(request: Request) -> str:
     return "" if request.client is None else request.client.host
 
 
-def _inside(target: str) -> str:
+def inside(target: str) -> str:
     """Where to go after, if that is a path of ours; browsers take a backslash for a slash, and forget line ends."""
     parts = urlsplit(target)
     is_ours = target.startswith("/") and not target.startswith("//") and not parts.netloc and not parts.scheme

@@ -14,29 +14,31 @@ from playwright.sync_api import Browser, Page, expect
 
 import report_builders as build
 from browsing import DESKTOP, PHONE, OpenPage, chromium, opened
-from replays import long_recording, poisoned
+from replays import long_recording, parting_grade, poisoned
 from service.reports.html import replay_page, report
 from service.reports.replay.document import replay_of_grade
-from service.reports.view import student_view
+from service.reports.replay.over import parted
+from service.reports.view import BEFORE_PUBLICATION, other_trials, student_view
 from sim.floors import floor
 from sim.recording import Recording
 
 pytestmark = pytest.mark.long
 
-#: Where the middle of the axle is, CSS pixels: the mean of the pixels that have its colour.
-AXLE = """() => {
+#: The middle of what has this colour, CSS pixels: of an axle, where it has the axle's.
+MIDDLE = """(colour) => {
   const canvas = document.querySelector("canvas.floor");
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   let [count, x, y] = [0, 0, 0];
   for (let at = 0; at < data.length; at += 4) {
-    if (data[at] !== 230 || data[at + 1] !== 0 || data[at + 2] !== 126) continue;
+    if (colour.some((value, part) => data[at + part] !== value)) continue;
     count += 1;
     x += (at / 4) % canvas.width;
     y += Math.floor(at / 4 / canvas.width);
   }
   const ratio = canvas.width / canvas.clientWidth;
-  return [(x / count + 0.5) / ratio, (y / count + 0.5) / ratio];
+  return count ? [(x / count + 0.5) / ratio, (y / count + 0.5) / ratio] : [null, null];
 }"""
+AXLE_COLOUR, OVER_COLOUR = [230, 0, 126], [0, 166, 147]
 REGION = """() => {
   const canvas = document.querySelector("canvas.floor");
   return [...canvas.dataset.region.split(" ").map(Number), canvas.clientWidth, canvas.clientHeight];
@@ -85,7 +87,7 @@ def pose_at(recording: Recording, t: float) -> tuple[float, float]:
 
 def assert_robot_is_there(page: Page, recording: Recording, t: float) -> None:
     wanted = on_canvas(page, *pose_at(recording, t))
-    found = page.evaluate(AXLE)
+    found = page.evaluate(MIDDLE, AXLE_COLOUR)
     assert max(abs(found[0] - wanted[0]), abs(found[1] - wanted[1])) <= 1, t
 
 
@@ -259,3 +261,104 @@ def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, 
         expect(found.page.locator(".events tbody tr").first).to_be_visible()
         wrong = found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)")
         assert wrong == []
+
+
+@pytest.fixture(scope="module")
+def report_of_two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("over") / "report.html"
+    view = student_view(build.line_follower_grade())
+    others = other_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
+    file.write_text(report(view, {}, build.faulty_submission(), others=others))
+    return file
+
+
+def assert_both_are_there(page: Page, mine: Recording, other: Recording, t: float) -> None:
+    for recording, colour in ((mine, AXLE_COLOUR), (other, OVER_COLOUR)):
+        (x, y), (found_x, found_y) = on_canvas(page, *pose_at(recording, t)), page.evaluate(MIDDLE, colour)
+        assert found_x is not None, t
+        assert max(abs(found_x - x), abs(found_y - y)) <= 1, t
+
+
+@WIDTHS
+def test_the_other_robot_is_where_its_recording_has_it(
+    browser: Browser, report_of_two: Path, context: dict[str, Any]
+) -> None:
+    mine, other = (grade.trials[0].recording for grade in (build.line_follower_grade(), parting_grade()))
+    with opened(browser, report_of_two, "#trial=1&t=0", **context) as found:
+        found.page.locator("select").nth(2).select_option("floor")
+        for t in (4.5, 5, 5.5, 6.1, 7, 7.3):
+            found.page.evaluate(SEEK, t)
+            assert_both_are_there(found.page, mine, other, t)
+        found.page.locator("select").nth(2).select_option("path")
+        for t in (5, 8, 9.9, 10.5, 12):  # the first robot has come to its end at 10 s
+            found.page.evaluate(SEEK, t)
+            assert_both_are_there(found.page, mine, other, t)
+        assert_quiet(found, report_of_two)
+
+
+def test_the_other_trial_is_switched_off_and_on_by_keyboard(browser: Browser, report_of_two: Path) -> None:
+    with opened(browser, report_of_two, "#trial=1&t=11.5", **DESKTOP) as found:
+        page = found.page
+        page.locator("section.replay summary").click()
+        rows = page.locator(".events tbody tr.of-over")
+        assert (now(page), rows.count()) == (11.5, 3)
+        expect(page.locator(".happened .of-over").first).to_contain_text("attempt 1: robot: said")
+        told = page.locator(".moment").get_attribute("aria-valuetext")
+        assert told is not None
+        assert "attempt 1 " in told
+        box = page.get_by_role("checkbox", name="Show attempt 1 over it")
+        box.focus()
+        page.keyboard.press("Space")
+        expect(box).not_to_be_checked()
+        assert page.evaluate(MIDDLE, OVER_COLOUR) == [None, None]
+        assert page.locator(".play").inner_text() == "Play"
+        assert (now(page), rows.count(), page.locator(".happened .of-over").count()) == (10, 0, 0)
+        page.keyboard.press("Space")
+        page.keyboard.press("End")
+        assert (now(page), rows.count()) == (12, 3)
+        assert page.evaluate(MIDDLE, OVER_COLOUR) != [None, None]
+
+
+def test_where_they_part_is_a_link_to_the_moment(browser: Browser, report_of_two: Path) -> None:
+    mine, other = (grade.trials[1].recording for grade in (build.line_follower_grade(), parting_grade()))
+    moment = parted(mine, other)
+    assert moment is not None
+    with opened(browser, report_of_two, "#trial=2&t=0", **DESKTOP) as found:
+        page = found.page
+        page.get_by_role("link", name="Here they part: 3.13 s").focus()
+        page.keyboard.press("Enter")
+        assert moment <= now(page) < moment + 0.001
+        expect(page.locator(".moment")).to_be_focused()
+        page.evaluate(SEEK, moment - 1 / 30)
+        assert "Now 1 mm and 4° apart." in page.locator(".over").inner_text()
+
+
+@WIDTHS
+def test_hostile_texts_of_the_other_trial_run_nothing(
+    browser: Browser, tmp_path: Path, context: dict[str, Any]
+) -> None:
+    view = student_view(build.faulty_grade())
+    honest = replay_of_grade(view, others=other_trials(view, build.astray_grade(), "attempt 1", BEFORE_PUBLICATION))
+    file = tmp_path / "replay.html"
+    file.write_text(replay_page(poisoned(honest, HOSTILE)))
+    with opened(browser, file, "#trial=2&t=0.5", **context) as found:
+        page = found.page
+        page.locator("section.replay summary").click()
+        expect(page.locator(".events tbody tr.of-over").first).to_be_visible()
+        assert page.evaluate("document.scripts.length") == 2
+        assert page.locator("section.replay img, section.replay iframe").count() == 0
+        assert page.evaluate("document.documentElement.scrollWidth") <= context["viewport"]["width"]
+        assert_quiet(found, file)
+
+
+@WIDTHS
+@SCHEMES
+def test_axe_finds_nothing_in_two_trials(
+    browser: Browser, report_of_two: Path, context: dict[str, Any], scheme: str
+) -> None:
+    axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    with opened(browser, report_of_two, "#trial=2&t=6", color_scheme=scheme, **context) as found:
+        found.page.locator("section.replay summary").click()
+        found.page.evaluate(axe)
+        expect(found.page.locator(".events tbody tr.of-over").first).to_be_visible()
+        assert found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)") == []

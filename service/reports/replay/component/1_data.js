@@ -80,7 +80,8 @@ class Trial {
   constructor(told, floors) {
     Object.assign(this, told);
     this.robots = told.robots.map((robot) => new RobotTrack(robot));
-    this.floorImage = floors[told.floor].loaded;
+    this.floorImage = floors[told.floor]?.loaded ?? null;
+    this.over = told.over ? new Trial({ lost: [], ...told.over }, []) : null;
     const messages = told.messages.map((message) => ({ kind: "message", ...message }));
     this.happened = [...told.events, ...messages].sort((a, b) => a.t - b.t);
   }

@@ -7,8 +7,17 @@ const CLOSEST = 640;
 const BEYOND = 400; // mm outside the floor that are still shown
 const COLOURS = {
   ink: "#1c2630", left: "#0b4a86", right: "#d9791a", pen: "#e79b9b", fault: "#a3162a", second: "#7a3e9d",
-  paper: "#ffffff", axle: "#e6007e", axleOfSecond: "#7a3e9d", beyond: "#a3aab1", obstacle: "#c8cdd2",
+  paper: "#ffffff", axle: "#e6007e", beyond: "#a3aab1", obstacle: "#c8cdd2", over: "#00736a",
 };
+// How a robot and its way are drawn: the first one's, the second one's, and those of the trial that lies over this one.
+const LOOKS = [
+  { path: COLOURS.left, ahead: "rgba(28, 38, 48, 0.55)", pen: COLOURS.pen, dash: [], edged: [], edge: COLOURS.ink,
+    body: "rgba(255, 255, 255, 0.66)", axle: COLOURS.axle },
+  { path: COLOURS.second, ahead: "rgba(28, 38, 48, 0.55)", pen: COLOURS.pen, dash: [], edged: [], edge: COLOURS.second,
+    body: "rgba(238, 228, 244, 0.72)", axle: COLOURS.second },
+];
+const LOOK_OF_OVER = { path: COLOURS.over, ahead: "rgba(0, 115, 106, 0.5)", pen: "#8fd0c3", dash: [10, 7], edged: [5, 3],
+  edge: COLOURS.over, body: "rgba(222, 243, 239, 0.5)", axle: "#00a693" };
 const FONT = "system-ui, sans-serif";
 
 class FloorCanvas {
@@ -20,9 +29,11 @@ class FloorCanvas {
     this.mode = "path";
   }
 
-  show(trial) {
-    this.trial = trial;
-    this.drawnGround = null;
+  // With another trial over it, or null.
+  show(trial, over) {
+    Object.assign(this, { trial, over, drawnGround: null, reachedRegion: null });
+    this.tracks = trial.robots.map((robot, which) => ({ robot, run: trial, look: LOOKS[which ? 1 : 0] }));
+    if (over) this.tracks.unshift(...over.robots.map((robot) => ({ robot, run: over, look: LOOK_OF_OVER })));
   }
 
   // The part of the world that is seen: x and y of its lower left corner, and mm across and up.
@@ -42,10 +53,10 @@ class FloorCanvas {
 
   // Where robots and what they talk to have been, with some room around.
   reached() {
-    if (this.trial.reached) return this.trial.reached;
+    if (this.reachedRegion) return this.reachedRegion;
     const places = this.trial.lost.map((loss) => loss.pose);
     if (this.trial.beacon) places.push(this.trial.beacon);
-    for (const robot of this.trial.robots) {
+    for (const { robot } of this.tracks) {
       for (let tick = 0; tick <= robot.length; tick += 1) places.push(robot.row(tick));
     }
     let [west, south, east, north] = [Infinity, Infinity, -Infinity, -Infinity];
@@ -56,9 +67,9 @@ class FloorCanvas {
       south = Math.min(south, y);
       north = Math.max(north, y);
     }
-    this.trial.reached = [Math.max(west, -BEYOND) - MARGIN, Math.max(south, -BEYOND) - MARGIN,
+    this.reachedRegion = [Math.max(west, -BEYOND) - MARGIN, Math.max(south, -BEYOND) - MARGIN,
       Math.min(east, FLOOR_WIDTH + BEYOND) + MARGIN, Math.min(north, FLOOR_HEIGHT + BEYOND) + MARGIN];
-    return this.trial.reached;
+    return this.reachedRegion;
   }
 
   draw(t, speed) {
@@ -79,20 +90,22 @@ class FloorCanvas {
     this.drawGround(width, height);
     const context = this.context;
     context.setTransform(1, 0, 0, 1, 0, 0);
-    this.drawTrail(ticks);
+    this.drawTrail(t);
     context.drawImage(this.ground, 0, 0);
     context.drawImage(this.trail, 0, 0);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.trial.robots.forEach((robot, which) => this.drawRobot(robot, ticks, which));
+    for (const track of this.tracks) this.drawRobot(track, t);
+    if (this.over) this.drawOver(t);
     this.drawMisread(t, speed);
     this.drawTouches(t);
     this.drawLosses(t);
     this.drawTalk(t, ticks, speed);
-    this.trial.robots.forEach((robot, which) => {
-      const [x, y] = at(...robot.pose(ticks));
-      dot(context, x, y, 4.5, COLOURS.paper);
-      dot(context, x, y, 3, which ? COLOURS.axleOfSecond : COLOURS.axle);
-    });
+    for (const { robot, run, look } of this.tracks) {
+      const [x, y] = at(...robot.pose(run.ticks(t)));
+      const mark = run === this.over ? diamond : dot;
+      mark(context, x, y, 4.5, COLOURS.paper);
+      mark(context, x, y, 3, look.axle);
+    }
   }
 
   // All that does not move, drawn again only when another part of the world is seen.
@@ -124,33 +137,38 @@ class FloorCanvas {
       context.strokeRect(...corner, across * scale, up * scale);
     }
     if (this.trial.beacon) drawBeacon(context, ...at(...this.trial.beacon));
-    for (const robot of this.trial.robots) {
+    for (const { robot, look } of this.tracks) {
       robot.seen = this.thinned(robot);
-      context.setLineDash([2, 3]);
-      this.strokePath(context, robot, 0, robot.length, "rgba(28, 38, 48, 0.55)", 1);
-      context.setLineDash([]);
+      this.strokePath(context, robot, 0, robot.length, look.ahead, 1, [2, 3]);
     }
   }
 
-  // The ticks of a path that are at least a pixel apart.
+  // The ticks of a path that are at least a pixel apart, where they are, and how many pixels the way to them is.
   thinned(robot) {
     const kept = [];
-    let [lastX, lastY] = [NaN, NaN];
+    let [lastX, lastY, way] = [NaN, NaN, 0];
     for (let tick = 0; tick <= robot.length; tick += 1) {
       const [x, y] = this.place.at(...robot.row(tick));
       if (Number.isNaN(x + y) || Math.abs(x - lastX) + Math.abs(y - lastY) < 1) continue;
       const [worldX, worldY] = robot.row(tick);
-      kept.push([tick, worldX, worldY]);
+      if (kept.length) way += Math.hypot(x - lastX, y - lastY);
+      kept.push([tick, worldX, worldY, way]);
       [lastX, lastY] = [x, y];
     }
     return kept;
   }
 
-  strokePath(context, robot, from, until, colour, width) {
+  strokePath(context, robot, from, until, colour, width, dash = []) {
+    const begin = this.place.at(...robot.pose(from));
+    let before = 0; // pixels from the start, so that dashes go on where those before them ended
     context.beginPath();
-    context.moveTo(...this.place.at(...robot.pose(from)));
-    for (const [tick, x, y] of robot.seen) {
-      if (tick <= from) continue;
+    context.moveTo(...begin);
+    for (const [tick, x, y, way] of robot.seen) {
+      if (tick <= from) {
+        const [keptX, keptY] = this.place.at(x, y);
+        before = way + Math.hypot(begin[0] - keptX, begin[1] - keptY);
+        continue;
+      }
       if (tick > until) break;
       context.lineTo(...this.place.at(x, y));
     }
@@ -158,39 +176,42 @@ class FloorCanvas {
     context.strokeStyle = colour;
     context.lineWidth = width;
     context.lineJoin = "round";
+    context.setLineDash(dash);
+    context.lineDashOffset = before;
     context.stroke();
+    context.setLineDash([]);
   }
 
   // What the robots have left behind: drawn on from where it was, and anew when time goes back.
-  drawTrail(ticks) {
+  drawTrail(t) {
     const context = this.trail.getContext("2d");
-    if (this.drawnTrail === null || ticks < this.drawnTrail) {
+    if (this.drawnTrail === null || t < this.drawnTrail) {
       this.trail.width = this.ground.width;
       this.trail.height = this.ground.height;
       this.drawnTrail = -1;
     }
     context.setTransform(this.place.ratio, 0, 0, this.place.ratio, 0, 0);
-    const from = Math.max(0, this.drawnTrail);
-    this.trial.robots.forEach((robot, which) => {
-      const until = Math.min(ticks, robot.length);
+    for (const { robot, run, look } of this.tracks) {
+      const from = Math.max(0, run.ticks(this.drawnTrail));
+      const until = Math.min(run.ticks(t), robot.length);
       for (const [down, up] of robot.pen) {
         const [begins, ends] = [Math.max(from, down), Math.min(until, up)];
-        if (begins < ends) this.strokePath(context, robot, begins, ends, COLOURS.pen, Math.max(4, 8 * this.place.scale));
+        const width = Math.max(4, 8 * this.place.scale);
+        if (begins < ends) this.strokePath(context, robot, begins, ends, look.pen, width, look.dash);
       }
       if (from < until) {
         this.strokePath(context, robot, from, until, COLOURS.paper, 4);
-        this.strokePath(context, robot, from, until, which ? COLOURS.second : COLOURS.left, 2);
+        this.strokePath(context, robot, from, until, look.path, 2, look.dash);
       }
-      this.drawImages(context, robot, ticks);
-    });
-    this.drawnTrail = ticks;
+      this.drawImages(context, robot, t);
+    }
+    this.drawnTrail = t;
   }
 
-  drawImages(context, robot, ticks) {
+  drawImages(context, robot, t) {
     for (const image of robot.images) {
-      const taken = image.t / this.trial.tick - ALMOST;
-      if (taken > ticks) break;
-      if (taken <= this.drawnTrail) continue;
+      if (image.t > t + ALMOST) break;
+      if (image.t <= this.drawnTrail + ALMOST) continue;
       const [x, y] = this.place.at(...placed(image.pose, robot.body.left));
       const side = Math.max(8, image.side * this.place.scale);
       const wrong = isMisread(image);
@@ -239,9 +260,22 @@ class FloorCanvas {
     });
   }
 
-  drawRobot(robot, ticks, which) {
+  // Whose the other robot is, where it is not the same place, and where the two part.
+  drawOver(t) {
+    const [mine, others] = [this.trial, this.over].map((run) => this.place.at(...run.robots[0].pose(run.ticks(t))));
+    if (Math.hypot(mine[0] - others[0], mine[1] - others[1]) > 30) {
+      this.bubble(this.over.name, others[0], others[1] + (others[1] > mine[1] ? 34 : -34), COLOURS.over);
+    }
+    if (this.over.parted !== null && Math.abs(this.over.parted - t) < 0.5) {
+      const place = this.place.at(...this.trial.robots[0].pose(this.trial.ticks(this.over.parted)));
+      outlined(this.context, COLOURS.over, 2.5, () => this.context.arc(...place, 16, 0, 7));
+    }
+  }
+
+  drawRobot({ robot, run, look }, t) {
     const context = this.context;
     const { at, scale } = this.place;
+    const ticks = run.ticks(t);
     const [x, y, heading] = robot.pose(ticks);
     const body = robot.body;
     const thin = 1.2 / scale;
@@ -253,11 +287,13 @@ class FloorCanvas {
     if (distance !== undefined) drawRay(context, body.ultrasonic, distance, scale);
     context.beginPath();
     context.roundRect(body.back, -body.half_width, body.front - body.back, 2 * body.half_width, 12);
-    context.fillStyle = which ? "rgba(238, 228, 244, 0.72)" : "rgba(255, 255, 255, 0.66)";
+    context.fillStyle = look.body;
     context.fill();
-    context.strokeStyle = which ? COLOURS.second : COLOURS.ink;
+    context.strokeStyle = look.edge;
     context.lineWidth = 1.6 * thin;
+    context.setLineDash(look.edged.map((pixels) => pixels / scale));
     context.stroke();
+    context.setLineDash([]);
     for (const [side, name] of [[-1, "left_position"], [1, "right_position"]]) {
       drawWheel(context, body, side, robot.reading(name, ticks)[0] ?? 0, thin);
     }

@@ -84,6 +84,15 @@ function dot(context, x, y, radius, colour) {
   context.fill();
 }
 
+function diamond(context, x, y, radius, colour) {
+  const reach = 1.3 * radius;
+  context.beginPath();
+  for (const [across, down] of [[0, -reach], [reach, 0], [0, reach], [-reach, 0]]) context.lineTo(x + across, y + down);
+  context.closePath();
+  context.fillStyle = colour;
+  context.fill();
+}
+
 function cross(context, x, y, reach) {
   context.moveTo(x - reach, y - reach);
   context.lineTo(x + reach, y + reach);

@@ -149,14 +149,22 @@ function drawPixels(canvas, told, side) {
   context.drawImage(small, 0, 0, canvas.width, canvas.height);
 }
 
+// What happened in the other trial, each with whose it is.
+function happenedOver(over) {
+  return over.happened.map((item) => ({ ...item, whose: over.name }));
+}
+
 // The words for one thing that happened: who, what, and what came of it at the other end.
 function happenedWords(item) {
-  if (item.kind !== "message") return { who: item.who, kind: item.kind, text: item.text, outcome: "", wrong: isWrong(item) };
+  const whose = item.whose ? `${item.whose}: ` : "";
+  if (item.kind !== "message") {
+    return { who: whose + item.who, kind: item.kind, text: item.text, outcome: "", wrong: isWrong(item) };
+  }
   const got = item.arrived_as === undefined ? "" : `, as ${item.arrived_as}`;
   const befell = item.befell ? `${item.befell}; ` : "";
   const outcome = item.arrived === null ? `${item.befell ?? "not answered"}: never arrived`
     : `${befell}arrived ${seconds(item.arrived)}${got}`;
-  return { who: `${item.from} → ${item.to}`, kind: "message", text: item.text, outcome, wrong: isWrong(item) };
+  return { who: `${whose}${item.from} → ${item.to}`, kind: "message", text: item.text, outcome, wrong: isWrong(item) };
 }
 
 function isWrong(item) {
@@ -169,23 +177,26 @@ class HappenedPanel {
     this.root = element("section", { className: "now" }, element("h3", {}, "What happens"), this.list);
   }
 
-  show(trial) {
-    this.trial = trial;
-    this.shown = -1;
+  show(trial, over) {
+    Object.assign(this, { trial, over, shown: "" });
+    this.happenedOver = over ? happenedOver(over) : [];
   }
 
   draw(t) {
-    const count = this.trial.count(t);
-    if (count === this.shown) return;
-    this.shown = count;
-    const recent = this.trial.happened.slice(Math.max(0, count - RECENT), count).reverse();
+    const [count, countOver] = [this.trial.count(t), this.over ? this.over.count(t) : 0];
+    const shown = `${count} ${countOver}`;
+    if (shown === this.shown) return;
+    this.shown = shown;
+    const recent = [...this.trial.happened.slice(Math.max(0, count - RECENT), count),
+      ...this.happenedOver.slice(Math.max(0, countOver - RECENT), countOver)].sort((a, b) => a.t - b.t).reverse();
     this.list.replaceChildren(...recent.map((item) => this.row(item)));
     if (!recent.length) this.list.append(element("li", { className: "soft" }, "Nothing yet."));
   }
 
   row(item) {
     const words = happenedWords(item);
-    const row = element("li", { className: `${item.kind}${words.wrong ? " wrong" : ""}` }, momentLink(this.trial, item.t),
+    const states = [item.kind, words.wrong ? "wrong" : "", item.whose ? "of-over" : ""];
+    const row = element("li", { className: states.join(" ") }, momentLink(this.trial, item.t),
       element("span", { className: "who" }, item.kind === "message" ? words.who : `${words.who}: ${words.kind}`),
       element("span", { className: "what" }, words.text));
     if (words.outcome) row.append(element("span", { className: "outcome" }, words.outcome));
@@ -256,9 +267,8 @@ class EventTable {
     this.root.addEventListener("toggle", () => this.fill());
   }
 
-  show(trial) {
-    this.trial = trial;
-    this.filled = false;
+  show(trial, over) {
+    Object.assign(this, { trial, over, filled: false });
     this.fill();
   }
 
@@ -268,15 +278,17 @@ class EventTable {
     const lost = this.trial.lost.map((loss) => ({ ...loss, who: loss.title, kind: "marks lost" }));
     const images = this.trial.robots.flatMap((robot) =>
       robot.images.map((image) => ({ t: image.t, who: robot.name, kind: "image", text: sentWords(image) })));
-    const all = [...this.trial.happened, ...lost, ...images].sort((a, b) => a.t - b.t);
+    const others = this.over ? happenedOver(this.over) : [];
+    const all = [...this.trial.happened, ...others, ...lost, ...images].sort((a, b) => a.t - b.t);
     this.body.replaceChildren(...all.slice(0, MOST_ROWS).map((item) => {
       const { who, kind, text, outcome, wrong } = happenedWords(item);
       const place = item.pose ? placeWords(item.pose) : outcome;
-      return element("tr", { className: wrong || kind === "marks lost" ? "wrong" : "" },
+      const states = [wrong || kind === "marks lost" ? "wrong" : "", item.whose ? "of-over" : ""];
+      return element("tr", { className: states.join(" ").trim() },
         element("td", { className: "number" }, momentLink(this.trial, item.t)),
         ...[who, kind, text, place].map((cell) => element("td", {}, cell)));
     }));
-    const missing = Math.max(0, all.length - MOST_ROWS) + this.trial.left_out;
+    const missing = Math.max(0, all.length - MOST_ROWS) + this.trial.left_out + (this.over?.left_out ?? 0);
     this.more.textContent = missing ? `${missing.toLocaleString("en")} more are not shown.` : "";
   }
 }

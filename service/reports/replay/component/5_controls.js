@@ -15,8 +15,10 @@ class ReplayControls {
     this.speed = 1;
     this.playing = false;
     const [sensors, ...beside] = [new SensorPanel(), new HappenedPanel(), new SourcePanel(replay.sources)];
-    this.panels = [sensors, ...beside];
     this.table = new EventTable();
+    this.overChoice = new OverChoice(() => this.showOver());
+    this.panels = [this.overChoice, sensors, ...beside];
+    this.showingOver = [this.overChoice, beside[0], this.table]; // besides the floor
     this.build(sensors, beside);
     this.open(this.trials[replay.first], 0);
     this.listen();
@@ -47,7 +49,7 @@ class ReplayControls {
       element("div", { className: "controls" }, this.play, this.slider, this.clock),
       element("div", { className: "choices" }, speedLabel, viewLabel, this.link),
       element("p", { className: "small soft keys" }, keys), this.losses, sensors.root);
-    this.root.replaceChildren(trialLabel, element("div", { className: "columns" }, main,
+    this.root.replaceChildren(trialLabel, this.overChoice.root, element("div", { className: "columns" }, main,
       element("div", { className: "panels" }, ...beside.map((panel) => panel.root))), this.table.root);
     const missing = this.replay.of - this.trials.length;
     if (missing) {
@@ -82,13 +84,27 @@ class ReplayControls {
   open(trial, t) {
     this.trial = trial;
     this.trialChoice.value = String(trial.trial);
-    this.slider.max = String(trial.seconds);
-    this.floor.show(trial);
-    for (const panel of [...this.panels, this.table]) panel.show(trial);
+    const over = this.layOver();
+    for (const panel of [...this.panels, this.table]) panel.show(trial, over);
     this.losses.replaceChildren(...trial.lost.map((loss) =>
       element("li", {}, element("b", {}, loss.title), ` (${loss.marks}), lost at `, momentLink(trial, loss.t),
         element("p", { className: "small" }, loss.text))));
     this.seek(t);
+  }
+
+  // As long as the longer of both trials, and the floor with both.
+  layOver() {
+    const over = this.overChoice.of(this.trial);
+    this.seconds = Math.max(this.trial.seconds, over ? over.seconds : 0);
+    this.slider.max = String(this.seconds);
+    this.floor.show(this.trial, over);
+    return over;
+  }
+
+  showOver() {
+    const over = this.layOver();
+    for (const panel of this.showingOver) panel.show(this.trial, over);
+    this.seek(this.t);
   }
 
   // A link to a moment: #t=12.40, or #trial=2&t=12.40.
@@ -107,10 +123,10 @@ class ReplayControls {
 
   key(event) {
     if (event.altKey || event.ctrlKey || event.metaKey || event.target.closest("select, .lines, .scroll")) return;
-    if (event.key === " " && !event.target.closest("button, a, summary")) this.toggle();
+    if (event.key === " " && !event.target.closest("button, a, summary, [type=checkbox]")) this.toggle();
     else if (event.key in STEPS) this.step(STEPS[event.key] * (event.shiftKey ? 10 : 1));
     else if (event.key === "Home") this.seek(0);
-    else if (event.key === "End") this.seek(this.trial.seconds);
+    else if (event.key === "End") this.seek(this.seconds);
     else return;
     event.preventDefault();
   }
@@ -121,7 +137,7 @@ class ReplayControls {
   }
 
   seek(t) {
-    this.t = Math.max(0, Math.min(t, this.trial.seconds));
+    this.t = Math.max(0, Math.min(t, this.seconds));
     this.draw();
   }
 
@@ -131,7 +147,7 @@ class ReplayControls {
   }
 
   start() {
-    if (this.t >= this.trial.seconds - ALMOST) this.seek(0);
+    if (this.t >= this.seconds - ALMOST) this.seek(0);
     this.playing = true;
     this.play.textContent = "Pause";
     let last = performance.now();
@@ -141,7 +157,7 @@ class ReplayControls {
         this.seek(this.t + (Math.max(0, now - last) / 1000) * this.speed);
         last = now;
       }
-      if (this.t >= this.trial.seconds) this.pause();
+      if (this.t >= this.seconds) this.pause();
       else requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
@@ -155,7 +171,7 @@ class ReplayControls {
 
   draw() {
     this.slider.value = String(this.t);
-    this.clock.textContent = `${this.t.toFixed(2)} of ${seconds(this.trial.seconds)}`;
+    this.clock.textContent = `${this.t.toFixed(2)} of ${seconds(this.seconds)}`;
     this.floor.draw(this.t, this.speed);
     for (const panel of this.panels) panel.draw(this.t);
     if (!this.playing) this.tell();
@@ -167,7 +183,9 @@ class ReplayControls {
     const count = this.trial.count(this.t);
     const latest = count ? happenedWords(this.trial.happened[count - 1]) : null;
     const said = latest ? `; last, ${latest.who} ${latest.kind}: ${latest.text.slice(0, 80)}` : "";
-    this.slider.setAttribute("aria-valuetext", `${this.t.toFixed(2)} of ${seconds(this.trial.seconds)}; ${place}${said}`);
+    const over = this.overChoice.of(this.trial);
+    const far = over ? `; ${over.name} ${apartWords(this.trial, this.t)}` : "";
+    this.slider.setAttribute("aria-valuetext", `${this.t.toFixed(2)} of ${seconds(this.seconds)}; ${place}${far}${said}`);
     this.link.href = momentHash(this.trial, this.t);
   }
 }

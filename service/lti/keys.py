@@ -1,0 +1,36 @@
+"""Our key pair: what we sign with towards platforms, and the public half that they read."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
+from jwt.algorithms import RSAAlgorithm
+from sqlalchemy.orm import Session
+
+from service.store import lti
+
+_BITS = 2048
+
+
+def signing_key(session: Session) -> tuple[str, str]:
+    """Id and PEM of the key to sign with, made when it is first asked for."""
+    if not lti.private_keys(session):
+        key = rsa.generate_private_key(public_exponent=65537, key_size=_BITS)
+        lti.add_private_key(
+            session, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()).decode("ascii")
+        )
+    return lti.private_keys(session)[0]
+
+
+def public_keys(session: Session) -> dict[str, Any]:
+    """The JSON Web Key Set (RFC 7517) of all our keys."""
+    return {"keys": [_public(key_id, pem) for key_id, pem in lti.private_keys(session)]}
+
+
+def _public(key_id: str, pem: str) -> dict[str, Any]:
+    key = load_pem_private_key(pem.encode("ascii"), None)
+    assert isinstance(key, rsa.RSAPrivateKey)
+    return {**json.loads(RSAAlgorithm.to_jwk(key.public_key())), "kid": key_id, "alg": "RS256", "use": "sig"}

@@ -1,0 +1,142 @@
+"""A launch by LTI 1.3: the login that a platform begins, and the identity token that it ends with.
+
+After the 1EdTech Security Framework 1.0, section 5.1, and LTI core 1.3, section 5; signs nobody in itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlencode
+
+import jwt
+from jwt import PyJWKSet
+from jwt.exceptions import PyJWTError
+
+from service.lti.fetching import fetch
+from service.store.lti import PendingLaunch, Platform
+from service.store.states import Role
+from sim.errors import UsageError
+from submissions.people import Student
+
+CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
+MEMBERS_CLAIM = "https://purl.imsglobal.org/spec/lti-nrps/claim/namesroleservice"
+GRADES_CLAIM = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
+_MEMBERSHIP = "http://purl.imsglobal.org/vocab/lis/v2/membership"
+_CLOCKS_DIFFER_SECONDS = 60
+_LONGEST = 250
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """What a platform vouches for: who comes, as what, and to which course."""
+
+    subject: str
+    student: Student
+    role: Role
+    context: str
+    course_title: str
+    members_url: str | None
+    lineitems_url: str | None
+
+
+def authorization_address(
+    platform: Platform, redirect_uri: str, login_hint: str, message_hint: str | None, state: str, nonce: str
+) -> str:
+    """Where the browser goes to be told apart by the platform."""
+    asked = {
+        "scope": "openid",
+        "response_type": "id_token",
+        "response_mode": "form_post",
+        "prompt": "none",
+        "client_id": platform.client_id,
+        "redirect_uri": redirect_uri,
+        "login_hint": login_hint,
+        "state": state,
+        "nonce": nonce,
+    }
+    if message_hint:
+        asked["lti_message_hint"] = message_hint
+    separator = "&" if "?" in platform.authorization_url else "?"
+    return f"{platform.authorization_url}{separator}{urlencode(asked)}"
+
+
+def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
+    """What the token says, if the platform signed it for us, now, and for the launch that was begun.
+
+    Raises UsageError where it is not to be trusted, and PlatformError where the platform's keys cannot be had.
+    """
+    claims = _claims(pending, id_token)
+    if claims.get(f"{CLAIM}version") != "1.3.0":
+        raise UsageError("this launch is not of LTI 1.3")
+    if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
+        raise UsageError("this launch is not one of a link in a course; Robomark answers no other")
+    deployment = claims.get(f"{CLAIM}deployment_id")
+    if deployment not in pending.platform.deployments:
+        raise UsageError(f"this launch comes from a deployment that is not registered here: {str(deployment)[:80]!r}")
+    context = _table(claims, f"{CLAIM}context")
+    context_id = context.get("id")
+    subject = claims.get("sub")
+    if not isinstance(context_id, str) or not isinstance(subject, str) or not context_id or not subject:
+        raise UsageError("this launch names no course or nobody; the platform has to send both")
+    title = context.get("title") or context.get("label") or context_id
+    return Launch(
+        subject=subject[:_LONGEST],
+        student=_student(claims, pending.platform, subject),
+        role=role_of(claims.get(f"{CLAIM}roles")),
+        context=context_id[:_LONGEST],
+        course_title=str(title)[:_LONGEST],
+        members_url=_text(_table(claims, MEMBERS_CLAIM).get("context_memberships_url")),
+        lineitems_url=_text(_table(claims, GRADES_CLAIM).get("lineitems")),
+    )
+
+
+def role_of(roles: object) -> Role:
+    """An instructor of the course, or else a student; what somebody is in the institution gives them nothing here."""
+    named = {role for role in roles if isinstance(role, str)} if isinstance(roles, list) else set()
+    return Role.INSTRUCTOR if named & {f"{_MEMBERSHIP}#Instructor", "Instructor"} else Role.STUDENT
+
+
+def student_of(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
+    """How a course knows somebody whom a platform told of: by the institution's id where it says one."""
+    return Student((id or f"{platform.name} {subject}")[:_LONGEST], (name or "")[:_LONGEST], (email or "")[:_LONGEST])
+
+
+def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
+    platform = pending.platform
+    keys = fetch(platform.keys_url).value
+    try:
+        known = PyJWKSet.from_dict(keys)
+        key = known[jwt.get_unverified_header(id_token).get("kid", "")]
+        claims: dict[str, Any] = jwt.decode(
+            id_token,
+            key,
+            algorithms=["RS256"],
+            audience=platform.client_id,
+            issuer=platform.issuer,
+            leeway=_CLOCKS_DIFFER_SECONDS,
+            options={"require": ["exp", "iat", "aud", "iss", "sub", "nonce"]},
+        )
+    except (PyJWTError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"the platform's word cannot be trusted: {error}") from None
+    audience = claims["aud"]
+    if isinstance(audience, list) and len(audience) > 1 and claims.get("azp") != platform.client_id:
+        raise UsageError("the platform's word is meant for somebody else")
+    if claims["nonce"] != pending.nonce:
+        raise UsageError("this launch was used already, or was begun elsewhere; open the link in the course again")
+    return claims
+
+
+def _student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:
+    known = _text(_table(claims, f"{CLAIM}lis").get("person_sourcedid"))
+    return student_of(platform, subject, known, _text(claims.get("name")), _text(claims.get("email")))
+
+
+def _table(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    found = claims.get(name)
+    return found if isinstance(found, dict) else {}
+
+
+def _text(value: object) -> str | None:
+    return value if isinstance(value, str) and value else None

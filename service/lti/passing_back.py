@@ -1,0 +1,59 @@
+"""Published marks on their way to a platform's gradebook: the grade that stands of each student whom it knows."""
+
+from __future__ import annotations
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.lti.services import Score, send_scores
+from service.store import lti
+from service.store.engine import Store
+from service.store.lti import CourseLink
+from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
+from service.store.states import JobState, Standing
+from sim.errors import UsageError
+
+
+def send_marks(store: Store, link: CourseLink, course_id: int, assignment: str) -> int:
+    """Send the published marks of an assignment; how many there were.
+
+    Raises UsageError where nobody of the course submitted to it, PlatformError where the platform takes none.
+    """
+    with store.reading() as session:
+        title = session.scalar(
+            select(AssignmentVersion.title)
+            .join(Job, Job.assignment_version_id == AssignmentVersion.id)
+            .join(Enrolment, Job.enrolment_id == Enrolment.id)
+            .where(Enrolment.course_id == course_id, AssignmentVersion.assignment == assignment)
+            .order_by(AssignmentVersion.id.desc())
+            .limit(1)
+        )
+        if title is None:
+            raise UsageError(f"nobody of this course has submitted to {assignment!r}")
+        scores = _published(session, link, course_id, assignment)
+    return send_scores(store, link, assignment, title, scores)
+
+
+def _published(session: Session, link: CourseLink, course_id: int, assignment: str) -> list[Score]:
+    """The newest submission of each student whose grade stands and is published."""
+    subjects = lti.subjects(session, link.platform, course_id)
+    query = (
+        select(Enrolment.student, Job.marks, Job.max_marks, Job.published_at)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .where(
+            Enrolment.course_id == course_id,
+            SubmissionRow.assignment == assignment,
+            SubmissionRow.staff_only.is_(None),
+            Job.state == JobState.DONE,
+            Job.standing == Standing.STANDS,
+            Job.suspect.is_(None),
+            Job.published_at.is_not(None),
+        )
+        .order_by(SubmissionRow.attempt)
+    )
+    newest = {}
+    for student, marks, max_marks, published_at in session.execute(query):
+        if student in subjects and marks is not None and max_marks and published_at is not None:
+            newest[student] = Score(subjects[student], marks, max_marks, published_at)
+    return list(newest.values())

@@ -1,0 +1,376 @@
+"""A film of one trial, a GIF: the robot on its floor with its pen, the time, and what is printed, said and sent.
+
+It shows what the replay shows, for where nothing can run. It is a minute's work at most, however long the trial was:
+time runs so fast that a few hundred frames are enough.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageColor, ImageDraw, ImageFont
+
+from service.grading.grade import TrialResult
+from service.reports.plots.style import FAINT, FAULT, FONT_FILE, INK, LEFT, PEN, RIGHT, RULE, SECOND_ROBOT, drawable
+from service.reports.readable import one_line
+from service.reports.replay.sources import Sources
+from service.reports.replay.trial import trial_data
+from service.reports.robots import robots_of
+from sim.recorded import floor_of, pose_after, robot_of, ticks_until
+from sim.recording import Pose, Recording
+from sim.robot import LightSensor
+
+Pixels = NDArray[np.uint8]
+Point = tuple[float, float]
+
+#: Milliseconds; a GIF counts hundredths of a second.
+FRAME = 80
+MOST_FRAMES = 300
+_LAST_FRAME = 2000
+_WIDTH, _LOWEST, _HIGHEST, _STRIP = 640, 240, 420, 50  # pixels
+_MARGIN, _BEYOND, _CLOSEST = 150, 400, 640  # mm
+_FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
+_OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY = "#a3aab1", "#ffffff", "#c8cdd2", "#3f7d3c"
+_COLOURS = (INK, LEFT, RIGHT, PEN, FAULT, SECOND_ROBOT, FAINT, RULE, _OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY)
+_FOUND_COLOURS, _TOO_NEAR = 150, 8
+_FINER = 3  # what is drawn is so much larger at first, so that it has no steps
+_NOTHING_SEEN = 2550  # mm
+#: Frames for which a text stays at least, and at most.
+_SHORTEST, _LONGEST = 10, 25
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """The part of the world that is filmed: its upper left corner, mm, and how many pixels a mm has."""
+
+    left: float
+    top: float
+    scale: float
+    height: int  # pixels
+
+    def at(self, x: float, y: float) -> Point:
+        return (x - self.left) * self.scale, (self.top - y) * self.scale
+
+
+def film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
+    """The trial as a GIF; ``own_floors`` are those that are not built in, by name."""
+    recording = trial.recording
+    sight = _sight(recording)
+    ground = _ground(recording, own_floors.get(recording.background), sight)
+    speed = max(1, math.ceil(recording.end_t * 1000 / FRAME / (MOST_FRAMES - 1)))
+    palette = _palette(_frames(trial, ground.copy(), sight, speed, (0.0, recording.end_t)))
+    moments = [*np.arange(0, recording.end_t, FRAME / 1000 * speed).tolist(), recording.end_t]
+    frames = (
+        frame.quantize(palette=palette, dither=Image.Dither.NONE)
+        for frame in _frames(trial, ground, sight, speed, moments)
+    )
+    durations = [FRAME] * (len(moments) - 1) + [_LAST_FRAME]
+    stream = io.BytesIO()
+    next(frames).save(
+        stream, "GIF", save_all=True, append_images=frames, duration=durations, loop=0, optimize=False, disposal=1
+    )
+    return stream.getvalue()
+
+
+def _frames(
+    trial: TrialResult, ground: Image.Image, sight: _Sight, speed: int, moments: list[float] | tuple[float, ...]
+) -> Iterator[Image.Image]:
+    """A frame for each moment; what the robots leave behind is drawn on ``ground``."""
+    recording = trial.recording
+    words = _Words(trial)
+    robots = [own for _, own in robots_of(recording)]
+    drawn, marked = 0, -math.inf
+    for number, t in enumerate(moments):
+        tick = ticks_until(recording, t)
+        for which, own in enumerate(robots):
+            _leave_trail(ground, own, sight, drawn, tick, SECOND_ROBOT if which else LEFT)
+            _leave_marks(ground, own, sight, marked, t)
+        drawn, marked = tick, t
+        seen = ground.copy()
+        for which, own in enumerate(robots):
+            _draw_robot(seen, own, sight, tick, SECOND_ROBOT if which else INK)
+        frame = Image.new("RGB", (_WIDTH, sight.height + _STRIP), _PAPER)
+        frame.paste(seen)
+        _draw_strip(frame, sight.height, t, recording.end_t, speed, words.at(t, number))
+        yield frame
+
+
+def _sight(recording: Recording) -> _Sight:
+    """Where the robots have been, with some room around, in the shape of a screen."""
+    places = np.vstack([_places(own) for _, own in robots_of(recording)])
+    if recording.beacon is not None:
+        places = np.vstack((places, recording.beacon))
+    places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
+    most = (_FLOOR_WIDTH + _BEYOND, _FLOOR_HEIGHT + _BEYOND)
+    low = np.clip(places.min(axis=0), -_BEYOND, most) - _MARGIN
+    high = np.clip(places.max(axis=0), -_BEYOND, most) + _MARGIN
+    across, up = (high - low).tolist()
+    height = round(min(max(_WIDTH * up / across, _LOWEST), _HIGHEST))
+    scale = min(_WIDTH / max(across, _CLOSEST), height / up)
+    middle_x, middle_y = ((low + high) / 2).tolist()
+    return _Sight(middle_x - _WIDTH / scale / 2, middle_y + height / scale / 2, scale, height)
+
+
+def _places(own: Recording) -> NDArray[np.float64]:
+    start = np.array([[own.start.x, own.start.y]])
+    return np.vstack((start, np.column_stack((own.ticks.x, own.ticks.y))))
+
+
+def _ground(recording: Recording, own: Pixels | None, sight: _Sight) -> Image.Image:
+    """The floor as it was, white where nobody has it any more, with what stands on it."""
+    ground = Image.new("RGB", (_WIDTH, sight.height), _OFF_THE_FLOOR)
+    built_in = floor_of(recording) if own is None else None
+    pixels = own if built_in is None else built_in.pixels
+    if pixels is None:
+        pixels = np.full((_FLOOR_HEIGHT, _FLOOR_WIDTH, 3), 255, np.uint8)
+    image = Image.fromarray(np.ascontiguousarray(pixels[:, :, :3]))
+    per = image.width / _FLOOR_WIDTH
+    left, right = (min(max(x, 0.0), _FLOOR_WIDTH) for x in (sight.left, sight.left + _WIDTH / sight.scale))
+    bottom, top = (min(max(y, 0.0), _FLOOR_HEIGHT) for y in (sight.top - sight.height / sight.scale, sight.top))
+    corner, far = sight.at(left, top), sight.at(right, bottom)
+    size = (max(1, round(far[0]) - round(corner[0])), max(1, round(far[1]) - round(corner[1])))
+    box = (left * per, (_FLOOR_HEIGHT - top) * per, right * per, (_FLOOR_HEIGHT - bottom) * per)
+    if right > left and top > bottom:
+        ground.paste(image.resize(size, Image.Resampling.LANCZOS, box=box), (round(corner[0]), round(corner[1])))
+    draw = ImageDraw.Draw(ground)
+    for x, y, wide, high in recording.obstacles:
+        draw.rectangle((*sight.at(x, y + high), *sight.at(x + wide, y)), fill=_OBSTACLE, outline=INK)
+    if recording.beacon is not None:
+        x, y = sight.at(*recording.beacon)
+        points = [
+            (x + (4.5 if point % 2 else 11) * math.sin(point * math.pi / 5),
+             y - (4.5 if point % 2 else 11) * math.cos(point * math.pi / 5))
+            for point in range(10)
+        ]  # fmt: skip
+        with _Layer(ground, points) as layer:
+            layer.polygon(points, RIGHT, INK, 1)
+    return ground
+
+
+def _leave_trail(ground: Image.Image, own: Recording, sight: _Sight, since: int, until: int, colour: str) -> None:
+    """The way from one tick to the other, and what the pen drew on it."""
+    until = min(until, len(own.ticks))
+    if until <= since:
+        return
+    way = _seen(own, sight, since, until)
+    with _Layer(ground, way) as layer:
+        for down, up in _strokes(own):
+            if max(since, down) < min(until, up):
+                pen = _seen(own, sight, max(since, down), min(until, up))
+                layer.line(pen, PEN, max(7.0, 8 * sight.scale))
+        layer.line(way, _PAPER, 4)
+        layer.line(way, colour, 2)
+
+
+def _seen(own: Recording, sight: _Sight, since: int, until: int) -> list[Point]:
+    """Where on the frame the robot was from one tick to the other, as far as it is known."""
+    poses = (pose_after(own, tick) for tick in range(since, until + 1))
+    return [sight.at(pose.x, pose.y) for pose in poses if math.isfinite(pose.x + pose.y)]
+
+
+def _strokes(own: Recording) -> list[tuple[int, int]]:
+    """From each tick at which the pen goes down to the one at which it goes up."""
+    strokes: list[tuple[int, int]] = []
+    since = None
+    for tick, down in (*own.pen, (len(own.ticks), False)):
+        if down and since is None:
+            since = tick
+        elif not down and since is not None:
+            strokes.append((since, tick))
+            since = None
+    return strokes
+
+
+def _leave_marks(ground: Image.Image, own: Recording, sight: _Sight, since: float, until: float) -> None:
+    """A cross for each touch after the one moment until the other."""
+    for touch in own.touches:
+        if since < touch.t <= until and math.isfinite(touch.pose.x + touch.pose.y):
+            x, y = sight.at(touch.pose.x, touch.pose.y)
+            for way in ([(x - 6, y - 6), (x + 6, y + 6)], [(x - 6, y + 6), (x + 6, y - 6)]):
+                with _Layer(ground, way) as layer:
+                    layer.line(way, FAULT, 2.5)
+
+
+def _draw_robot(frame: Image.Image, own: Recording, sight: _Sight, tick: int, colour: str) -> None:
+    body, pose = robot_of(own), pose_after(own, tick)
+    if not math.isfinite(pose.x + pose.y + pose.heading):
+        return
+    place = _Placed(pose, sight)
+    row = min(tick, len(own.ticks)) - 1
+    distance = float(own.ticks.ultrasonic[row]) if row >= 0 else math.nan
+    ray = [place.at(0, body.ultrasonic_y), place.at(0, body.ultrasonic_y + distance)]
+    seen = ray if distance < _NOTHING_SEEN else []
+    outline = place.rounded(-body.half_width, body.back, body.half_width, body.front, 12)
+    with _Layer(frame, [*outline, *seen]) as layer:
+        if seen:
+            layer.dashes(ray[0], ray[1], _RAY, 1.5)
+            layer.dot(ray[1], 3.5, _RAY)
+        layer.polygon(outline, "#ffffffb4", colour, 1.8)
+        wheel = body.wheel_diameter
+        for side in (-1, 1):
+            middle = side * body.wheel_spacing / 2
+            layer.polygon(place.rounded(middle - 0.18 * wheel, -wheel / 2, middle + 0.18 * wheel, wheel / 2, 4), INK)
+        lights = ((body.left_light, own.ticks.left_rgb, LEFT), (body.right_light, own.ticks.right_rgb, RIGHT))
+        for sensor, column, edge in lights:
+            layer.dot(place.at(sensor.x, sensor.y), _light_radius(sensor, sight) + 1.6, edge)
+            known = row >= 0 and bool(np.isfinite(column[row]).all())
+            light = tuple(np.clip(column[row], 0, 255).astype(int).tolist()) if known else (255, 255, 255)
+            layer.dot(place.at(sensor.x, sensor.y), _light_radius(sensor, sight), light)
+        layer.dot(place.at(0, 0), 4, _PAPER)
+        layer.dot(place.at(0, 0), 2.6, colour)
+
+
+def _light_radius(sensor: LightSensor, sight: _Sight) -> float:
+    return sensor.diameter / 2 * sight.scale
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A robot's own points on the frame: x to its right, y forward, mm."""
+
+    pose: Pose
+    sight: _Sight
+
+    def at(self, right: float, forward: float) -> Point:
+        cosine, sine = math.cos(math.radians(self.pose.heading)), math.sin(math.radians(self.pose.heading))
+        return self.sight.at(
+            self.pose.x + forward * cosine + right * sine, self.pose.y + forward * sine - right * cosine
+        )
+
+    def rounded(self, left: float, back: float, right: float, front: float, radius: float) -> list[Point]:
+        """A rectangle with round corners."""
+        corners = ((right, front, 0), (left, front, 90), (left, back, 180), (right, back, 270))
+        points = []
+        for x, y, begin in corners:
+            for angle in range(begin, begin + 91, 30):
+                cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+                inner_x = x - radius if x == right else x + radius
+                inner_y = y - radius if y == front else y + radius
+                points.append(self.at(inner_x + radius * cosine, inner_y + radius * sine))
+        return points
+
+
+class _Layer:
+    """The part of an image around some points, to draw on without steps; it lies on the image when it is left."""
+
+    def __init__(self, image: Image.Image, points: list[Point], room: int = 8) -> None:
+        self._image = image
+        across, down = ([point[axis] for point in points] or [0.0] for axis in (0, 1))
+        self._left, self._top = max(0, math.floor(min(across)) - room), max(0, math.floor(min(down)) - room)
+        right = min(image.width, math.ceil(max(across)) + room)
+        bottom = min(image.height, math.ceil(max(down)) + room)
+        self._size = max(0, right - self._left), max(0, bottom - self._top)
+        self._layer = Image.new("RGBA", (self._size[0] * _FINER, self._size[1] * _FINER))
+        self._draw = ImageDraw.Draw(self._layer)
+
+    def __enter__(self) -> _Layer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if 0 not in self._size:
+            small = self._layer.resize(self._size, Image.Resampling.BOX)
+            self._image.paste(small, (self._left, self._top), small)
+
+    def line(self, points: list[Point], colour: str, width: float) -> None:
+        fine = [self._fine(point) for point in points]
+        if len(set(fine)) > 1:
+            self._draw.line(fine, fill=colour, width=round(width * _FINER), joint="curve")
+
+    def dashes(self, begin: Point, end: Point, colour: str, width: float) -> None:
+        long = math.dist(begin, end)
+        for start in np.arange(0, long, 10).tolist():
+            here, there = start / long, min(start + 6, long) / long
+            dash = [tuple(np.add(begin, np.multiply(np.subtract(end, begin), part)).tolist()) for part in (here, there)]
+            self._draw.line([self._fine((x, y)) for x, y in dash], fill=colour, width=round(width * _FINER))
+
+    def polygon(self, points: list[Point], fill: str, outline: str | None = None, width: float = 1) -> None:
+        fine = [self._fine(point) for point in points]
+        self._draw.polygon(fine, fill=fill)
+        if outline is not None:
+            self._draw.line([*fine, *fine[:2]], fill=outline, width=round(width * _FINER), joint="curve")
+
+    def dot(self, place: Point, radius: float, colour: str | tuple[int, ...]) -> None:
+        self._round(self._fine(place), radius * _FINER, colour)
+
+    def _round(self, fine: Point, radius: float, colour: str | tuple[int, ...]) -> None:
+        x, y = fine
+        self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
+
+    def _fine(self, point: Point) -> Point:
+        return (point[0] - self._left) * _FINER, (point[1] - self._top) * _FINER
+
+
+class _Words:
+    """What is told below the floor: the latest text, for as long as it takes to read it."""
+
+    def __init__(self, trial: TrialResult) -> None:
+        told = trial_data(trial, Sources())
+        texts = [*told["events"], *told["messages"]]
+        self._texts = sorted(texts, key=lambda text: float(text["t"]))
+        self._moments = [float(text["t"]) for text in self._texts]
+        self._count, self._since = 0, 0
+
+    def at(self, t: float, frame: int) -> tuple[str, str]:
+        """The text and its colour; the frames are asked for in their order."""
+        count = bisect_right(self._moments, t + 1e-6)
+        if count > self._count and (not self._count or frame - self._since >= _SHORTEST):
+            self._count, self._since = count, frame
+        if not self._count or frame - self._since > _LONGEST:
+            return "", INK
+        return _told(self._texts[self._count - 1])
+
+
+def _told(text: Mapping[str, Any]) -> tuple[str, str]:
+    if "kind" in text:
+        return f"{text['who']} {text['kind']}: {text['text']}", FAULT if text["kind"] in ("fault", "touched") else INK
+    befell = f"{text['befell']}: " if "befell" in text else ""
+    return f"{text['from']} → {text['to']}: {befell}{text['text']}", FAULT if text["arrived"] is None else LEFT
+
+
+def _draw_strip(frame: Image.Image, top: int, t: float, end: float, speed: int, words: tuple[str, str]) -> None:
+    """How far it is, as a bar and in figures, and what was told last."""
+    draw = ImageDraw.Draw(frame)
+    draw.rectangle((0, top, _WIDTH, top + 3), fill=RULE)
+    draw.rectangle((0, top, round(_WIDTH * t / end) if end else _WIDTH, top + 3), fill=LEFT)
+    clock = f"{t:.1f} of {end:.1f} s"
+    draw.text((8, top + 8), clock, fill=INK, font=_font())
+    draw.text((_WIDTH - 8, top + 8), f"{speed}×", fill=FAINT, font=_font(), anchor="ra")
+    text, colour = words
+    draw.text((8, top + 28), _shortened(drawable(one_line(text, 200)), _WIDTH - 16), fill=colour, font=_font())
+
+
+def _shortened(text: str, width: int) -> str:
+    if _font().getlength(text) <= width:
+        return text
+    while text and _font().getlength(f"{text}…") > width:
+        text = text[:-1]
+    return f"{text}…"
+
+
+@lru_cache(maxsize=1)
+def _font() -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(str(FONT_FILE), 14, layout_engine=ImageFont.Layout.BASIC)
+
+
+def _palette(frames: Iterator[Image.Image]) -> Image.Image:
+    """One for the whole film: those of its first and last frame, and all that anything is drawn in."""
+    first, last = (frame.copy() for frame in frames)
+    sample = Image.new("RGB", (_WIDTH, first.height + last.height))
+    sample.paste(first)
+    sample.paste(last, (0, first.height))
+    quantized = sample.quantize(_FOUND_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    found = np.reshape(quantized.getpalette() or [], (-1, 3))[:_FOUND_COLOURS]
+    exact = np.array([ImageColor.getrgb(colour) for colour in _COLOURS])
+    # A pixel is given the first colour that comes near it, which would tint what is white.
+    others = found[np.abs(found[:, None] - exact).max(axis=2).min(axis=1) > _TOO_NEAR]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(np.vstack((exact, others)).ravel().tolist())
+    return palette

@@ -1,0 +1,52 @@
+// Another trial over the one that is watched: whether it is shown, where the two part, and how far apart they are.
+
+// How far the other trial's robot is from this one's: mm, and degrees one way or the other.
+function apart(trial, t) {
+  const [[x, y, heading], [otherX, otherY, otherHeading]] = [trial, trial.over].map((run) =>
+    run.robots[0].pose(run.ticks(t)));
+  const turned = heading - otherHeading;
+  return [Math.hypot(x - otherX, y - otherY), Math.abs(turned - 360 * Math.round(turned / 360))];
+}
+
+function apartWords(trial, t) {
+  const [far, turned] = apart(trial, t);
+  return `${Math.round(far)} mm and ${Math.round(turned)}° apart`;
+}
+
+class OverChoice {
+  constructor(changed) {
+    this.box = element("input", { type: "checkbox", checked: true });
+    this.box.addEventListener("change", changed);
+    this.words = element("span");
+    this.parted = element("span", { className: "small" });
+    this.now = element("span", { className: "small soft" });
+    this.root = element("div", { className: "over" },
+      element("label", {}, this.box, element("span", { className: "dashes", "aria-hidden": "true" }), this.words),
+      this.parted, this.now);
+  }
+
+  // The other trial, where there is one and it is to be seen.
+  of(trial) {
+    return this.box.checked ? trial.over : null;
+  }
+
+  show(trial) {
+    this.trial = trial;
+    this.root.hidden = !trial.over;
+    if (!trial.over) return;
+    this.words.textContent = `Show ${trial.over.name} over it: ${trial.over.ended}`;
+    const { parted } = trial.over;
+    if (parted === null) this.parted.textContent = "They go the same way.";
+    else {
+      this.parted.replaceChildren(
+        element("a", { href: momentHash(trial, parted) }, `Here they part: ${seconds(parted)}`));
+    }
+    this.now.hidden = !this.box.checked;
+  }
+
+  draw(t) {
+    if (!this.of(this.trial)) return;
+    const words = `Now ${apartWords(this.trial, t)}.`;
+    if (this.now.textContent !== words) this.now.textContent = words;
+  }
+}

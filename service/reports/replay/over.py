@@ -1,0 +1,70 @@
+"""Another trial as a replay draws it over the one that is watched, and the moment at which the two part.
+
+Which trials may lie over each other is the view's to say; of the other's source and images nothing is told.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.grading.grade import TrialResult
+from service.reports.readable import one_line
+from service.reports.replay.sources import Sources
+from service.reports.replay.trial import trial_data
+from service.reports.robots import robots_of
+from sim.recording import SECOND, Recording
+
+#: Poses that differ by more are told apart by the eye.
+_FAR, _TURNED = 10.0, 5.0  # mm, degrees
+_COLUMNS = frozenset({"x", "y", "heading", "left_position", "right_position"})
+_KEPT = ("verdict", "ended", "seconds", "tick", "messages", "events", "left_out")
+
+
+def over_data(trial: TrialResult, other: TrialResult, name: str) -> dict[str, Any]:
+    """What is drawn and told of ``other`` beside ``trial``; ``name`` says whose it is."""
+    told = trial_data(other, Sources())
+    robots = [{**robot, "columns": _drawn(robot["columns"]), "images": []} for robot in told["robots"]]
+    return {
+        "name": one_line(name, 60),
+        **{key: told[key] for key in _KEPT},
+        "robots": robots,
+        "parted": parted(trial.recording, other.recording),
+    }
+
+
+def parted(one: Recording, other: Recording) -> float | None:
+    """The first moment at which a robot's poses differ by more than 10 mm or 5 degrees; None if they never do.
+
+    A robot whose trial has ended stays where it is.
+    """
+    pairs = zip(robots_of(one), robots_of(other), strict=False)
+    moments = [_parted(own, others) for (_, own), (_, others) in pairs]
+    return min((moment for moment in moments if moment is not None), default=None)
+
+
+def _parted(one: Recording, other: Recording) -> float | None:
+    times = np.union1d(_times(one), _times(other))
+    x, y, heading = (_along(one, times) - _along(other, times)).T
+    turned = np.abs((heading + 180) % 360 - 180)
+    apart = np.flatnonzero((np.hypot(x, y) > _FAR) | (turned > _TURNED))
+    return float(times[apart[0]]) if apart.size else None
+
+
+def _times(recording: Recording) -> NDArray[np.float64]:
+    """Seconds of each pose, the one at the start included."""
+    return np.round(np.arange(len(recording.ticks) + 1) * recording.ticks.length / SECOND, 9)
+
+
+def _along(recording: Recording, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The poses at these times, a row each, on the straight way from one tick to the next."""
+    ticks, start = recording.ticks, recording.start
+    columns = ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
+    known = [np.concatenate(([first], values)) for values, first in columns]
+    return np.stack([np.interp(times, _times(recording), values) for values in known], axis=1)
+
+
+def _drawn(columns: dict[str, Any]) -> dict[str, Any]:
+    return {name: column for name, column in columns.items() if name in _COLUMNS}

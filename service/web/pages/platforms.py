@@ -1,0 +1,96 @@
+"""Learning platforms: registered by whoever runs the installation; members fetched and marks sent by instructors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Form, Request
+from fastapi.responses import RedirectResponse, Response
+
+from service.lti import services
+from service.lti.passing_back import send_marks
+from service.store import audit, lti, open_assignments
+from service.web.access import Instructing, Operating
+from service.web.context import Context
+from service.web.rendering import page
+from sim.errors import UsageError
+
+router = APIRouter()
+Address = Annotated[str, Form(min_length=1, max_length=1000)]
+
+
+@router.get("/operator/platforms")
+def platforms(request: Request, reader: Operating, context: Context) -> Response:
+    """What is registered, what a platform's administrator has to be told, and a form for another."""
+    with context.store.reading() as session:
+        registered = lti.platforms(session)
+    start = context.settings.public_url or str(request.base_url).rstrip("/")
+    return page(request, reader, "platforms.html", platforms=registered, start=start)
+
+
+@router.post("/operator/platforms")
+def register(
+    reader: Operating,
+    context: Context,
+    name: Annotated[str, Form(min_length=1, max_length=200)],
+    issuer: Address,
+    client_id: Address,
+    deployments: Address,
+    authorization_url: Address,
+    token_url: Address,
+    keys_url: Address,
+) -> Response:
+    """Register a platform, or change one of the same issuer and client."""
+    for what, url in (("login", authorization_url), ("token", token_url), ("keys", keys_url)):
+        if not url.startswith(("https://", "http://")):
+            raise UsageError(f"the {what} address is {url!r}, expected one that begins with https://")
+    listed = [each for each in deployments.replace(",", " ").split() if each]
+    with context.store.transaction() as session:
+        platform_id = lti.register(session, name, issuer, client_id, listed, authorization_url, token_url, keys_url)
+        audit.note(session, reader.actor, "register", "lti_platform", str(platform_id), issuer=issuer)
+    return RedirectResponse("/operator/platforms", 303)
+
+
+@router.get("/courses/{course_id}/platform")
+def course_platform(request: Request, here: Instructing, context: Context) -> Response:
+    """The platform that the course is launched from, and what can be fetched from it and sent to it."""
+    return _course_page(request, here, context, "")
+
+
+@router.post("/courses/{course_id}/platform/members")
+def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
+    """Enrol everybody whom the platform has in the course."""
+    with context.store.reading() as session:
+        link = _link(lti.course_link(session, here.course_id))
+    found = services.members(context.store, link)
+    with context.store.transaction() as session:
+        for each in found:
+            lti.enrol(session, link.platform, here.course_id, each.subject, each.student, each.role)
+        audit.note(session, here.actor, "enrol", "course", str(here.course_id), members=len(found))
+    return _course_page(request, here, context, f"{len(found)} of the platform's members are in the course.")
+
+
+@router.post("/courses/{course_id}/platform/marks")
+def pass_back(
+    request: Request, here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=200)]
+) -> Response:
+    """Send the published marks of an assignment to the platform's gradebook."""
+    with context.store.reading() as session:
+        link = _link(lti.course_link(session, here.course_id))
+    sent = send_marks(context.store, link, here.course_id, assignment)
+    with context.store.transaction() as session:
+        audit.note(session, here.actor, "pass_back", "course", str(here.course_id), assignment=assignment, sent=sent)
+    return _course_page(request, here, context, f"{sent} published marks were sent.")
+
+
+def _course_page(request: Request, here: Instructing, context: Context, told: str) -> Response:
+    with context.store.reading() as session:
+        link = lti.course_link(session, here.course_id)
+        assignments = open_assignments.of_course(session, here.course_id)
+    return page(request, here.reader, "course_platform.html", here=here, link=link, assignments=assignments, told=told)
+
+
+def _link(link: lti.CourseLink | None) -> lti.CourseLink:
+    if link is None:
+        raise UsageError("this course is launched from no learning platform")
+    return link

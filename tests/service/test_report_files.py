@@ -1,0 +1,106 @@
+"""What the files made of a stored grade show of another one, and to whom."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+import report_builders as build
+from builders import grading_request
+from replays import data_of, parting_grade
+from service.grading.grade import Grade
+from service.report_files import write_grade_film, write_grade_replay, write_report
+from service.store import batches, jobs, policies, regrades, results
+from service.store.batches import JobLine
+from service.store.engine import Store, now
+from service.store.intake import accept_batch
+from service.store.policies import PolicyLimits
+from service.store.students import course_of
+from sim.errors import UsageError
+
+
+def stored(store: Store, student: str, program: int, grade: Grade) -> tuple[JobLine, str]:
+    """The grade as that of a student's submission, and its batch."""
+    taken = accept_batch(store, "class", [grading_request(student, f"print({program})\n")], [], max_attempts=3)
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    return line_of(store, taken.jobs[0].job_id), taken.id
+
+
+def line_of(store: Store, job_id: str) -> JobLine:
+    with store.reading() as session:
+        return batches.job_line(session, job_id)
+
+
+def replay_over(store: Store, line: JobLine, over: JobLine, folder: Path) -> dict[str, object]:
+    """The first trial's other one in the replay of one grade with another over it."""
+    with store.reading() as session:
+        grade = results.load(session, line.id)
+    write_grade_replay(store, line, grade, folder / "replay.json", over)
+    return dict(json.loads((folder / "replay.json").read_text())["trials"][0]["over"])
+
+
+def test_a_student_watches_an_earlier_attempt_in_a_report_and_in_a_replay(store: Store, tmp_path: Path) -> None:
+    before, _ = stored(store, "ada", 1, parting_grade())
+    line, _ = stored(store, "ada", 2, build.line_follower_grade())
+    with store.reading() as session:
+        assert batches.job_before(session, line.id) == before.id
+        with pytest.raises(UsageError, match="comes before"):
+            batches.job_before(session, before.id)
+        grade = results.load(session, line.id)
+    told = replay_over(store, line, before, tmp_path)
+    assert (told["name"], told["parted"]) == ("attempt 1", pytest.approx(94 / 30))
+    report = write_report(store, line, grade, tmp_path, "ada", before)
+    assert [trial["over"]["name"] for trial in data_of(report.path.read_text())["trials"]] == ["attempt 1"] * 2
+    plain = write_report(store, line, grade, tmp_path, "ada")
+    assert all("over" not in trial for trial in data_of(plain.path.read_text())["trials"])
+
+
+def test_the_reference_is_shown_once_the_grade_is_published_and_other_students_never(
+    store: Store, tmp_path: Path
+) -> None:
+    reference, _ = stored(store, "reference", 1, parting_grade())
+    other, _ = stored(store, "bob", 2, parting_grade())
+    line, batch = stored(store, "ada", 3, build.line_follower_grade())
+    with pytest.raises(UsageError, match="published"):
+        replay_over(store, line, reference, tmp_path)
+    regrades.publish(store, batch, actor="staff")
+    assert replay_over(store, line_of(store, line.id), reference, tmp_path)["name"] == "the reference"
+    with pytest.raises(UsageError, match="another student's"):
+        replay_over(store, line_of(store, line.id), other, tmp_path)
+
+
+def test_what_is_for_staff_is_shown_over_nothing_that_a_student_reads(store: Store, tmp_path: Path) -> None:
+    with store.transaction() as session:
+        policies.set_policy(session, course_of(session, "default", now(session)), "", PolicyLimits(attempts=1))
+    first, batch = stored(store, "ada", 1, build.line_follower_grade())
+    proposal = regrades.regrade(store, batch, None, max_attempts=1, actor="staff")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(parting_grade()), datetime.now(UTC))
+    with store.reading() as session:
+        (proposed,) = batches.job_lines(session, proposal.batch_id)
+    with pytest.raises(UsageError, match="not published"):
+        replay_over(store, first, proposed, tmp_path)
+    over_the_limit = replace(first, staff_only="attempt 2, allowed: 1")
+    with pytest.raises(UsageError, match="staff only"):
+        replay_over(store, first, over_the_limit, tmp_path)
+    assert replay_over(store, over_the_limit, proposed, tmp_path)["name"] == f"attempt 1, grade {proposed.id}"
+
+
+def test_a_film_is_of_a_trial_that_may_be_shown(store: Store, tmp_path: Path) -> None:
+    line, _ = stored(store, "ada", 1, build.hidden_grade())
+    with store.reading() as session:
+        grade = results.load(session, line.id)
+    write_grade_film(store, line, grade, tmp_path / "film.gif", None)
+    with Image.open(tmp_path / "film.gif") as image:
+        assert image.format == "GIF"
+    for number in (0, 5, 6):
+        with pytest.raises(UsageError, match=f"--trial {number}: expected 1 to 4"):
+            write_grade_film(store, line, grade, tmp_path / "film.gif", number)

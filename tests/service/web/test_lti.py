@@ -1,0 +1,216 @@
+"""Launches, members and marks against a platform that is simulated from LTI 1.3, NRPS 2.0 and AGS 2.0."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from cryptography.hazmat.primitives.asymmetric import rsa
+from httpx2 import Response
+from sqlalchemy import update
+from starlette.testclient import TestClient
+
+import report_builders
+from builders import grading_request
+from lti_platform import CLIENT, INSTRUCTOR, ISSUER, LEARNER, LearningPlatform, learning_platform
+from service.lti.launch import CLAIM
+from service.store import intake, jobs, lti, people, results
+from service.store.models import Job
+from service.store.states import Role
+from service.store.web_tables import LtiCourse
+from service.web.access import CSRF_FIELD
+from web import Web, csrf, web_in
+
+SAME_SITE = "https://localhost"
+
+
+@pytest.fixture
+def launched(tmp_path: Path) -> Iterator[tuple[Web, LearningPlatform]]:
+    with learning_platform() as platform, web_in(tmp_path) as web:
+        urls = (f"{platform.url}/auth?x=1", f"{platform.url}/token", f"{platform.url}/keys")
+        with web.store.transaction() as session:
+            lti.register(session, "Moodle", ISSUER, CLIENT, ["1"], *urls)
+        yield web, platform
+
+
+def _browser(web: Web) -> TestClient:
+    return TestClient(web.app, base_url=SAME_SITE, follow_redirects=False)
+
+
+def _begin(browser: TestClient, **changes: str) -> dict[str, str]:
+    asked = {"iss": ISSUER, "login_hint": "hint", "client_id": CLIENT, "target_link_uri": f"{SAME_SITE}/"} | changes
+    answer = browser.post("/lti/login", data=asked, headers={"sec-fetch-site": "cross-site"})
+    assert answer.status_code == 303, answer.text
+    return {name: values[0] for name, values in parse_qs(urlsplit(answer.headers["location"]).query).items()}
+
+
+def _end(browser: TestClient, state: str, token: str) -> Response:
+    headers = {"sec-fetch-site": "cross-site", "origin": "https://platform.example.org"}
+    return browser.post("/lti/launch", data={"state": state, "id_token": token}, headers=headers)
+
+
+def _launch(
+    web: Web, platform: LearningPlatform, subject: str, *roles: str, **changes: Any
+) -> tuple[TestClient, Response]:
+    browser = _browser(web)
+    begun = _begin(browser)
+    return browser, _end(browser, begun["state"], platform.sign(platform.claims(begun, subject, *roles, **changes)))
+
+
+def test_an_instructor_and_then_a_student_come_to_a_course_of_its_own(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    _, refused = _launch(web, platform, "ada", LEARNER)
+    assert refused.status_code == 422
+    assert "No instructor has opened Robomark" in refused.text
+    grace, answer = _launch(web, platform, "grace", INSTRUCTOR)
+    assert answer.status_code == 303
+    assert answer.headers["location"] == "/courses/1/batches"
+    assert "Grace Example" in grace.get("/account").text
+    ada, answer = _launch(web, platform, "ada", LEARNER)
+    assert answer.headers["location"] == "/courses/1/mine"
+    assert ada.get("/courses/1/platform").status_code == 404
+    assert grace.get("/courses/1/platform").status_code == 200
+    with web.store.reading() as session:
+        assert [(each.id, each.role) for each in people.members(session, 1)] == [
+            ("ada", Role.STUDENT),
+            ("grace", Role.INSTRUCTOR),
+        ]
+        assert [course.name for course in people.courses(session)] == ["Robotics"]
+    # The same people again, and a course of the same title in another context.
+    _launch(web, platform, "grace", INSTRUCTOR)
+    _, answer = _launch(web, platform, "grace", INSTRUCTOR, **{f"{CLAIM}context": {"id": "c2", "title": "Robotics"}})
+    assert answer.headers["location"] == "/courses/2/batches"
+    with web.store.reading() as session:
+        assert [course.name for course in people.courses(session)] == ["Robotics", "Robotics (2)"]
+        (first,), (second,) = ([each for each in people.members(session, n) if each.id == "grace"] for n in (1, 2))
+        assert first.person_id == second.person_id
+
+
+_OTHER_KEY = rsa.generate_private_key(65537, 2048)
+_NOW = int(time.time())
+
+
+@pytest.mark.parametrize(
+    ("changes", "header", "said"),
+    [
+        pytest.param({"aud": "somebody else"}, {}, "trusted", id="for another client"),
+        pytest.param({"aud": [CLIENT, "other"], "azp": "other"}, {}, "somebody else", id="for another party"),
+        pytest.param({"iss": "https://evil.example.org"}, {}, "trusted", id="of another issuer"),
+        pytest.param({"exp": _NOW - 3600, "iat": _NOW - 7200}, {}, "trusted", id="expired"),
+        pytest.param({"nonce": "another"}, {}, "used already", id="another nonce"),
+        pytest.param({"nonce": None}, {}, "trusted", id="no nonce"),
+        pytest.param({"sub": None}, {}, "trusted", id="nobody"),
+        pytest.param({f"{CLAIM}deployment_id": "2"}, {}, "deployment", id="another deployment"),
+        pytest.param({f"{CLAIM}deployment_id": ["1"]}, {}, "deployment", id="a list for a deployment"),
+        pytest.param({f"{CLAIM}version": "1.1"}, {}, "not of LTI 1.3", id="another version"),
+        pytest.param({f"{CLAIM}message_type": "LtiDeepLinkingRequest"}, {}, "no other", id="another message"),
+        pytest.param({f"{CLAIM}context": None}, {}, "no course", id="no course"),
+        pytest.param({}, {"key": _OTHER_KEY}, "trusted", id="another key"),
+        pytest.param({}, {"kid": "k9"}, "trusted", id="an unknown key"),
+    ],
+)
+def test_a_word_that_is_not_to_be_trusted_signs_nobody_in(
+    launched: tuple[Web, LearningPlatform], changes: dict[str, Any], header: dict[str, Any], said: str
+) -> None:
+    web, platform = launched
+    browser = _browser(web)
+    begun = _begin(browser)
+    token = platform.sign(platform.claims(begun, "grace", INSTRUCTOR, **changes), **header)
+    answer = _end(browser, begun["state"], token)
+    assert answer.status_code == 422
+    assert said in answer.text
+    assert browser.get("/account").status_code == 303
+
+
+@pytest.mark.parametrize("token", ["", "x", "a.b.c", "eyJhbGciOiJub25lIn0.e30."])
+def test_what_is_no_token_is_refused(launched: tuple[Web, LearningPlatform], token: str) -> None:
+    browser = _browser(launched[0])
+    assert _end(browser, _begin(browser)["state"], token).status_code == 422
+
+
+def test_a_launch_counts_once_and_in_the_browser_that_began_it(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    browser, other = _browser(web), _browser(web)
+    begun = _begin(browser)
+    token = platform.sign(platform.claims(begun, "grace", INSTRUCTOR))
+    assert "another browser" in _end(other, begun["state"], token).text
+    assert _end(browser, begun["state"], token).status_code == 303
+    browser.cookies.set("robomark_launch", begun["state"], domain="localhost.local", path="/lti")
+    assert _end(browser, begun["state"], token).status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("target", "path"),
+    [
+        (f"{SAME_SITE}/courses/1/platform", "/courses/1/platform"),
+        ("https://evil.example.org/", "/courses/1/batches"),
+        (f"{SAME_SITE}.evil.example.org/", "/courses/1/batches"),
+        (f"{SAME_SITE}//evil.example.org/", "/courses/1/batches"),
+        (f"{SAME_SITE}/\\evil.example.org", "/courses/1/batches"),
+    ],
+)
+def test_a_launch_leads_nowhere_but_here(launched: tuple[Web, LearningPlatform], target: str, path: str) -> None:
+    web, platform = launched
+    browser = _browser(web)
+    begun = _begin(browser, target_link_uri=target)
+    answer = _end(browser, begun["state"], platform.sign(platform.claims(begun, "grace", INSTRUCTOR)))
+    assert answer.headers["location"] == path
+
+
+def test_a_platform_that_nobody_registered_begins_nothing(launched: tuple[Web, LearningPlatform]) -> None:
+    browser = _browser(launched[0])
+    answer = browser.get("/lti/login", params={"iss": "https://evil.example.org", "login_hint": "x"})
+    assert answer.status_code == 422
+    assert "registered" in answer.text
+
+
+def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    platform.tool_keys = _browser(web).get("/lti/keys").json()
+    grace, _ = _launch(web, platform, "grace", INSTRUCTOR)
+    platform.members = [
+        {"user_id": "grace", "name": "Grace Example", "roles": ["Instructor"], "lis_person_sourcedid": "grace"},
+        {"user_id": "ada", "name": "Ada Example", "roles": ["Learner"], "lis_person_sourcedid": "ada"},
+        {"user_id": "bob", "given_name": "Bob", "family_name": "Example", "roles": [LEARNER], "status": "Active"},
+        {"user_id": "eve", "roles": [LEARNER], "status": "Inactive"},
+    ]
+    word = csrf(grace.get("/account"))
+    answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: word})
+    assert "3 of the platform&#39;s members" in answer.text, answer.text
+    with web.store.reading() as session:
+        assert [each.name for each in people.members(session, 1)] == ["Bob Example", "Ada Example", "Grace Example"]
+    requests = [grading_request("ada"), grading_request("unknown")]
+    intake.accept_batch(web.store, "b", requests, (), course="Robotics", max_attempts=3)
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    send = {CSRF_FIELD: word, "assignment": "echo-responder"}
+    assert "0 published marks" in grace.post("/courses/1/platform/marks", data=send).text
+    assert platform.scores == []
+    with web.store.transaction() as session:
+        session.execute(update(Job).values(published_at=datetime.now(UTC), published_by="grace"))
+    for _ in range(2):
+        assert "1 published marks" in grace.post("/courses/1/platform/marks", data=send).text
+    assert len(platform.columns) == 1
+    graded = report_builders.faulty_grade()
+    assert [(each["userId"], each["scoreGiven"], each["scoreMaximum"]) for each in platform.scores] == [
+        ("ada", float(graded.marks), float(graded.max_marks))
+    ] * 2
+    missing = grace.post("/courses/1/platform/marks", data={**send, "assignment": "shape-recognition"})
+    assert missing.status_code == 422
+
+
+def test_a_platform_that_does_not_answer_is_said_so(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    grace, _ = _launch(web, platform, "grace", INSTRUCTOR)
+    platform.tool_keys = _browser(web).get("/lti/keys").json()
+    with web.store.transaction() as session:
+        session.execute(update(LtiCourse).values(members_url=f"{platform.url}/nowhere"))
+    answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: csrf(grace.get("/account"))})
+    assert answer.status_code == 502
+    assert re.search(r"The platform at 127.0.0.1:\d+ answered 403", answer.text)
