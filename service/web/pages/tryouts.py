@@ -28,16 +28,15 @@ router = APIRouter()
 @router.get("/courses/{course_id}/mine/{assignment}/try")
 def newest_tryout(request: Request, here: Studying, context: Context, assignment: str) -> Response:
     """What was tried last, with the program in the form to be changed; htmx is told to load it when it is through."""
+    if not wants_part(request):
+        return _shown(request, here, context, assignment)
     with context.store.reading() as session:
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        seen_assignment(session, here, assignment)
         newest = tryouts.newest(session, enrolment_id, assignment)
         line = tryouts.line(session, enrolment_id, newest) if newest else None
-    if wants_part(request):
-        if line is None or not line.waits:
-            return Response(headers={"hx-refresh": "true"})
-        return page(request, here.reader, "tryout_progress.html", here=here, line=line)
-    return _shown(request, here, context, assignment)
+    if line is None or not line.waits:
+        return Response(headers={"hx-refresh": "true"})
+    return page(request, here.reader, "tryout_progress.html", here=here, line=line)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
