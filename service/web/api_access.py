@@ -56,7 +56,7 @@ def caller_of(request: Request, context: Context) -> Caller:
         identity = credentials.identify(session, secret, CredentialKind.TOKEN)
     if identity is None:
         raise SignInNeeded("the token does not count")
-    context.api_calls.spend(identity.credential_id)
+    context.limits.api_calls.spend(identity.credential_id)
     with context.store.transaction() as session:
         credentials.note_use(session, identity.credential_id)
     return Caller(identity)

@@ -10,7 +10,7 @@ from fastapi import Depends, Request
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
-from service.web.rate_limits import RateLimit, RateLimits
+from service.web.rate_limits import RateLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,6 @@ class WebContext:
     settings: Settings
     store: Store
     notifier: Notifier
-    api_calls: RateLimit  # of each token
     limits: RateLimits = field(default_factory=RateLimits)
 
 

@@ -38,7 +38,7 @@ def submit(
         if not opened.open:
             raise UsageError(f"{opened.title} is closed; nothing can be submitted to it any more.")
         asked = open_assignments.load(session, course_id, assignment)
-    context.submissions.spend(str(identity.person_id))
+    context.limits.submissions.spend(str(identity.person_id))
     if not sent:
         raise UsageError("nothing was sent; choose a file, or paste a program.")
     source = shown(", ".join(each.flat_name for each in sent))
