@@ -95,6 +95,9 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "policy": Command("course:policy", "Say what holds for all, or show it."),
                 "extend": Command("course:extend", "Allow one student more time or attempts."),
                 "enrol": Command("course:enrol", "Enrol students before they submit."),
+                "export-student": Command("privacy:export_student", "Write all there is of a student."),
+                "delete-student": Command("privacy:delete_student", "Remove all there is of a student."),
+                "purge": Command("privacy:purge_course", "Remove what is old."),
             },
         ),
         "user": CommandGroup(

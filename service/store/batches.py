@@ -8,7 +8,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Select, func, select
+from sqlalchemy import ColumnElement, Row, Select, and_, func, or_, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store import overrides
@@ -43,6 +43,7 @@ class JobLine:
     """One job, as a table shows it."""
 
     id: str
+    submission_id: int
     student: str
     name: str  # the student's
     email: str
@@ -145,6 +146,16 @@ def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
     return _batch_lines(session, rows)
 
 
+def batches_of(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[BatchLine]:
+    """The newest batches of a course first, from the one on that was made ``after`` at, and has that id."""
+    query = select(Batch).where(Batch.course_id == course_id)
+    if after is not None:
+        earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
+        query = query.where(or_(Batch.created_at < after[0], earlier))
+    rows = session.scalars(query.order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
+    return _batch_lines(session, rows)
+
+
 def batch(session: Session, batch_id: str) -> BatchLine:
     """One batch. Raises UsageError if there is none of this id."""
     row = session.get(Batch, batch_id)
@@ -153,15 +164,21 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     return _batch_lines(session, [row])[0]
 
 
-def job_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs."""
+def job_lines(session: Session, batch_id: str, limit: int | None = None, after: str | None = None) -> list[JobLine]:
+    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs.
+
+    Where only some are wanted, those that follow on the job of this id.
+    """
     which: tuple[ColumnElement[bool], ...]
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
         which = (Job.batch_id == batch_id, Job.suspect.is_(None))
     else:
         ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
         which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
-    query = _job_lines().where(*which).order_by(Enrolment.student, Job.id)
+    query = _job_lines().where(*which).order_by(Enrolment.student, Job.id).limit(limit)
+    if after is not None:
+        own = select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == after)
+        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(own.scalar_subquery(), after))
     return [_line(row) for row in session.execute(query)]
 
 
@@ -267,6 +284,7 @@ def _line(row: Row[*_Asked]) -> JobLine:
     unjudged, by_hand, surprises = counts
     return JobLine(
         id=job.id,
+        submission_id=job.submission_id,
         student=student,
         name=name,
         email=email or "",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit, overrides
+from service.store import audit, outbox, overrides
 from service.store.engine import Store, now
 from service.store.jobs import enqueue
 from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
@@ -163,6 +163,9 @@ def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) ->
             sum(job.id in unjudged and job.published_at is None for job in jobs),
         )
         audit.note(session, actor, "publish", "batch", batch_id, published=published, replaced=replaced)
+        if published:
+            course_id = session.get_one(Batch, batch_id).course_id
+            outbox.grades_published(session, course_id, batch=batch_id, published=published)
         return result
 
 
