@@ -101,6 +101,9 @@ def _autograde(course: Path) -> float:
 
 
 def _nbgrader(course: Path, *words: str) -> None:
-    ended = subprocess.run([NBGRADER, *words], cwd=course, capture_output=True, text=True, check=False)
+    # It calls programs that are installed with it.
+    path = f"{Path(NBGRADER).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = os.environ | {"PATH": path}
+    ended = subprocess.run([NBGRADER, *words], cwd=course, env=environment, capture_output=True, text=True, check=False)
     if ended.returncode:
         raise RuntimeError(f"nbgrader {' '.join(words)} ends with {ended.returncode}: {ended.stderr[-1000:]}")

@@ -91,6 +91,13 @@ def _secret(given: str | Secret) -> Secret:
     return Secret(text)
 
 
+def _whether(written: str | bool) -> bool:
+    known = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+    if str(written).lower() not in known:
+        raise ValueError("expected true or false")
+    return known[str(written).lower()]
+
+
 def _seconds(least: float, most: float) -> Callable[[Any], float]:
     def read(written: str | float) -> float:
         try:
@@ -150,6 +157,10 @@ class Settings:
     log_level: str = _setting(_log_level, default="WARNING")
     #: Where browsers find the web server, when others than this machine are to reach it.
     public_url: str = _setting(_address, default="")
+    #: How often a token may call the API; as often again at once, after a rest.
+    api_calls_per_minute: float = _setting(_seconds(1, 1_000_000), default=600.0)
+    #: Whether webhooks may lead to addresses of the own network, which else are refused.
+    webhooks_inside: bool = _setting(_whether, default=False)
     #: Wins over the database's own; empty where there is none.
     secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import report_builders
 from builders import echo, grading_request
-from service.store import credentials, intake, jobs, open_assignments, results
+from service.store import appeals, credentials, intake, jobs, open_assignments, results, webhooks
 from service.store.people import Member
 from service.store.versions import freeze
 from service.web.rendering import statics
@@ -34,8 +34,10 @@ def make_world(web: Web) -> World:
         open_assignments.prepare(session, 1, freeze(given))
         open_assignments.open_for_students(session, 1, given.id)
     web.token(ada, "read")
-    with web.store.reading() as session:
+    with web.store.transaction() as session:
         (token,) = credentials.tokens(session, ada.person_id)
+        appeal = appeals.ask(session, 1, "Please look again.")
+        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"], "grace")
     values = {
         "course_id": "1",
         "batch_id": batch.id,
@@ -43,9 +45,13 @@ def make_world(web: Web) -> World:
         "submission_id": "1",
         "assignment": "echo-responder",
         "file": "notes.txt",
+        "enrolment_id": str(ada.enrolment_id),
+        "student_id": str(web.student("leaver").enrolment_id),
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "webhook_id": hook.id,
+        "appeal_id": str(appeal),
     }
     return World(ada, grace, values)
 

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
-from service.commands.batch.words import remarks
+from service.commands.batch.words import out_of, remarks
 from service.commands.shown import table
 from service.store.states import JobState, Standing
 
 if TYPE_CHECKING:
-    from decimal import Decimal
-
     from rich.console import RenderableType
     from rich.table import Table
 
@@ -44,7 +42,7 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
         outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
         made.add_row(
             *who(line.student, line.name, line.assignment),
-            _out_of(line.marks, line.max_marks),
+            out_of(line.marks, line.max_marks),
             accuracy,
             Text("; ".join([outcome, *remarks(line)]), style=_STYLES.get(line.state, "")),
             line.id,
@@ -70,8 +68,8 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
     for change in shown:
         made.add_row(
             change.student,
-            _out_of(change.before, change.before_max),
-            _out_of(change.after, change.after_max),
+            out_of(change.before, change.before_max),
+            out_of(change.after, change.after_max),
             "; ".join(_criterion(criterion) for criterion in change.criteria),
             Text(change.reason, style=_STYLES.get(change.state, "")),
             change.job_id,
@@ -108,11 +106,5 @@ def _worth_a_row(change: Change) -> bool:
 
 
 def _criterion(change: CriterionChange) -> str:
-    before, after = (_out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
+    before, after = (out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
     return f"{change.title}: {before} to {after}"
-
-
-def _out_of(marks: Decimal | None, most: Decimal | None) -> str:
-    if marks is None:
-        return ""
-    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"

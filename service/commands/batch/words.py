@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from decimal import Decimal
 
 from service.store.batches import BatchLine, JobLine
 from service.store.policies import in_days
@@ -27,6 +28,7 @@ def remarks(line: JobLine) -> list[str]:
         f"staff only: {line.staff_only}": line.staff_only is not None,
         f"no {line.missing}": bool(line.missing),
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
+        f"{line.set_by_hand} criteria set by hand": line.set_by_hand > 0,
         f"{line.surprises} trials that the log explains": line.surprises > 0,
         "suspect": line.suspect is not None,
         "published": line.published_at is not None,
@@ -42,3 +44,10 @@ def unjudged_words(lines: Sequence[JobLine]) -> str:
     told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
     whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
     return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
+
+
+def out_of(marks: Decimal | None, most: Decimal | None) -> str:
+    """Marks and the most there are; empty where there are none."""
+    if marks is None:
+        return ""
+    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"
