@@ -11,7 +11,7 @@ from datetime import datetime
 from sqlalchemy import Select, and_, select
 from sqlalchemy.orm import Session
 
-from service.store import audit
+from service.store import audit, outbox
 from service.store.engine import now
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.states import JobState, Standing
@@ -69,6 +69,7 @@ def ask(session: Session, submission_id: int, text: str) -> int:
     row = Appeal(submission_id=submission_id, text=text, asked_at=now(session))
     session.add(row)
     session.flush()
+    outbox.appeal_opened(session, submission_id, row.id)
     return row.id
 
 

@@ -40,9 +40,9 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
         title="Robomark", version=GRADER_VERSION, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
     )
     app.router.redirect_slashes = False
-    api_calls = RateLimit(round(settings.api_calls_per_minute), settings.api_calls_per_minute)
-    notifier = Notifier(make_celery(settings), store, settings)
-    app.state.context = WebContext(settings, store, notifier, RateLimits(api_calls=api_calls))
+    calls = settings.api_calls_per_minute
+    limits = RateLimits(api_calls=RateLimit(round(calls), calls))
+    app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings), limits)
     app.add_middleware(Guarded, public_url=settings.public_url)
     add_error_pages(app)
     _add_probes(app, settings, store)

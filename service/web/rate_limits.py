@@ -64,5 +64,5 @@ class RateLimits:
     submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: Programs of one person that are tried; how many are run in all is the store's to say.
     tryouts: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
-    #: Calls of the API, by token; how many is a setting.
+    #: Calls of the API, by token; the settings say how many.
     api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))

@@ -51,6 +51,8 @@ def make_world(web: Web) -> World:
         "link": web.link(ada),
         "token_id": token.id,
         "webhook_id": hook.id,
+        "criterion": report_builders.faulty_grade().criteria[0].id,
+        "comment_id": "1",
         "appeal_id": str(appeal),
     }
     return World(ada, grace, values)

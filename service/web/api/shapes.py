@@ -138,6 +138,7 @@ class CriterionShape(Shape):
     max_marks: float
     message: str
     for_staff: str = Field(description="Where somebody should look; told to staff alone.", default="")
+    set_by_hand: dict[str, Any] | None = Field(description="What an instructor set, and why.", default=None)
 
 
 class TrialShape(Shape):
@@ -178,6 +179,7 @@ class GradeShape(Shape):
     trials: list[TrialShape]
     accuracy: AccuracyShape | None
     notes: list[str]
+    comments: list[dict[str, Any]] = Field(description="What instructors wrote.", default=[])
     missing: str = ""
     cost: dict[str, Any] | None = None
     withheld: bool = Field(description="Whether there is more to it than is shown to the token's owner now.")
