@@ -155,7 +155,8 @@ class CachedCamera:
 
     That one sees only what lies round the first tile until a tile elsewhere is needed: most robots that stay where they
     are have a floor of their own, and a texture of the whole floor takes long.
-    Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track.
+    Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track. Tiles of
+    one colour are not photographed.
     """
 
     def __init__(self, pixels: Bytes) -> None:
@@ -195,10 +196,15 @@ class CachedCamera:
         key = (tile_column, tile_row, side)
         tile = self._tiles.get(key)
         if tile is None:
-            tile = self._tiles[key] = self._photographed(tile_column * _TILE, tile_row * _TILE, _TILE + side)
+            tile = self._tiles[key] = self._photograph(tile_column * _TILE, tile_row * _TILE, _TILE + side)
         return tile
 
-    def _photographed(self, column: int, row: int, side: int) -> Bytes:
+    def _photograph(self, column: int, row: int, side: int) -> Bytes:
+        if 0 <= column <= WIDTH - side and 0 <= row <= HEIGHT - side:
+            printed = self._pixels[row : row + side, column : column + side]
+            if (printed == printed[0, 0]).all():
+                # What is of one colour looks so in a photograph too, for which PyBullet would have to come.
+                return printed
         if self._camera is None:
             self._see(_Part(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
         elif not self._seen.has(column, row, side):

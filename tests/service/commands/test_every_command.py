@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
@@ -18,10 +19,11 @@ from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
-from service.store import jobs, results
+from service.store import appeals, comments, jobs, overrides, results
 from service.store.engine import now, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
+from service.store.models import Job
 from submissions.assignment.examples import examples
 from submissions.people import Refusal, Student
 
@@ -57,9 +59,20 @@ SHOWING = {
     "models list": "models",
     "models compare digits digits-28": "models curves",
     "show GRADE": "job grade",
+    "mark set GRADE asks-aloud 1.5 --reason heard": "job",
+    "mark excuse GRADE asks-aloud --reason ill": "job",
+    "mark withdraw GRADE names-the-right-shape": "job",
+    "mark comment GRADE good --criterion asks-aloud": "job",
+    "mark uncomment GRADE 1": "job",
+    "mark history GRADE": "grade criteria comments history",
+    "appeals list": "appeals",
+    "appeals answer 1 yes": "appeal",
     "course policy": "policies",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
+    "course export-student ada -o ada-all.zip": "student output bytes",
+    "course delete-student cyd --for-good": "submissions grades",
+    "course purge --older-than 9000": "removed archive submissions grades students",
     "user add grace --name Grace": "id path url",
     "user link ada": "id path url",
     "user token ada --scope read": "id token scopes days",
@@ -123,6 +136,10 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
             own = replace(grade, secret_sha256=secret_of(store).sha256)
             jobs.finish(store, claim, results.prepare(own), at)
             grades.append(claim.job_id)
+        with store.transaction() as session:
+            overrides.set_marks(session, grades[0], "names-the-right-shape", Decimal(6), "seen again", "staff")
+            comments.comment(session, grades[0], "", "Well done.", "staff")
+            appeals.ask(session, session.get_one(Job, grades[0]).submission_id, "Why?")
     return folder, {"BATCH": batch.id, "GRADE": grades[0]}
 
 

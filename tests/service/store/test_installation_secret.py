@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import sqlite3
+from dataclasses import replace
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ def test_a_database_that_lost_it_is_not_graded_with(service_settings: Settings) 
 
 
 def test_the_environments_wins(service_settings: Settings) -> None:
-    settings = service_settings.model_copy(update={"secret": Settings(secret=SECRET).secret})
+    settings = replace(service_settings, secret=Secret(SECRET))
     with open_store(settings) as store:
         assert secret_of(store) == secret_here(settings) == Secret(SECRET)
     with open_store(service_settings) as store:

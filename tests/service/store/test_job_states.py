@@ -167,14 +167,15 @@ def _job_writes(tree: ast.AST) -> Iterator[int]:
 
 
 def _writes_a_job(call: ast.Call) -> bool:
-    """Whether a job is made, or anything but a batch updated, with what belongs to a job's state."""
+    """Whether a job is made, or anything but a job updated, with what belongs to a job's state."""
     if not any(keyword.arg is None or keyword.arg in OWN for keyword in call.keywords):
         return False
     if isinstance(call.func, ast.Name):
         return call.func.id == "Job"
     if not isinstance(call.func, ast.Attribute) or call.func.attr != "values":
         return False
-    return not ast.unparse(call.func.value).startswith(("update(Batch)", "insert("))
+    others = ("update(Batch)", "update(Delivery)", "update(IdempotentReply)", "insert(")
+    return not ast.unparse(call.func.value).startswith(others)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
@@ -121,6 +122,6 @@ def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None
 def test_a_database_that_is_away_is_named_without_its_password(service_settings: Settings) -> None:
     url = "postgresql+psycopg://someone:hush@127.0.0.1:1/nowhere"
     with pytest.raises(HostError) as caught:
-        open_store(service_settings.model_copy(update={"database_url": url}))
+        open_store(replace(service_settings, database_url=url))
     assert "127.0.0.1" in str(caught.value)
     assert "hush" not in str(caught.value)
