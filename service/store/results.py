@@ -81,7 +81,23 @@ def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> N
 
 def load(session: Session, job_id: str) -> Grade:
     """The grade of a job as it counts, with what instructors set and wrote. Raises UsageError when it has none."""
-    graded = load_graded(session, job_id)
+    return _as_all_counts(session, job_id, load_graded(session, job_id))
+
+
+def load_graded(session: Session, job_id: str) -> Grade:
+    """The grade of a job as the grader gave it. Raises UsageError when it has none."""
+    return _load(session, job_id, load_trials(session, job_id))
+
+
+def load_marks(session: Session, job_id: str) -> Grade:
+    """The grade of a job as it counts, without its trials and predictions, for lists, which read no recordings.
+
+    Raises like ``load``.
+    """
+    return _as_all_counts(session, job_id, _load(session, job_id, ()))
+
+
+def _as_all_counts(session: Session, job_id: str, graded: Grade) -> Grade:
     by_hand = overrides.of_jobs(session, [job_id]).get(job_id, {})
     return replace(
         graded,
@@ -90,8 +106,7 @@ def load(session: Session, job_id: str) -> Grade:
     )
 
 
-def load_graded(session: Session, job_id: str) -> Grade:
-    """The grade of a job as the grader gave it. Raises UsageError when it has none."""
+def _load(session: Session, job_id: str, trials: tuple[TrialResult, ...]) -> Grade:
     query = (
         select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -103,7 +118,6 @@ def load_graded(session: Session, job_id: str) -> Grade:
     if found is None or found[0].verdict is None:
         raise UsageError(f"{job_id} has no grade")
     job, sha256, student, version = found
-    trials = load_trials(session, job_id)
     rows = session.scalars(
         select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
     )
@@ -224,7 +238,7 @@ def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> Crit
         visibility=row.visibility,
         evidence=decode(tuple[Evidence, ...], row.evidence),
         accuracy=_accuracy(row),
-        predictions=tuple(_prediction(plain, trials) for plain in row.predictions),
+        predictions=tuple(_prediction(plain, trials) for plain in row.predictions) if trials else (),
         curves=decode(tuple[AccuracyCurve, ...], row.curves),
         shown=None if row.shown is None else decode(Shown, row.shown),
         unjudged=row.unjudged or "",

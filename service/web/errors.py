@@ -68,7 +68,7 @@ async def _misread(request: Request, error: Exception) -> Response:
 
 
 async def _usage(request: Request, error: Exception) -> Response:
-    return answer(request, 422, _sentence(error))
+    return answer(request, 422, sentence_of(error))
 
 
 async def _host(request: Request, error: Exception) -> Response:
@@ -77,7 +77,7 @@ async def _host(request: Request, error: Exception) -> Response:
 
 
 async def _platform(request: Request, error: Exception) -> Response:
-    return answer(request, 502, _sentence(error))
+    return answer(request, 502, sentence_of(error))
 
 
 async def _no_database(request: Request, error: Exception) -> Response:
@@ -103,6 +103,9 @@ def answer(request: Request, status: int, sentence: str, headers: dict[str, str]
     return shown
 
 
-def _sentence(error: Exception) -> str:
+def sentence_of(error: Exception) -> str:
+    """What an error says, as a sentence on a page."""
     text = str(error)
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
+    # The name of a file stays as it is.
+    first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
+    return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import report_builders
-from builders import grading_request
-from service.store import appeals, credentials, intake, jobs, results, webhooks
+from builders import echo, grading_request
+from service.store import appeals, credentials, intake, jobs, open_assignments, results, webhooks
 from service.store.people import Member
+from service.store.versions import freeze
 from service.web.rendering import statics
 from web import COURSE, Web
 
@@ -28,6 +29,10 @@ def make_world(web: Web) -> World:
     ada, grace = web.student("ada"), web.instructor("grace")
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
+    given = replace(echo(), given={"notes.txt": b"counts from 0"})
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(given))
+        open_assignments.open_for_students(session, 1, given.id)
     web.token(ada, "read")
     with web.store.transaction() as session:
         (token,) = credentials.tokens(session, ada.person_id)
@@ -39,6 +44,7 @@ def make_world(web: Web) -> World:
         "job_id": batch.jobs[0].job_id,
         "submission_id": "1",
         "assignment": "echo-responder",
+        "file": "notes.txt",
         "enrolment_id": str(ada.enrolment_id),
         "student_id": str(web.student("leaver").enrolment_id),
         "name": statics()["robomark.css"].rpartition("/")[2],
