@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections import OrderedDict
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ WIDTH, HEIGHT = 2362, 1143  # the floor, in pixels and in mm
 _METRE = 0.001  # metres a pixel
 _PAD = 192  # black pixels round what is seen, more than a tile reaches: off the floor the original reads 0, 0, 0
 _TILE = 128
-_BLOCK = 3 * _TILE  # what one BulletCamera photographs the tiles of
 
 
 class LightCamera(Protocol):
@@ -130,10 +129,32 @@ class BulletCamera:
         return rgb
 
 
+class _Part(NamedTuple):
+    """A part of the floor, in pixels; beyond the floor's own borders there is nothing to see."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    def has(self, column: int, row: int, side: int) -> bool:
+        """Whether all of a window that lies on the floor is in it."""
+        return (
+            self.left <= max(column, 0)
+            and self.top <= max(row, 0)
+            and min(column + side, WIDTH) <= self.right
+            and min(row + side, HEIGHT) <= self.bottom
+        )
+
+
+_WHOLE = _Part(0, 0, WIDTH, HEIGHT)
+
+
 class CachedCamera:
     """The same windows, cut from tiles of the floor that a BulletCamera photographed when they were first needed.
 
-    Each sees a block of the floor round its tiles: most robots see little, and a texture of the whole floor takes long.
+    That one sees only what lies round the first tile until a tile elsewhere is needed: most robots that stay where they
+    are have a floor of their own, and a texture of the whole floor takes long.
     Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track. Tiles of
     one colour are not photographed.
     """
@@ -141,14 +162,16 @@ class CachedCamera:
     def __init__(self, pixels: Bytes) -> None:
         """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
         self._pixels = pixels
-        self._cameras: dict[tuple[int, int], BulletCamera] = {}
+        self._camera: BulletCamera | None = None
+        self._seen = _WHOLE
         self._tiles: dict[tuple[int, int, int], Bytes] = {}
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
     def close(self) -> None:
-        """Give back PyBullet's memory; the tiles stay, and a new one brings PyBullet back."""
-        while self._cameras:
-            self._cameras.popitem()[1].close()
+        """Give back PyBullet's 60 MB; the tiles stay, and a new one brings PyBullet back."""
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
 
     def window(self, column: int, row: int, side: int) -> Bytes:
         """RGB, shape (side, side, 3), top row first; black outside the floor."""
@@ -182,13 +205,17 @@ class CachedCamera:
             if (printed == printed[0, 0]).all():
                 # What is of one colour looks so in a photograph too, for which PyBullet would have to come.
                 return printed
-        block = column // _BLOCK, row // _BLOCK
-        left, top = (max(0, each * _BLOCK) for each in block)
-        camera = self._cameras.get(block)
-        if camera is None:
-            right, bottom = ((each + 1) * _BLOCK + _TILE for each in block)
-            camera = self._cameras[block] = BulletCamera(self._pixels[top:bottom, left:right])
-        return camera.window(column - left, row - top, side)
+        if self._camera is None:
+            self._see(_Part(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
+        elif not self._seen.has(column, row, side):
+            self.close()
+            self._see(_WHOLE)
+        assert self._camera is not None
+        return self._camera.window(column - self._seen.left, row - self._seen.top, side)
+
+    def _see(self, part: _Part) -> None:
+        self._seen = _Part(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
+        self._camera = BulletCamera(self._pixels[self._seen.top : part.bottom, self._seen.left : part.right])
 
 
 def _disc_sums(tile: Bytes, side: int) -> memoryview:

@@ -15,7 +15,7 @@ from service.reports.view import student_view
 from service.store import batches, policies, results
 from service.store.models import SubmissionRow
 from service.store.queue_places import queue_place
-from service.web.access import Studying, enrolment_in, nothing_here
+from service.web.access import RowNumber, Studying, enrolment_in, nothing_here
 from service.web.attachments import attachment
 from service.web.context import Context
 from service.web.pages.mine import curve
@@ -25,7 +25,7 @@ router = APIRouter()
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}")
-def own_submission(request: Request, here: Studying, context: Context, submission_id: int) -> Response:
+def own_submission(request: Request, here: Studying, context: Context, submission_id: RowNumber) -> Response:
     """How far it is, or its report; htmx is given how far it is alone, and told to load the page when that is over."""
     with context.store.reading() as session:
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
@@ -58,7 +58,7 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/files")
-def own_files(here: Studying, context: Context, submission_id: int) -> Response:
+def own_files(here: Studying, context: Context, submission_id: RowNumber) -> Response:
     """What was submitted, as a .zip that can be submitted again."""
     with context.store.reading() as session:
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id

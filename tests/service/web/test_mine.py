@@ -226,6 +226,7 @@ def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member
     assert "It is the next to be graded." in first.get(mine).text
     assert "One is graded before it." in second.get(theirs).text
     assert first.get(theirs).status_code == 404
+    assert first.get(f"{MINE}/submissions/{10**30}").status_code in (404, 422)
     claim = jobs.claim(web.store, "worker", 60)
     assert claim is not None
     jobs.heartbeat(web.store, claim, 60, 0.5)
