@@ -18,6 +18,7 @@ from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
 from submissions.assignment.second_robot import second_program_of
+from submissions.bundle import PART_FILES
 from submissions.source_text import decode_source
 from submissions.submission import Submission
 
@@ -78,7 +79,7 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
     often = (
         first if len(places) == 1 else f"{len(places)} times in {trials} of {len(grade.trials)} trials, first {first}"
     )
-    excerpt = () if source is None or fault.line is None else _excerpt(source, fault.line)
+    excerpt = () if source is None or fault.line is None else excerpt_around(source, fault.line)
     return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), often, excerpt)
 
 
@@ -98,6 +99,15 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
     return parts.get(fault.who)
 
 
+def source_called(name: str, submission: Submission) -> Code | None:
+    """What a hint calls by this name: ``cell 3``, a part, or a file beside it."""
+    if name.startswith("cell ") and submission.notebook is not None:
+        cells = {f"cell {cell.number}": cell.source for cell in submission.notebook.cells}
+        return Code(name, cells[name]) if name in cells else None
+    parts = {PART_FILES["program"]: submission.program, PART_FILES["responder"]: submission.responder}
+    return parts.get(name) or _beside(name, submission)
+
+
 def _beside(file: str, submission: Submission) -> Code | None:
     """A process has named the file, so it may be any, or none."""
     data = submission.files.get(file)
@@ -106,7 +116,8 @@ def _beside(file: str, submission: Submission) -> Code | None:
     return None
 
 
-def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+def excerpt_around(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+    """The line with those around it; nothing where the source has no such line."""
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()

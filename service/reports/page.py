@@ -8,8 +8,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.cause import Diagnosis, diagnose, found
 from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of
@@ -25,7 +27,6 @@ from service.reports.words import (
     channel_words,
     cost_words,
     grade_words,
-    hints_of,
     verdict_words,
 )
 from sim.recorded import stood_still
@@ -42,9 +43,13 @@ PROCESS_LIMITS = "process limits only"
 
 @dataclass(frozen=True, slots=True)
 class CriterionLine:
-    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure."""
+    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure.
+
+    ``told`` says in short what was found; empty where it is told already, or nothing was lost. ``message`` is all.
+    """
 
     title: str
+    told: str
     message: str
     marks: str
     max_marks: str
@@ -117,9 +122,12 @@ class Page:
     marks: str
     max_marks: str
     share: float
+    state: str  # as of a criterion: the colour of the bar
     words: VerdictWords
-    hints: tuple[str, ...]
+    diagnosis: Diagnosis
     criteria: tuple[CriterionLine, ...]
+    lost_with_it: tuple[CriterionLine, ...]
+    other_criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     faults_title: str
     classification: tuple[Plot, ...]
@@ -142,15 +150,23 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
     plots = plots_of(grade)
     lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
     faults = fault_groups(grade, submission)
+    diagnosis = diagnose(grade, submission)
+    criteria = tuple(
+        _criterion_line(grade, result, played, told=index != diagnosis.main and index not in diagnosis.lost_with_it)
+        for index, result in enumerate(grade.criteria)
+    )
     time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=number(grade.marks),
         max_marks=number(grade.max_marks),
         share=_share(float(grade.marks), float(grade.max_marks)),
+        state=_state(grade.marks, grade.max_marks),
         words=grade_words(grade),
-        hints=hints_of(grade),
-        criteria=tuple(_criterion_line(grade, result, played) for result in grade.criteria),
+        diagnosis=diagnosis,
+        criteria=criteria,
+        lost_with_it=tuple(criteria[index] for index in sorted(diagnosis.lost_with_it)),
+        other_criteria=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost_with_it),
         faults=faults,
         faults_title="How it ended" if time_alone else "What went wrong",
         classification=tuple(plot for plot in plots if not plot.scenario),
@@ -191,7 +207,7 @@ def _kind(fault: Fault) -> str:
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
-def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int]) -> CriterionLine:
+def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int], *, told: bool) -> CriterionLine:
     full = result.marks >= result.max_marks
     missed = [item for item in result.evidence if not item.passed]
     failed = next(iter(missed), None)
@@ -199,17 +215,22 @@ def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int
     seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
+        told=found(grade, result) if told and not full else "",
         message=readable(result.message, 1000, lines=12),
         marks=number(result.marks),
         max_marks=number(result.max_marks),
         share=_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
-        state="full" if full else ("part" if result.marks > 0 else "none"),
+        state=_state(result.marks, result.max_marks),
         visibility=result.visibility,
         where="" if full or failed is None else _where(grade, failed),
         moment="" if watched is None else moment_hash(watched.trial + 1, seconds),
         watch=f"Watch it at {seconds:.2f} s",
         for_staff=readable(result.for_staff, 1000, lines=4),
     )
+
+
+def _state(marks: Decimal, max_marks: Decimal) -> str:
+    return "full" if marks >= max_marks else ("part" if marks > 0 else "none")
 
 
 def _where(grade: Grade, evidence: Evidence) -> str:
