@@ -5,7 +5,6 @@ Nothing is escaped here, and nothing is hidden: what comes in is the reader's vi
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -14,11 +13,12 @@ from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
 from service.reports.cause import Diagnosis, diagnose, found
 from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
-from service.reports.plots.drawn import plots_of
+from service.reports.plots.drawn import plots_of, same_answers
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
+from service.reports.plots.talk import talk_words, talks
 from service.reports.readable import message_words, number, one_line, readable
-from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
 from service.reports.replay.trial import loss_moment, moment_hash
 from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
@@ -30,12 +30,13 @@ from service.reports.words import (
     verdict_words,
 )
 from sim.recorded import stood_still
-from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
+from sim.recording import AgentMessage, Call, Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
+_MOST_CALLS = 12  # of those that one message causes
 _MOST_TRIALS = 250
 _STOOD_STILL = "the robot stood still, so neither its path nor its sensors are drawn"
 PROCESS_LIMITS = "process limits only"
@@ -73,13 +74,13 @@ class TimelineEntry:
 
 @dataclass(frozen=True, slots=True)
 class MessageLine:
-    """One row of the messages table."""
+    """One row of the messages table; ``kind`` is ``wrong``, or ``inner`` for what a responder asked of others."""
 
     t: str
     sender: str
     text: str
     arrived: str
-    wrong: bool
+    kind: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,19 +99,34 @@ class TrialLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
-    """A closer look at one trial of a scenario: the one that lost most."""
+class Seen:
+    """What was seen and answered, once for all criteria that judge the same answers."""
 
-    scenario: str
-    which: str
-    words: VerdictWords
+    title: str
+    tables: tuple[RecognitionTable, ...]
+    classes: tuple[ClassLine, ...]
+    plots: tuple[Plot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TextOutput:
+    """What a process printed or logged, under what it is called."""
+
+    title: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A closer look at one trial of a scenario: the one that lost most. ``where`` says which, if there are several."""
+
+    where: str
     plots: tuple[Plot, ...]
     timeline: tuple[TimelineEntry, ...]
     messages: tuple[MessageLine, ...]
     more_messages: int
-    responder_output: str
-    responder_log: str
-    agents: tuple[AgentOutput, ...]
+    talk: str
+    outputs: tuple[TextOutput, ...]
     notes: tuple[str, ...]
 
 
@@ -129,9 +145,7 @@ class Page:
     lost_with_it: tuple[CriterionLine, ...]
     other_criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
-    faults_title: str
-    classification: tuple[Plot, ...]
-    recognition: tuple[RecognitionTable, ...]
+    recognition: tuple[Seen, ...]
     scenes: tuple[Scene, ...]
     diagrams: tuple[OwnDiagram, ...]
     trials: tuple[TrialLine, ...]
@@ -155,7 +169,6 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         _criterion_line(grade, result, played, told=index != diagnosis.main and index not in diagnosis.lost_with_it)
         for index, result in enumerate(grade.criteria)
     )
-    time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=number(grade.marks),
@@ -168,9 +181,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         lost_with_it=tuple(criteria[index] for index in sorted(diagnosis.lost_with_it)),
         other_criteria=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost_with_it),
         faults=faults,
-        faults_title="How it ended" if time_alone else "What went wrong",
-        classification=tuple(plot for plot in plots if not plot.scenario),
-        recognition=recognition_tables(grade),
+        recognition=tuple(_seen(grade, alike, plots) for alike in same_answers(grade)),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
         diagrams=own_diagrams(grade, diagrams_in(submission.notebook).cells) if submission is not None else (),
         trials=lines,
@@ -244,29 +255,39 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
-    messages = messages_of(recording)
-    of = sum(other.scenario == scenario for other in grade.trials)
-    which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
-    if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
-        which = f"trial {trial.index + 1} of {of}"
+    lines = tuple(_message_lines(recording))
+    several = len(grade.trials) > 1
     return Scene(
-        scenario=one_line(scenario, 80),
-        which=which,
-        words=verdict_words(trial.verdict),
+        where=f": {one_line(scenario, 80)}, trial {trial.index + 1}" if several else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
-        messages=tuple(itertools.islice(_message_lines(recording), _MOST_MESSAGES)),
-        more_messages=max(0, len(messages) + len(recording.agent_messages) - _MOST_MESSAGES),
-        responder_output=readable(recording.responder_output, 4000),
-        responder_log=readable(recording.responder_log, 4000),
-        agents=tuple(
-            AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
-            for each in recording.agent_outputs
-        ),
+        messages=lines[:_MOST_MESSAGES],
+        more_messages=max(0, len(lines) - _MOST_MESSAGES),
+        talk=talk_words(talks(recording)),
+        outputs=tuple(each for each in _outputs(recording) if each.text),
         notes=(
             *((_STOOD_STILL,) if stood_still(recording) else ()),
             *(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
         ),
+    )
+
+
+def _outputs(recording: Recording) -> Iterator[TextOutput]:
+    yield TextOutput("What your responder printed", readable(recording.responder_output, 4000))
+    yield TextOutput("What your responder wrote to logger.txt", readable(recording.responder_log, 4000))
+    for each in recording.agent_outputs:
+        yield TextOutput(f"What the agent {each.agent} printed", readable(each.printed, 4000))
+        yield TextOutput(f"What the agent {each.agent} wrote to logger.txt", readable(each.log, 4000))
+
+
+def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...]) -> Seen:
+    results = [grade.criteria[index] for index in alike]
+    tables = tuple(recognition_table(result) for result in results if result.accuracy is not None)
+    return Seen(
+        " and ".join(f"“{one_line(result.title, 80)}”" for result in results),
+        tables,
+        tables[0].classes if tables else (),
+        tuple(plot for plot in plots if not plot.scenario and plot.subject in alike),
     )
 
 
@@ -284,15 +305,25 @@ def _message_lines(recording: Recording) -> Iterator[MessageLine]:
         happened = befell_in_full(message)
         if happened:
             arrived += f" ({happened})"
-        wrong = message.delivered is None or bool(happened)
-        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, wrong)
+        kind = "wrong" if message.delivered is None or happened else ""
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, kind)
+        calls = sorted((each for each in recording.calls if each.message == index), key=lambda each: each.before)
+        yield from map(_call_line, calls[:_MOST_CALLS])
         yield from map(_agent_line, inner.get(index, ()))
 
 
 def _agent_line(each: AgentMessage) -> MessageLine:
     arrived = f"({each.note})" if each.note else f"{each.t:.2f} s"
     sender = f"{each.sender} → {each.receiver}"
-    return MessageLine(f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, bool(each.note))
+    return MessageLine(
+        f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, "wrong" if each.note else "inner"
+    )
+
+
+def _call_line(call: Call) -> MessageLine:
+    returned = f" → {one_line(call.result, 120)}" if call.result != "None" else ""
+    sender = f"{one_line(call.caller, 20)} → {one_line(call.callee, 20)}"
+    return MessageLine("", sender, f"{message_words(call.argument, 120)}{returned}", "", "inner")
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:

@@ -16,8 +16,6 @@ from service.reports.view import is_for_staff
 Kind = Literal[
     "path",
     "sensors",
-    "conversation",
-    "talk",
     "confusion",
     "curves",
     "track",
