@@ -37,16 +37,14 @@ class Excerpt:
 class Diagnosis:
     """What is told first. ``cause`` and ``next_step`` are sentences; ``further`` are causes that come after.
 
-    ``main`` is the criterion that the cause is told of, where it is one's, and ``lost_with_it`` those that lost marks
-    by the same cause, all by their index.
+    ``lost`` are the criteria that lost marks by this cause, by their index.
     """
 
     cause: str
     next_step: str
     further: tuple[str, ...] = ()
     excerpt: Excerpt | None = None
-    main: int | None = None
-    lost_with_it: frozenset[int] = frozenset()
+    lost: frozenset[int] = frozenset()
 
 
 def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
@@ -68,7 +66,7 @@ def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
         return _of_fault(grade, fault, lost, submission)
     if grade.missing:
         concerned = (index for index, each in lost.items() if grade.missing in each.message)
-        return Diagnosis(words.happened, words.next_step, lost_with_it=frozenset(concerned))
+        return Diagnosis(words.happened, words.next_step, lost=frozenset(concerned))
     return _of_criterion(grade, lost) if lost else Diagnosis(words.happened, words.next_step)
 
 
@@ -88,30 +86,30 @@ def _of_hint(
     if place is None:
         words = grade_words(grade)
         step = words.next_step if words.tone == "bad" else "Mend that first, and submit it again."
-        return Diagnosis(hint, step, hints[1:], lost_with_it=with_it)
+        return Diagnosis(hint, step, hints[1:], lost=with_it)
     line, name = int(place[1]), place[2]
     step = f"Mend line {line} of {name}, run it once in the simulator, and submit it again."
-    return Diagnosis(hint, step, hints[1:], _excerpt(submission, name, line), lost_with_it=with_it)
+    return Diagnosis(hint, step, hints[1:], _excerpt(submission, name, line), lost=with_it)
 
 
 def _of_fault(grade: Grade, fault: Fault, lost: dict[int, CriterionResult], submission: Submission | None) -> Diagnosis:
     step = grade_words(grade).next_step
     if fault.verdict is Verdict.TIME_LIMIT:
         words = verdict_words(fault.verdict)
-        return Diagnosis(words.happened, words.next_step, lost_with_it=_lost_by(grade, fault, lost))
+        return Diagnosis(words.happened, words.next_step, lost=_lost_by(grade, fault, lost))
     group = next(each for each in fault_groups(grade, submission) if each.message == readable(fault.message, 600))
     hint = f" {group.hint}" if group.hint else ""
     cause = f"{group.where}: {group.message.rstrip('.')}.{hint}"
     excerpt = Excerpt(group.where, group.excerpt) if group.excerpt else None
-    return Diagnosis(cause, step, excerpt=excerpt, lost_with_it=_lost_by(grade, fault, lost))
+    return Diagnosis(cause, step, excerpt=excerpt, lost=_lost_by(grade, fault, lost))
 
 
 def _of_criterion(grade: Grade, lost: dict[int, CriterionResult]) -> Diagnosis:
     main = max(lost, key=lambda index: lost[index].max_marks - lost[index].marks)
     result = lost[main]
-    with_it = frozenset(index for index, each in lost.items() if index != main and _alike(grade, result, each))
+    with_it = {index for index, each in lost.items() if _alike(grade, result, each)}
     step = grade_words(grade).next_step
-    return Diagnosis(found(grade, result) + _practised(grade, result), step, main=main, lost_with_it=with_it)
+    return Diagnosis(found(grade, result) + _practised(grade, result), step, lost=frozenset({main, *with_it}))
 
 
 def _practised(grade: Grade, result: CriterionResult) -> str:
@@ -131,12 +129,10 @@ def found(grade: Grade, result: CriterionResult) -> str:
     accuracy = result.accuracy
     wrong = _confused(result)
     if accuracy is not None and wrong:
-        truth, answer = wrong[0]
         right, of = accuracy_counted(accuracy)
-        return (
-            f"{right} of {accuracy.n} {of} were named rightly: “{one_line(truth, 60)}” was taken for "
-            f"“{one_line(answer, 60)}”{' among others' if len(wrong) > 1 else ''}."
-        )
+        taken = [f"“{one_line(truth, 60)}” was taken for “{one_line(answer, 60)}”" for truth, answer in wrong[:2]]
+        others = ", among others" if len(wrong) > len(taken) else ""
+        return f"{right} of {accuracy.n} {of} were named rightly: {' and '.join(taken)}{others}."
     failed = next((each for each in _failed(result) if each.message), None)
     if failed is None:
         return readable(result.message, 600, lines=6)

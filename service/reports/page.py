@@ -142,8 +142,8 @@ class Page:
     words: VerdictWords
     diagnosis: Diagnosis
     criteria: tuple[CriterionLine, ...]
-    lost_with_it: tuple[CriterionLine, ...]
-    other_criteria: tuple[CriterionLine, ...]
+    lost: tuple[CriterionLine, ...]  # by the cause, which has told of them already
+    others: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     recognition: tuple[Seen, ...]
     scenes: tuple[Scene, ...]
@@ -166,7 +166,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
     faults = fault_groups(grade, submission)
     diagnosis = diagnose(grade, submission)
     criteria = tuple(
-        _criterion_line(grade, result, played, told=index != diagnosis.main and index not in diagnosis.lost_with_it)
+        _criterion_line(grade, result, played, told=index in diagnosis.lost)
         for index, result in enumerate(grade.criteria)
     )
     return Page(
@@ -178,8 +178,8 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         words=grade_words(grade),
         diagnosis=diagnosis,
         criteria=criteria,
-        lost_with_it=tuple(criteria[index] for index in sorted(diagnosis.lost_with_it)),
-        other_criteria=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost_with_it),
+        lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
+        others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
         recognition=tuple(_seen(grade, alike, plots) for alike in same_answers(grade)),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
@@ -226,7 +226,7 @@ def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int
     seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
-        told=found(grade, result) if told and not full else "",
+        told="" if full or told else found(grade, result),
         message=readable(result.message, 1000, lines=12),
         marks=number(result.marks),
         max_marks=number(result.max_marks),
