@@ -47,6 +47,12 @@ class Diagnosis:
     lost: frozenset[int] = frozenset()
 
 
+def excerpt_lines(diagnosis: Diagnosis) -> list[str]:
+    """The excerpt as lines of text, an arrow before the one that the cause is in."""
+    lines = () if diagnosis.excerpt is None else diagnosis.excerpt.lines
+    return [f"{'→' if line.marked else ' '} {line.number:>4}  {line.text}".rstrip() for line in lines]
+
+
 def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
     """The one cause: what a hint names, else a fault that cost marks, else what the dearest criterion did not find.
 

@@ -6,7 +6,7 @@ Faults are told, never judged; marks do not depend on anything here.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -53,6 +53,13 @@ class FaultGroup:
     hint: str
     how_often: str
     excerpt: tuple[SourceLine, ...] = ()
+
+
+def faults_beside(cause: str, grade: Grade, submission: Submission | None = None) -> Iterator[tuple[str, FaultGroup]]:
+    """Each fault with what is to be told of it where the cause has been told: of the cause's own, only where."""
+    for group in fault_groups(grade, submission, limit=10):
+        told = group.message.rstrip(".") in cause
+        yield (group.where if told else f"{group.where}: {group.message}"), group
 
 
 def fault_groups(grade: Grade, submission: Submission | None = None, limit: int = 12) -> tuple[FaultGroup, ...]:

@@ -14,12 +14,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import BinaryIO
 
+from service.reports.cause import diagnose
 from service.reports.formats.csv_output import csv_text, safe_cell
 from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import hints_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -104,8 +104,11 @@ def _feedback(row: TableRow[GradebookView]) -> str:
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    hints = () if row.grade is None else hints_of(row.grade.shown)
-    return one_line(" ".join([*hints, "; ".join(lines)]), _LONGEST)
+    first = []
+    if row.grade is not None:
+        diagnosis = diagnose(row.grade.shown)
+        first = [diagnosis.cause, diagnosis.next_step, *diagnosis.further]
+    return one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
