@@ -5,6 +5,7 @@ Nothing is escaped here, and nothing is hidden: what comes in is the reader's vi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -16,6 +17,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of, same_answers
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
+from service.reports.plots.sequence import MOST_CALL_STEPS, Step, inside
 from service.reports.plots.talk import talk_words, talks
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
@@ -30,13 +32,12 @@ from service.reports.words import (
     verdict_words,
 )
 from sim.recorded import stood_still
-from sim.recording import AgentMessage, Call, Fault, Recording, Verdict
+from sim.recording import Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
-_MOST_CALLS = 12  # of those that one message causes
 _MOST_TRIALS = 250
 _STOOD_STILL = "the robot stood still, so neither its path nor its sensors are drawn"
 PROCESS_LIMITS = "process limits only"
@@ -292,14 +293,11 @@ def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...]) -> Seen
 
 
 def _message_lines(recording: Recording) -> Iterator[MessageLine]:
-    """Each message of the robot's is followed by what the agents said until it was answered.
+    """Each message of the robot's is followed by what was called and what agents said until it was answered.
 
     Two robots have no agents, so the index of a message among those told is its index in the recording.
     """
-    inner: dict[int, list[AgentMessage]] = {}
-    for each in recording.agent_messages:
-        inner.setdefault(each.message, []).append(each)
-    yield from map(_agent_line, inner.get(-1, ()))
+    yield from map(_inner_line, inside(recording, -1))
     for index, (sender, message) in enumerate(messages_of(recording)):
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
         happened = befell_in_full(message)
@@ -307,23 +305,14 @@ def _message_lines(recording: Recording) -> Iterator[MessageLine]:
             arrived += f" ({happened})"
         kind = "wrong" if message.delivered is None or happened else ""
         yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, kind)
-        calls = sorted((each for each in recording.calls if each.message == index), key=lambda each: each.before)
-        yield from map(_call_line, calls[:_MOST_CALLS])
-        yield from map(_agent_line, inner.get(index, ()))
+        if recording.partner is None:
+            yield from map(_inner_line, itertools.islice(inside(recording, index), MOST_CALL_STEPS))
 
 
-def _agent_line(each: AgentMessage) -> MessageLine:
-    arrived = f"({each.note})" if each.note else f"{each.t:.2f} s"
-    sender = f"{each.sender} → {each.receiver}"
-    return MessageLine(
-        f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, "wrong" if each.note else "inner"
-    )
-
-
-def _call_line(call: Call) -> MessageLine:
-    returned = f" → {one_line(call.result, 120)}" if call.result != "None" else ""
-    sender = f"{one_line(call.caller, 20)} → {one_line(call.callee, 20)}"
-    return MessageLine("", sender, f"{message_words(call.argument, 120)}{returned}", "", "inner")
+def _inner_line(step: Step) -> MessageLine:
+    t = "" if step.t is None else f"{step.t:.2f}"
+    note = f"({step.note})" if step.note else ""
+    return MessageLine(t, f"{step.source} → {step.target}", step.label, note, "wrong" if step.note else "inner")
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:
