@@ -53,6 +53,12 @@ def excerpt_lines(diagnosis: Diagnosis) -> list[str]:
     return [f"{'→' if line.marked else ' '} {line.number:>4}  {line.text}".rstrip() for line in lines]
 
 
+def ended(grade: Grade, diagnosis: Diagnosis) -> str:
+    """How it ended and whose doing that is, without what the cause has said."""
+    words = grade_words(grade)
+    return words.whose if words.happened in diagnosis.cause else f"{words.happened} {words.whose}"
+
+
 def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
     """The one cause: what a hint names, else a fault that cost marks, else what the dearest criterion did not find.
 
@@ -150,7 +156,8 @@ def _where(grade: Grade, evidence: Evidence) -> str:
     if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
     trial = grade.trials[evidence.trial]
-    return f" That was in {one_line(trial.scenario, 60)}, trial {trial.index + 1}."
+    several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
+    return f" That was in {one_line(trial.scenario, 60)}{f', trial {trial.index + 1}' if several else ''}."
 
 
 def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:

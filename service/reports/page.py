@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
-from service.reports.cause import Diagnosis, diagnose, found
+from service.reports.cause import Diagnosis, diagnose, ended, found
 from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of, same_answers
@@ -141,11 +141,13 @@ class Page:
     share: float
     state: str  # as of a criterion: the colour of the bar
     words: VerdictWords
+    ended: str
     diagnosis: Diagnosis
     criteria: tuple[CriterionLine, ...]
     lost: tuple[CriterionLine, ...]  # by the cause, which has told of them already
     others: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
+    faults_title: str
     recognition: tuple[Seen, ...]
     scenes: tuple[Scene, ...]
     diagrams: tuple[OwnDiagram, ...]
@@ -170,6 +172,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         _criterion_line(grade, result, played, told=index in diagnosis.lost)
         for index, result in enumerate(grade.criteria)
     )
+    time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=number(grade.marks),
@@ -177,11 +180,13 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         share=_share(float(grade.marks), float(grade.max_marks)),
         state=_state(grade.marks, grade.max_marks),
         words=grade_words(grade),
+        ended=ended(grade, diagnosis),
         diagnosis=diagnosis,
         criteria=criteria,
         lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
         others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
+        faults_title="How it ended" if time_alone else "What went wrong",
         recognition=tuple(_seen(grade, alike, plots) for alike in same_answers(grade)),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
         diagrams=own_diagrams(grade, diagrams_in(submission.notebook).cells) if submission is not None else (),

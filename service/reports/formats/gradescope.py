@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
-from service.reports.cause import diagnose, excerpt_lines
+from service.reports.cause import diagnose, ended, excerpt_lines
 from service.reports.faults import faults_beside
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import grade_words
 from submissions.submission import Submission
 
 
@@ -90,9 +89,9 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 
 def _output(view: GradebookView, submission: Submission | None) -> str:
     shown = view.shown
-    words, diagnosis = grade_words(shown), diagnose(shown, submission)
+    diagnosis = diagnose(shown, submission)
     lines = [diagnosis.cause, *excerpt_lines(diagnosis), f"Next: {diagnosis.next_step}"]
-    lines += [*diagnosis.further, f"{words.happened} {words.whose}"]
+    lines += [*diagnosis.further, ended(shown, diagnosis)]
     for told, group in faults_beside(diagnosis.cause, shown):
         lines += [told, *([group.hint] if group.hint and told != group.where else []), f"({group.how_often})"]
     lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from service.grading.grade import Grade
-from service.reports.cause import diagnose, excerpt_lines
+from service.reports.cause import diagnose, ended, excerpt_lines
 from service.reports.faults import FaultGroup, faults_beside
 from service.reports.formats.registry import on_terminal
 from service.reports.readable import number, one_line, readable
@@ -30,7 +30,7 @@ def rich_report(view: View, submission: Submission | None = None) -> RenderableT
     words = grade_words(grade)
     heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
     diagnosis = diagnose(grade, submission)
-    verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.whose}")
+    verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", ended(grade, diagnosis))
     cause = Group(
         Text(diagnosis.cause, style="bold"), *map(Text, excerpt_lines(diagnosis)), Text(f"Next: {diagnosis.next_step}")
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import textwrap
 
 from service.grading.grade import CriterionResult
-from service.reports.cause import Diagnosis, diagnose, excerpt_lines
+from service.reports.cause import Diagnosis, diagnose, ended, excerpt_lines
 from service.reports.faults import FaultGroup, faults_beside
 from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
@@ -36,7 +36,7 @@ def plain_text(view: View, submission: Submission | None = None) -> str:
     lines += [""] if of_the_cause and others else []
     for result in others:
         lines += _criterion_lines(result, readable(result.message, 600, lines=6))
-    lines += ["", *_wrapped(f"{words.happened} {words.whose}")]
+    lines += ["", *_wrapped(ended(grade, diagnosis))]
     for cause in diagnosis.further:
         lines += ["", *_wrapped(cause)]
     for told, group in faults_beside(diagnosis.cause, grade):

@@ -181,8 +181,8 @@ def test_lost_messages_are_told_apart() -> None:
     told = conversation(build.faulty_grade().trials[1].recording)
     kinds = [step.kind for step in told.steps if isinstance(step, Step)]
     assert kinds == ["message", "lost", "message", "silence", "lost"]
-    (scene,) = page_of(staff_view(build.faulty_grade())).scenes
-    assert [line.arrived for line in scene.messages if line.kind == "wrong"] == ["never (lost)", "never (lost)"]
+    (talk, *_) = (scene for scene in page_of(staff_view(build.faulty_grade())).scenes if scene.messages)
+    assert [line.arrived for line in talk.messages if line.kind == "wrong"] == ["never (lost)", "never (lost)"]
 
 
 def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
