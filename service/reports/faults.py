@@ -129,6 +129,8 @@ def excerpt_around(source: Code, line: int, around: int = 2) -> tuple[SourceLine
     if not 1 <= line <= len(lines):
         return ()
     first, last = max(1, line - around), min(len(lines), line + around)
+    while first < line and not lines[first - 1].strip():
+        first += 1
     return tuple(
         SourceLine(number, readable(lines[number - 1].rstrip("\r"), 200), number == line)
         for number in range(first, last + 1)
