@@ -41,13 +41,14 @@ def written(name: str, folder: Path) -> Path:
 def test_a_phone_shows_the_cause_at_once_and_the_details_after_three_screens(
     browser: Browser, tmp_path: Path, name: str
 ) -> None:
-    with opened(browser, written(name, tmp_path), **PHONE) as found:
+    file = written(name, tmp_path)
+    with opened(browser, file, **PHONE) as found:
         top = "(name) => document.querySelector(name).getBoundingClientRect().bottom"
         assert found.page.evaluate(top, ".verdict") < 844
         assert found.page.evaluate("document.querySelector('.details').getBoundingClientRect().top") <= 3 * 844
         assert found.page.evaluate("document.documentElement.scrollWidth") == 390
         assert not found.complaints
-        assert not found.asked
+        assert found.asked == [file.as_uri()]
 
 
 @pytest.mark.parametrize("name", ["shape", "line_follower"])
