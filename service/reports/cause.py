@@ -65,10 +65,12 @@ def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
     Excerpts need the ``submission``.
     """
     words = grade_words(grade)
-    lost = {index: each for index, each in enumerate(grade.criteria) if each.marks < each.max_marks}
+    # What was set by hand is told in the words of whoever set it.
+    graded = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
+    lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
     if is_ours(grade.verdict):
         return Diagnosis(words.happened, words.next_step)
-    if grade.criteria and not lost:
+    if grade.criteria and grade.marks >= grade.max_marks:
         return Diagnosis(FULL_MARKS, "Nothing is left to do.")
     hints = hints_of(grade)
     if hints:
@@ -138,6 +140,8 @@ def _failed(result: CriterionResult) -> list[Evidence]:
 
 def found(grade: Grade, result: CriterionResult) -> str:
     """What a criterion found instead of what it asked for, in a sentence or two."""
+    if result.set_by_hand is not None:
+        return readable(result.message, 1000, lines=12)
     accuracy = result.accuracy
     wrong = _confused(result)
     if accuracy is not None and wrong:

@@ -27,6 +27,7 @@ from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import (
     VerdictWords,
     channel_words,
+    comments_of,
     cost_words,
     grade_words,
     verdict_words,
@@ -143,6 +144,7 @@ class Page:
     words: VerdictWords
     ended: str
     diagnosis: Diagnosis
+    comments: tuple[str, ...]
     criteria: tuple[CriterionLine, ...]
     lost: tuple[CriterionLine, ...]  # by the cause, which has told of them already
     others: tuple[CriterionLine, ...]
@@ -182,6 +184,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         words=grade_words(grade),
         ended=ended(grade, diagnosis),
         diagnosis=diagnosis,
+        comments=comments_of(grade),
         criteria=criteria,
         lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
         others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
@@ -232,7 +235,7 @@ def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int
     seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
-        told="" if full or told else found(grade, result),
+        told="" if told or (full and result.set_by_hand is None) else found(grade, result),
         message=readable(result.message, 1000, lines=12),
         marks=number(result.marks),
         max_marks=number(result.max_marks),

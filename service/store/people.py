@@ -70,10 +70,15 @@ def make_operator(session: Session, person_id: int) -> None:
 
 def member(session: Session, course: str, written: str) -> Member:
     """Somebody in the course, by id. Raises UsageError for a course or a person that there is not."""
-    course_id = session.scalar(select(Course.id).where(Course.name == course))
+    return _member(session, Students(session, find_course(session, course)).find(written))
+
+
+def find_course(session: Session, name: str) -> int:
+    """The course of this name. Raises UsageError where there is none."""
+    course_id = session.scalar(select(Course.id).where(Course.name == name))
     if course_id is None:
-        raise UsageError(f"there is no course {course!r}")
-    return _member(session, Students(session, course_id).find(written))
+        raise UsageError(f"there is no course {name!r}")
+    return course_id
 
 
 def members(session: Session, course_id: int) -> list[Member]:
@@ -85,6 +90,24 @@ def members(session: Session, course_id: int) -> list[Member]:
         .order_by(Enrolment.student)
     )
     return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+
+
+def members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
+    """Some of the course, in the order in which they came in: those who came after this one."""
+    query = (
+        select(Enrolment, Person)
+        .join(Person, Enrolment.person_id == Person.id)
+        .where(Enrolment.course_id == course_id, Enrolment.id > enrolment_id)
+        .order_by(Enrolment.id)
+        .limit(limit)
+    )
+    return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+
+
+def is_more_than(session: Session, row: Enrolment) -> bool:
+    """Whether a person is more than this enrolment says: in other courses, or runs the installation."""
+    others = select(Enrolment.id).where(Enrolment.person_id == row.person_id, Enrolment.id != row.id).limit(1)
+    return session.get_one(Person, row.person_id).operator or session.scalar(others) is not None
 
 
 def courses(session: Session) -> list[CourseLine]:

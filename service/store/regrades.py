@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit
+from service.store import audit, outbox, overrides
 from service.store.engine import Store, now
 from service.store.jobs import enqueue
 from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
@@ -163,6 +163,9 @@ def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) ->
             sum(job.id in unjudged and job.published_at is None for job in jobs),
         )
         audit.note(session, actor, "publish", "batch", batch_id, published=published, replaced=replaced)
+        if published:
+            course_id = session.get_one(Batch, batch_id).course_id
+            outbox.grades_published(session, course_id, batch=batch_id, published=published)
         return result
 
 
@@ -175,12 +178,12 @@ def unpublished_regrades(session: Session, batch_id: str) -> int:
 
 
 def _unjudged(session: Session, batch_id: str) -> set[str]:
-    """The jobs for the submissions of a batch that have a criterion that could not be judged."""
+    """The jobs for the submissions of a batch that have a criterion that could not be judged, nor was set by hand."""
     ids = select(Job.submission_id).where(Job.batch_id == batch_id)
     query = (
         select(CriterionResultRow.job_id)
         .join(Job, CriterionResultRow.job_id == Job.id)
-        .where(Job.submission_id.in_(ids), CriterionResultRow.unjudged.is_not(None))
+        .where(Job.submission_id.in_(ids), overrides.waits_for_judgement())
     )
     return set(session.scalars(query))
 
@@ -264,8 +267,8 @@ _Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
 
 
 def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
-    query = select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
-    return {row.criterion: (row.title, row.marks, row.max_marks) for row in session.scalars(query)}
+    lines = overrides.criterion_marks(session, job_id)
+    return {line.criterion: (line.title, line.marks, line.max_marks) for line in lines}
 
 
 def _worth(marked: _Marked | None) -> tuple[Decimal, Decimal] | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from decimal import Decimal
 from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
@@ -17,6 +18,7 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
+from service.reports.words import comments_of
 from submissions.submission import Submission
 
 
@@ -24,7 +26,7 @@ def gradescope_document(view: GradebookView, submission: Submission | None = Non
     """The grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
     grade = view.entry
     return {
-        "score": json_number(grade.marks),
+        "score": json_number(view.marks or Decimal(0)),
         "output": _output(view, submission),
         "output_format": "text",
         "test_output_format": "text",
@@ -90,7 +92,8 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 def _output(view: GradebookView, submission: Submission | None) -> str:
     shown = view.shown
     diagnosis = diagnose(shown, submission)
-    lines = [diagnosis.cause, *excerpt_lines(diagnosis), f"Next: {diagnosis.next_step}"]
+    lines = [f"Comment: {comment}" for comment in comments_of(shown)]
+    lines += [diagnosis.cause, *excerpt_lines(diagnosis), f"Next: {diagnosis.next_step}"]
     lines += [*diagnosis.further, ended(shown, diagnosis)]
     for told, group in faults_beside(diagnosis.cause, shown):
         lines += [told, *([group.hint] if group.hint and told != group.where else []), f"({group.how_often})"]

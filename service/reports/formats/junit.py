@@ -14,7 +14,7 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
-from service.reports.words import hints_of
+from service.reports.words import comments_of, hints_of
 from sim.recording import Verdict
 from submissions.submission import Submission
 
@@ -108,6 +108,7 @@ def _properties(grade: Grade, submission: Submission | None) -> list[tuple[str, 
         ("cause", diagnosis.cause),
         ("next_step", diagnosis.next_step),
         *(("excerpt", line) for line in excerpt_lines(diagnosis)),
+        *(("comment", comment) for comment in comments_of(grade)),
         *(("hint", hint) for hint in hints_of(grade)),
         ("assignment_version", grade.assignment_version),
         ("submission", grade.submission),

@@ -20,6 +20,7 @@ from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
+from service.reports.words import comments_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -66,7 +67,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         line = lines[place]
         line += [""] * (len(lines[0]) - len(line))
         if row.grade is not None:
-            _check_maximum(row.grade.entry.max_marks, line, places)
+            _check_maximum(row.grade.entry.worth, line, places)
             line[places[_GRADE]] = _marks(row)
         feedback = places.get(_FEEDBACK)
         # What waits leaves standing what somebody wrote.
@@ -95,7 +96,7 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
 
 
 def _marks(row: TableRow[GradebookView]) -> str:
-    return "" if row.grade is None else number(row.grade.entry.marks)
+    return "" if row.grade is None or row.grade.marks is None else number(row.grade.marks)
 
 
 def _feedback(row: TableRow[GradebookView]) -> str:
@@ -104,10 +105,10 @@ def _feedback(row: TableRow[GradebookView]) -> str:
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    first = []
+    first: list[str] = []
     if row.grade is not None:
         diagnosis = diagnose(row.grade.shown)
-        first = [diagnosis.cause, diagnosis.next_step, *diagnosis.further]
+        first = [*comments_of(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
     return one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
 
 

@@ -17,7 +17,7 @@ from service.reports.faults import FaultGroup, faults_beside
 from service.reports.formats.registry import on_terminal
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, channel_words, cost_words, grade_words
+from service.reports.words import accuracy_words, channel_words, comments_of, cost_words, grade_words
 from submissions.submission import Submission
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
@@ -34,7 +34,9 @@ def rich_report(view: View, submission: Submission | None = None) -> RenderableT
     cause = Group(
         Text(diagnosis.cause, style="bold"), *map(Text, excerpt_lines(diagnosis)), Text(f"Next: {diagnosis.next_step}")
     )
-    parts: list[RenderableType] = [heading, Padding(cause, (0, 0, 0, 2)), marks_table(grade, diagnosis.lost), verdict]
+    written = [Padding(Text(f"Comment: {comment}"), (0, 0, 0, 2)) for comment in comments_of(grade)]
+    parts: list[RenderableType] = [heading, Padding(cause, (0, 0, 0, 2)), *written]
+    parts += [marks_table(grade, diagnosis.lost), verdict]
     parts += [Text(further) for further in diagnosis.further]
     parts += [_fault(told, group) for told, group in faults_beside(diagnosis.cause, grade)]
     if grade.accuracy is not None:

@@ -13,7 +13,7 @@ from service.reports.faults import FaultGroup, faults_beside
 from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, channel_words, cost_words, grade_words
+from service.reports.words import accuracy_words, channel_words, comments_of, cost_words, grade_words
 from submissions.submission import Submission
 
 _WIDTH = 96
@@ -29,6 +29,8 @@ def plain_text(view: View, submission: Submission | None = None) -> str:
     lines += [f"{number(grade.marks)} of {number(grade.max_marks)} marks; {words.short}", ""]
     lines += [*_wrapped(f"→ {diagnosis.cause}", indent=2), *_excerpt(diagnosis)]
     lines += [*_wrapped(f"  Next: {diagnosis.next_step}", indent=2), ""]
+    for comment in comments_of(grade):
+        lines += [*_wrapped(f"Comment: {comment}", indent=2), ""]
     of_the_cause = [grade.criteria[index] for index in sorted(diagnosis.lost)]
     for result in of_the_cause:
         lines += _criterion_lines(result, "")

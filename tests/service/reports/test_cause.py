@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 import report_builders as build
-from service.grading.grade import CriterionResult, Evidence, Grade
+from service.grading.grade import CriterionResult, Evidence, Grade, SetByHand
 from service.reports.cause import FULL_MARKS, diagnose
 from service.reports.formats.gradescope import gradescope_document
 from service.reports.formats.json_output import json_document
@@ -113,6 +113,15 @@ def test_the_dearest_criterion_is_the_cause_with_those_that_failed_where_it_did(
     at_the_end = (criterion("stops", missed(0, end)), criterion("says", missed(0, end)))
     assert diagnose(replace(grade, criteria=(closer, line, later, *at_the_end))).lost == {0, 1}
     assert diagnose(replace(grade, criteria=(*at_the_end, later))).lost == {0}
+
+
+def test_what_was_set_by_hand_is_no_cause_and_keeps_its_words() -> None:
+    by_hand = SetByHand(Decimal(0), Decimal(2), "It drove well.", excused=False)
+    dear = replace(criterion("dear", missed(0, 1.5), message="Set by hand from 0 to 1."), set_by_hand=by_hand)
+    full = replace(dear, id="full", marks=Decimal(2), message="Set by hand from 0 to 2.")
+    grade = replace(build.line_follower_grade(), criteria=(replace(dear, marks=Decimal(1)), full, criterion("cheap")))
+    assert diagnose(grade).lost == {2}
+    assert [line.told for line in page_of(staff_view(grade)).others] == [dear.message, full.message]
 
 
 def test_the_same_confusions_are_the_same_cause() -> None:
