@@ -35,7 +35,7 @@ from submissions.submission import Submission
 
 #: What is expected of a submission where a refusal does not say.
 _USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
-_SHOWN = 106 / DPI
+_SHOWN = 100 / DPI
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -238,7 +238,7 @@ def _data_uri(data: bytes) -> Markup:
 
 
 def _shown_size(image: bytes) -> tuple[int, int]:
-    """Of a PNG, as its header has it: 106 CSS pixels an inch, at which type of 7.5 points is 11 pixels high."""
+    """Of a PNG, as its header has it: 100 CSS pixels an inch, at which type of 8 points is 11 pixels high."""
     across, down = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
     return round(across * _SHOWN), round(down * _SHOWN)
 

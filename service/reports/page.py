@@ -18,6 +18,7 @@ from service.reports.plots.drawn import plots_of, same_answers
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
 from service.reports.plots.sequence import MOST_CALL_STEPS, Step, inside
+from service.reports.plots.style import turned
 from service.reports.plots.talk import talk_words, talks
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
@@ -328,7 +329,7 @@ def _trial_line(trial: TrialResult) -> TrialLine:
     return TrialLine(
         scenario=one_line(trial.scenario, 60),
         index=trial.index + 1,
-        start=f"{start.x:.0f}, {start.y:.0f}, {start.heading:.0f}°",
+        start=f"{start.x:.0f}, {start.y:.0f}, {turned(start.heading)}°",
         noise=f"{trial.light_noise:g} / {trial.motor_noise:g}{_channel_words(trial)}",
         seed=str(trial.seed),
         seconds=f"{trial.recording.end_t:.2f}",

@@ -19,6 +19,7 @@ from models.families import shapes
 from models.images import Photographer, Shift
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+from service.reports.plots.style import DPI, WIDTH
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +88,7 @@ def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation
     assert set(first) == {"shapes-confusion.png", "shapes-misread.png", "shapes-robustness.png"}
     for data in first.values():
         with Image.open(io.BytesIO(data)) as pixels:
-            assert pixels.width == 1040
+            assert pixels.width == round(WIDTH * DPI)
 
 
 def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:

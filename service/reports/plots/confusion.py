@@ -19,8 +19,9 @@ from service.reports.readable import one_line
 NO_ANSWER = "no answer"
 _LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the truths at the left
 _SHORT = 6  # characters of a name that needs little room
-_TOTALS = 2.55  # cells for what stands right of the counts
-_HEADS, _SHORT_HEADS = 0.86, 0.42  # for the answers at the top
+_FOOT = 0.56  # inches
+_TOTALS, _ALL, _RECALL = 3.2, 0.85, 2.4  # cells for what stands right of the counts, and where in them
+_HEADS, _SHORT_HEADS = 1.06, 0.24  # for the answers at the top
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> F
     """The confusion matrix of ``accuracy`` with its value, interval and n."""
     subtitle = (
         f"accuracy {accuracy.value:.2f}, 95 % interval {accuracy.low:.2f} to {accuracy.high:.2f}, "
-        f"n = {accuracy.n} {counted(accuracy)}; {one_line(result.title, 34)}"
+        f"n = {accuracy.n} {counted(accuracy)}"
     )
     return draw_table(confusion_table(accuracy), title, subtitle)
 
@@ -68,39 +69,40 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
     cell = min(0.56, (WIDTH - labels - 0.14) / across)
     body = cell * (len(table.truths) + 0.85)
-    heads = _HEADS if any(len(answer) > _SHORT for answer in table.answers) else _SHORT_HEADS
-    figure = new_figure(HEAD + heads + body + 0.42, title, subtitle)
-    axes = axes_at(figure, labels, 0.42, cell * across, body + heads)
+    upright = any(len(answer) > _SHORT for answer in table.answers)
+    heads = _HEADS if upright else _SHORT_HEADS
+    figure = new_figure(HEAD + heads + body + _FOOT, title, subtitle)
+    axes = axes_at(figure, labels, _FOOT, cell * across, body + heads)
     axes.set_axis_off()
     axes.set_xlim(0, across)
     axes.set_ylim(body / cell, -heads / cell)
-    size = 9.0 if cell > 0.4 else max(7.5 if cell > 0.25 else 5.0, 22 * cell)
-    _draw_names(axes, table, _smaller(size))
+    size = 9.0 if cell > 0.4 else max(8.0, 22 * cell)
+    _draw_names(axes, table, _smaller(size), upright=upright)
     _draw_cells(axes, table, size)
-    write(
-        figure,
-        0.08,
-        0.24,
-        "rows: what it was;  columns: what was answered;  ✓: right  ✗: wrong",
-        size=7.5,
-        colour=FAINT,
+    told = (
+        "precision: right of what was answered",
+        "✓: right  ✗: wrong;  recall: right of what it was",
+        "rows: what it was;  columns: what was answered",
     )
-    write(figure, 0.08, 0.10, "recall: right of what it was;  precision: right of what was answered", size=7.5,
-          colour=FAINT)  # fmt: skip
+    for number, line in enumerate(told):
+        write(figure, 0.08, 0.10 + 0.14 * number, line, size=8, colour=FAINT)
     return figure
 
 
-def _draw_names(axes: Axes, table: ConfusionTable, size: float) -> None:
-    for row, truth in enumerate(table.truths):
-        _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center", rotation=0)
-    for column, answer in enumerate(table.answers):
-        _name(axes, column + 0.42, -0.14, answer, size, ha="left", va="bottom", rotation=52)
-    _name(axes, len(table.answers) + 0.60, -0.14, "in all", size, ha="left", va="bottom", rotation=52)
-    _name(axes, len(table.answers) + 1.75, -0.14, "recall", size, ha="left", va="bottom", rotation=52)
-    _name(axes, -0.12, len(table.truths) + 0.5, "precision", size, ha="right", va="center", rotation=0)
+def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, upright: bool) -> None:
+    """All headings one way round: lying where every name is short, else upright."""
+    for row, truth in enumerate((*table.truths, "precision")):
+        _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
+    count = len(table.answers)
+    heads = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "in all")]
+    for x, name in (*heads, (count + _RECALL, "recall")):
+        if upright:
+            _name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)
+        else:
+            _name(axes, x, -0.14, name, size, ha="center", va="bottom")
 
 
-def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float) -> None:
+def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float = 0) -> None:
     text = "\n".join(textwrap.wrap(one_line(name, 40), 15, max_lines=2, placeholder="…"))
     axes.text(
         x, y, drawable(text), font=font(size), color=INK, ha=ha, va=va, rotation=rotation,
@@ -124,9 +126,9 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
                     column + 0.93, row + 0.06, "✓" if right else "✗", font=font(_smaller(size), bold=True), ha="right",
                     va="top", color=colour,
                 )  # fmt: skip
-        _figure_text(axes, len(counts) + 0.65, row, str(table.totals[row]), size)
+        _figure_text(axes, len(counts) + _ALL, row, str(table.totals[row]), size)
         right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
-        _figure_text(axes, len(counts) + 1.85, row, _share(right_ones, table.totals[row]), _smaller(size))
+        _figure_text(axes, len(counts) + _RECALL, row, _share(right_ones, table.totals[row]), _smaller(size))
     for column, answer in enumerate(table.answers):
         if answer in table.truths:
             answered = sum(counts[column] for counts in table.counts)
@@ -135,8 +137,8 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
 
 
 def _smaller(size: float) -> float:
-    """For what stands beside the counts: as small as a phone can show it, unless there are very many classes."""
-    return max(0.82 * size, min(size, 7.5))
+    """For what stands beside the counts: as small as a phone can show it."""
+    return max(0.82 * size, min(size, 8.0))
 
 
 def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None:

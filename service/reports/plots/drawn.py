@@ -19,7 +19,7 @@ from service.reports.plots.path import Pixels, draw_path
 from service.reports.plots.plot import Plot, hidden_suffix, slug, title_of, trial_name
 from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
 from service.reports.plots.sensor import draw_sensors
-from service.reports.plots.style import png
+from service.reports.plots.style import png, turned
 from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
 from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
@@ -120,7 +120,7 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
         if accuracy is not None and accuracy.confusion:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
-                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of(grade, "what was answered"),
+                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of("what was answered"),
                 f"What each image showed and what was answered, for “{one_line(result.title, 80)}”.",
                 f"Confusion matrix: {right} of {accuracy.n} images on the diagonal, accuracy {accuracy.value:.2f}, "
                 f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
@@ -138,7 +138,7 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
                 "predictions",
                 index,
                 "",
-                title_of(grade, "what the sensor saw"),
+                title_of("what the sensor saw"),
                 "What the left light sensor sent, whole and in the focus that a network is shown. "
                 "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
                 f"{shown} sensor images, {len(wrong)} of {len(result.predictions)} answered wrongly"
@@ -156,7 +156,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
             for curve in result.curves
         )
         yield Plot(
-            f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of(grade, "robustness"),
+            f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of("robustness"),
             f"How often images were named rightly as conditions got harder, for “{title}”.",
             f"Curves of accuracy. {told}.",
         )  # fmt: skip
@@ -164,7 +164,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
     if on_track:
         right = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
-            f"track-{slug(result.id)}{suffix}", "track", index, "", title_of(grade, "along the track"),
+            f"track-{slug(result.id)}{suffix}", "track", index, "", title_of("along the track"),
             "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
             "floor, and in all trials by the way driven.",
             f"{right} of {len(result.predictions)} images right along the track in {len(on_track)} trials.",
@@ -172,7 +172,7 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> It
     wrong = misread(result.predictions)
     if wrong:
         yield Plot(
-            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of(grade, "what was misread"),
+            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of("what was misread"),
             "Images that were misread, each beside the nearest one of the same truth that was read rightly, and the "
             "nearest right one of what it was taken for.",
             f"{len(wrong)} of {len(result.predictions)} images were misread.",
@@ -187,15 +187,16 @@ def _trials(grade: Grade) -> Iterator[Plot]:
         if stood_still(recording):
             continue
         name = trial_name(trial)
-        title = title_of(grade, scenario)
+        title = title_of(scenario)
         start, end = recording.start, recording.end
         yield Plot(
             f"path-{name}", "path", index, scenario, f"{title}: path",
             "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
             "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
             f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
-            f"{start.heading:.0f} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading {end.heading:.0f} degrees, "
-            f"in {recording.end_t:.1f} seconds; {len(recording.touches)} touches." + _partners_way(recording.partner),
+            f"{turned(start.heading)} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading "
+            f"{turned(end.heading)} degrees, in {recording.end_t:.1f} seconds; "
+            f"{len(recording.touches)} touches." + _partners_way(recording.partner),
         )  # fmt: skip
         light = recording.ticks.left_rgb[:, 0]
         heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, whole
+from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, turned, whole
 from sim.floors import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
@@ -20,7 +20,7 @@ def draw_floor(floor: Floor) -> Figure:
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * _FLOOR_HEIGHT / _FLOOR_WIDTH
     pose = floor.default_pose
-    subtitle = f"start ({whole(pose.x)}, {whole(pose.y)}) heading {whole(pose.heading)}°"
+    subtitle = f"start ({whole(pose.x)}, {whole(pose.y)}) heading {turned(pose.heading)}°"
     names = tuple(dict.fromkeys(label.label for label in floor.labels))
     if names:
         subtitle += f"; {len(floor.labels)} places with a label, {len(names)} labels"

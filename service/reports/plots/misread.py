@@ -21,7 +21,8 @@ from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WID
 from service.reports.readable import one_line
 
 MOST_MISREAD = 6
-_SIDE, _GAP, _ROW = 1.02, 0.16, 1.40  # inches
+_SIDE, _GAP, _ROW = 0.76, 0.10, 1.24  # inches
+_HEADS = 0.34
 _TEXT = 3 * (_SIDE + _GAP) + 0.08
 
 
@@ -64,16 +65,16 @@ def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
     height = _ROW * len(shown)
     count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
     figure = new_figure(
-        HEAD + 0.2 + height, title, f"{count} misread of n = {images} images; each: the focus that a network sees"
+        HEAD + _HEADS + height, title, f"{count} misread of n = {images} images; each: the focus that a network sees"
     )
-    axes = axes_at(figure, 0.02, 0.0, WIDTH - 0.04, height + 0.2)
+    axes = axes_at(figure, 0.02, 0.0, WIDTH - 0.04, height + _HEADS)
     axes.set_axis_off()
-    for column, head in enumerate(("misread", "right, same truth", "right, same answer")):
-        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.06, head, FAINT, 7.4, ha="center")
+    for column, head in enumerate(("misread", "right,\nsame truth", "right, same\nanswer")):
+        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.5 * _HEADS, head, FAINT, 8, ha="center")
     for row, item in enumerate(shown):
         _draw_row(axes, item, row * _ROW)
     axes.set_xlim(-0.08, WIDTH - 0.12)
-    axes.set_ylim(height, -0.2)
+    axes.set_ylim(height, -_HEADS)
     return figure
 
 
@@ -93,12 +94,12 @@ def _draw_row(axes: Axes, item: Misread, y: float) -> None:
     ]
     line = 0
     for text, colour, bold in lines:
-        for part in textwrap.wrap(text, 22, max_lines=2, placeholder="…") or [""]:
+        for part in textwrap.wrap(text, 16, max_lines=2, placeholder="…") or [""]:
             _write(axes, _TEXT, y + 0.08 + 0.145 * line, part, colour, 8.2, bold=bold)
             line += 1
     for column, other in ((1, item.like_truth), (2, item.like_answer)):
         if other is not None:
-            name = textwrap.shorten(one_line(other.truth, 40), 17, placeholder="…")
+            name = textwrap.shorten(one_line(other.truth, 40), 14, placeholder="…")
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
 
 

@@ -5,6 +5,7 @@ Everything in them was measured by ``models/evaluation.py``; the drawing of tabl
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,8 +35,9 @@ from service.reports.plots.style import (
 )
 
 MOST_MISREAD = 10
-_SIDE, _GAP, _ROW = 0.86, 0.14, 1.02
-_TEXT = 3 * (_SIDE + _GAP) + 0.16
+_SIDE, _GAP, _ROW = 0.74, 0.12, 0.92
+_TEXT = 3 * (_SIDE + _GAP) + 0.04
+_LINE = 16  # characters beside the images
 
 
 def evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
@@ -165,8 +167,9 @@ def _draw_row(axes: Axes, classes: tuple[str, ...], each: Answered, right: Seque
         (f"✗ read as {classes[read]}", FAULT, True),
         (_where(each), FAINT, False),
     ]
-    for number, (text, colour, bold) in enumerate(lines):
-        _text(axes, _TEXT, y + 0.16 + 0.20 * number, text, colour, 9 if bold else 7.4, bold=bold)
+    broken = [(line, colour, bold) for text, colour, bold in lines for line in textwrap.wrap(text, _LINE)]
+    for number, (text, colour, bold) in enumerate(broken):
+        _text(axes, _TEXT, y + 0.02 + 0.14 * number, text, colour, 8, bold=bold)
 
 
 def _where(each: Answered) -> str:

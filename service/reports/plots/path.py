@@ -38,6 +38,7 @@ from service.reports.plots.style import (
     axes_at,
     font,
     new_figure,
+    turned,
     whole,
     write,
 )  # fmt: skip
@@ -52,6 +53,7 @@ _SMALLEST_VIEW = 520.0  # mm, so that a robot that stands still is seen among it
 _BEYOND = 700.0  # mm outside the floor that are still shown
 _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is shown on all of it
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
+_LEGEND_COLUMNS = 2
 _OFF_THE_FLOOR = "#a3aab1"
 _DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
 _BEACON: Mapping[str, Any] = MappingProxyType(
@@ -91,7 +93,7 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     plot_height = plot_width * view.height / view.width
     handles = _legend(recording, view)
     located = view.width < FLOOR_WIDTH
-    legend_rows = -(-len(handles) // _columns(located))
+    legend_rows = -(-len(handles) // _LEGEND_COLUMNS)
     foot = 0.42 + max(0.62 if located else 0.0, 0.17 * legend_rows + 0.04)
     figure = new_figure(HEAD + plot_height + foot, title, _subtitle(trial))
     axes = axes_at(figure, _LEFT_EDGE, foot, plot_width, plot_height)
@@ -108,8 +110,8 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
     axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
     figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_columns(located), prop=font(8),
-        frameon=False, handletextpad=0.5, columnspacing=1.4, labelspacing=0.35, borderaxespad=0.3,
+        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_LEGEND_COLUMNS, prop=font(8),
+        frameon=False, handletextpad=0.5, columnspacing=0.9, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
     if _goes_on(everywhere, view):
         axes.text(0.5, 0.03, "the path goes on outside this image", transform=axes.transAxes, ha="center",
@@ -123,8 +125,8 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
 def _subtitle(trial: TrialResult) -> str:
     start, end, recording = trial.recording.start, trial.recording.end, trial.recording
     return (
-        f"trial {trial.index + 1}; from ({whole(start.x)}, {whole(start.y)}) heading {whole(start.heading)}° to "
-        f"({whole(end.x)}, {whole(end.y)}) heading {whole(end.heading)}° in {recording.end_t:.1f} s"
+        f"trial {trial.index + 1}; from ({whole(start.x)}, {whole(start.y)}) heading {turned(start.heading)}° to "
+        f"({whole(end.x)}, {whole(end.y)}) heading {turned(end.heading)}° in {recording.end_t:.1f} s"
     )
 
 
@@ -144,9 +146,10 @@ def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
     margin = max(_MARGIN, reach + 15)
     view = Viewport(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
     if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
-        view = Viewport(
-            min(0.0, low_x - 60), min(0.0, low_y - 60), max(FLOOR_WIDTH, high_x + 60), max(FLOOR_HEIGHT, high_y + 60)
-        )
+        ends = points[[0, -1], :2]
+        around = np.vstack((places - 60, places + 60, ends - reach - 15, ends + reach + 15))
+        (low_x, low_y), (high_x, high_y) = around.min(axis=0), around.max(axis=0)
+        view = Viewport(min(0.0, low_x), min(0.0, low_y), max(FLOOR_WIDTH, high_x), max(FLOOR_HEIGHT, high_y))
     left, right = max(view.left, -_BEYOND), min(view.right, FLOOR_WIDTH + _BEYOND)
     bottom, top = max(view.bottom, -_BEYOND), min(view.top, FLOOR_HEIGHT + _BEYOND)
     return _shaped(Viewport(left, bottom, right, top))
@@ -276,10 +279,6 @@ def _goes_on(points: NDArray[np.float64], view: Viewport) -> bool:
     return bool(((x < view.left) | (x > view.right) | (y < view.bottom) | (y > view.top)).any())
 
 
-def _columns(located: bool) -> int:
-    return 2 if located else 3
-
-
 def _legend(recording: Recording, view: Viewport) -> list[Artist]:
     """A handle for every kind of thing that is in the image."""
     handles: list[Artist] = [
@@ -315,7 +314,7 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
 
 
 def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
-    width = 1.12
+    width = 0.94
     height = width * FLOOR_HEIGHT / FLOOR_WIDTH
     axes = axes_at(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)
     axes.set_xlim(0, FLOOR_WIDTH)
@@ -330,4 +329,4 @@ def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
     axes.add_patch(
         Rectangle((view.left, view.bottom), view.width, view.height, facecolor="none", edgecolor=FAULT, linewidth=1.4)
     )
-    write(figure, WIDTH - _RIGHT_EDGE - width - 0.06, 0.10, "whole\nfloor", size=7.6, colour=FAINT, ha="right")
+    write(figure, WIDTH - _RIGHT_EDGE - width, 0.10 + height, "whole floor", size=8, colour=FAINT)

@@ -52,8 +52,11 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
             (x + way * _FROM_PATH[0] * per_inch * math.cos(angle), y + way * _FROM_PATH[1] * per_inch * math.sin(angle))
             for way in (1, -1)
         ]
-        place = next((side for side in sides if _whole_in_view(axes, *side, text, per_inch)), sides[0])
-        _tag(axes, *place, text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
+        fitting = [
+            side for side in sides if _whole_in_view(axes, *side, text, per_inch) and _clear(side, recording, per_inch)
+        ]
+        if fitting:
+            _tag(axes, *fitting[0], text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
 
 
 def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
@@ -96,6 +99,11 @@ def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
 def _half_width(text: str) -> float:
     """About half of what a time or a number takes, inches."""
     return 0.032 * len(text) + 0.03
+
+
+def _clear(place: tuple[float, float], recording: Recording, per_inch: float) -> bool:
+    """Whether a time there would be written over no touch."""
+    return all(math.dist(place, (touch.pose.x, touch.pose.y)) > 0.26 * per_inch for touch in recording.touches[:40])
 
 
 def _whole_in_view(axes: Axes, x: float, y: float, text: str, per_inch: float) -> bool:

@@ -9,12 +9,9 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from service.grading.grade import Grade, TrialResult
+from service.grading.grade import TrialResult
 from service.reports.readable import one_line
 from service.reports.view import is_for_staff
-
-#: Characters of a title for assignment and scenario, beside ``: sensors``.
-_ROOM = 46
 
 Kind = Literal[
     "path",
@@ -45,10 +42,10 @@ class Plot:
     alt: str
 
 
-def title_of(grade: Grade, what: str) -> str:
-    """A plot's title: of which assignment, as far as there is room, and what it shows."""
-    shown = one_line(what, 24)
-    return f"{one_line(grade.assignment_title, _ROOM - len(shown))}, {shown}"
+def title_of(what: str) -> str:
+    """A plot's title: what it shows, short enough for a phone."""
+    shown = one_line(what, 28)
+    return shown[:1].upper() + shown[1:]
 
 
 def trial_name(trial: TrialResult) -> str:

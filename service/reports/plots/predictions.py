@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 from PIL import Image as Pixels
 
 from service.grading.grade import Prediction
-from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
+from service.reports.plots.style import FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
 from sim.recording import Image
 
 MOST_PREDICTIONS = 12
 #: The part of the 20 x 20 image that lies wholly inside the round sensor: left, upper, right, lower.
 FOCUS = (3, 3, 17, 17)
-_CARD_WIDTH, _CARD_HEIGHT = 2.56, 1.77
-_SIDE = 1.13  # inches of an image
+_CARD_WIDTH, _CARD_HEIGHT = 1.93, 1.70
+_LINE = 28  # characters that fit under a card
+_SIDE = 0.83  # inches of an image
 _COLUMNS = 2
 
 
@@ -93,14 +94,13 @@ def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: flo
         )  # fmt: skip
     sign, word = ("✓", "right") if right else ("✗", "wrong")
     answer = "no answer" if prediction.answer is None else one_line(prediction.answer, 30)
-    lines = [
-        (f"{number}. {sign} {word}", colour, True),
-        (f"answered: {answer}" if prediction.answer is not None else answer, INK, False),
-        (f"truth: {one_line(prediction.truth, 30)}", FAINT if right else INK, False),
-    ]
+    told = f"answered: {answer}" if prediction.answer is not None else answer
+    said = [one_line(prediction.truth, 40)] if right else [told, f"truth: {one_line(prediction.truth, 40)}"]
+    lines = [(f"{number}. {sign} {word}", colour, True)]
+    lines += [(line, INK, False) for text in said for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")]
     for row, (text, shade, bold) in enumerate(lines):
         axes.text(
-            x, y + _SIDE + 0.08 + 0.142 * row, drawable(textwrap.shorten(text, 38, placeholder="…")), color=shade,
+            x, y + _SIDE + 0.08 + 0.142 * row, drawable(text), color=shade,
             font=font(8.3, bold=bold), va="top", parse_math=False,
         )  # fmt: skip
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import math
+import textwrap
 from functools import lru_cache
 from pathlib import Path
 
@@ -22,8 +23,10 @@ from PIL import Image
 
 from service.reports.readable import one_line
 
-#: Inches. On a phone the figure is shown about 3.6 inches wide, so 9 points still read as 6.
-WIDTH = 5.2
+#: Inches. A phone shows it 390 pixels wide, on which the smallest type is 11 pixels high.
+WIDTH = 3.9
+_SMALLEST = 8.0  # points
+_CHARACTERS = 15.2  # of a subtitle that fit into an inch
 DPI = 200
 _MOST_PIXELS = 6_000_000
 
@@ -48,13 +51,14 @@ def new_figure(height: float, title: str, subtitle: str = "", width: float = WID
     """
     dpi = min(DPI, math.sqrt(_MOST_PIXELS / (width * height)))
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    write(figure, 0.08, height - 0.08, one_line(title, 58), size=10.5, bold=True, va="top")
-    if subtitle:
-        write(figure, 0.08, height - 0.30, one_line(subtitle, 84), size=8, colour=FAINT, va="top")
+    write(figure, 0.08, height - 0.08, one_line(title, int(width * 10)), size=10, bold=True, va="top")
+    lines = textwrap.wrap(one_line(subtitle, 200), int(width * _CHARACTERS), max_lines=2, placeholder=" …")
+    for number, line in enumerate(lines):
+        write(figure, 0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, va="top")
     return figure
 
 
-HEAD = 0.56
+HEAD = 0.68
 
 
 def write(
@@ -91,13 +95,13 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
 
 def set_tick_type(axes: Axes, size: float = 8) -> None:
     """Sets the tick labels' type, points."""
-    axes.tick_params(labelsize=size, labelfontfamily="DejaVu Sans")
+    axes.tick_params(labelsize=max(size, _SMALLEST), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
 def font(size: float, *, bold: bool = False) -> FontProperties:
-    """The type that comes with matplotlib, whatever the machine has installed."""
-    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=size)
+    """The type that comes with matplotlib, whatever the machine has installed; not too small for a phone."""
+    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _SMALLEST))
 
 
 def drawable(text: str) -> str:
@@ -109,6 +113,11 @@ def drawable(text: str) -> str:
 def whole(value: float) -> str:
     """``value`` without decimals, with a true minus sign and never as minus nought."""
     return str(round(value)).replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
+
+
+def turned(heading: float) -> str:
+    """A heading as whole degrees from 0 to 359, however often the robot has turned round."""
+    return str(round(heading) % 360) if math.isfinite(heading) else "?"
 
 
 def png(figure: Figure) -> bytes:

@@ -36,7 +36,7 @@ from service.reports.plots.style import (
 )
 from sim.recording import Recording
 
-_LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.56
+_LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.74
 _ALONG, _GAP = 1.15, 0.62  # inches: the curve, and what is between it and the floor
 _MOST_BINS = 12
 _LEAST_WAY = 60.0  # mm that images must be apart for a track
@@ -114,10 +114,10 @@ def draw_track(
     top.set_ylim(view.bottom, view.top)
     _draw_images(top, by_trial[worst], 0.045 * view.width)
     top.set_xlabel("x, mm", font=font(8), labelpad=1)
-    top.set_ylabel("y, mm", font=font(8), labelpad=1)
+    top.set_ylabel("y, mm", font=font(8), labelpad=4)
     _draw_along(axes_at(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
-    write(figure, 0.08, 0.09, "beside each place: ○ right  ✗ wrong  □ no answer;   band: 95 % interval, above it: n",
-          size=7.5, colour=FAINT)  # fmt: skip
+    write(figure, 0.08, 0.23, "beside each place: ○ right  ✗ wrong  □ no answer", size=8, colour=FAINT)
+    write(figure, 0.08, 0.09, "band: 95 % interval; above it: n", size=8, colour=FAINT)
     return figure
 
 

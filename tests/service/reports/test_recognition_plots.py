@@ -72,7 +72,7 @@ def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     assert found.like_answer is not None
     assert found.like_answer.truth == "diamond"
     shown = _texts(draw_misread([found], 6, "t"))
-    assert {"misread", "right, same truth", "right, same answer", "none", "5. ✗ wrong"} <= set(shown)
+    assert {"misread", "right,\nsame truth", "right, same\nanswer", "none", "5. ✗ wrong"} <= set(shown)
     assert any("1 misread of n = 6 images" in text for text in shown)
     # Of two right images of a class the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))

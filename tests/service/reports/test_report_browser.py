@@ -19,8 +19,8 @@ from service.reports.view import student_view
 
 pytestmark = pytest.mark.long
 
-#: Of type, points: smaller is none in a plot but of very many classes.
-_SMALLEST = 7.5
+#: Of type, points: none in a plot is smaller.
+_SMALLEST = 8
 OPEN_ALL = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
 
 

@@ -114,8 +114,8 @@ class SensorPanel {
 }
 
 function placeWords([x, y, heading]) {
-  const within = heading - 360 * Math.round(heading / 360);
-  return `x ${x.toFixed(1)}, y ${y.toFixed(1)} mm, heading ${within.toFixed(1)}°`;
+  const tenths = ((Math.round(heading * 10) % 3600) + 3600) % 3600;
+  return `x ${x.toFixed(1)}, y ${y.toFixed(1)} mm, heading ${(tenths / 10).toFixed(1)}°`;
 }
 
 function readingWords(robot, name, ticks) {
