@@ -118,7 +118,8 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
             _draw_cell(axes, (column, row), share, right=right)
             colour = "white" if share > 0.55 else (INK if count else FAINT)
             axes.text(
-                column + 0.5, row + 0.5, str(count) if count else "·", font=font(size, bold=count > 0), ha="center",
+                column + 0.5, row + (0.66 if count else 0.5), str(count) if count else "·",
+                font=font(size, bold=count > 0), ha="center",
                 va="center", color=colour,
             )  # fmt: skip
             if count:

@@ -167,9 +167,11 @@ def _draw_row(axes: Axes, classes: tuple[str, ...], each: Answered, right: Seque
         (f"✗ read as {classes[read]}", FAULT, True),
         (_where(each), FAINT, False),
     ]
-    broken = [(line, colour, bold) for text, colour, bold in lines for line in textwrap.wrap(text, _LINE)]
-    for number, (text, colour, bold) in enumerate(broken):
-        _text(axes, _TEXT, y + 0.02 + 0.14 * number, text, colour, 8, bold=bold)
+    above = 0
+    for text, colour, bold in lines:
+        broken = textwrap.wrap(text, _LINE)
+        _text(axes, _TEXT, y + 0.02 + 0.14 * above, "\n".join(broken), colour, 8, bold=bold)
+        above += len(broken)
 
 
 def _where(each: Answered) -> str:
