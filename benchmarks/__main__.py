@@ -29,6 +29,7 @@ from benchmarks import (
     simulator,
     submission,
     table,
+    web,
 )
 from benchmarks.measurement import Measurement
 
@@ -48,6 +49,7 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "sandbox": sandbox.measure,
         "rows": rows.measure,
         "queue": queue.measure,
+        "web": web.measure,
     }
 )
 #: Those that ``--quick`` measures, under a minute in all.
