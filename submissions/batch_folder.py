@@ -62,7 +62,11 @@ def read_batch(path: Path, assignment: str | None, people: People | None = None)
     for the rows that name none. Who it is that a row names is looked up in ``people``. Raises UsageError when
     ``path`` or ``assignment`` itself cannot be used.
     """
-    asked = None if assignment is None else find_assignment(assignment)
+    return read_batch_for(path, None if assignment is None else find_assignment(assignment), people)
+
+
+def read_batch_for(path: Path, asked: Assignment | None, people: People | None = None) -> BatchContents:
+    """The same where the assignment is at hand. Raises UsageError when ``path`` itself cannot be used."""
     if path.is_file() and path.suffix.lower() == ".csv":
         find = cache(partial(_roster_assignment, path.parent))
         return _read(

@@ -58,6 +58,19 @@ class RawFiles:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class SentFile:
+    """A file as somebody sent it; the name is the sender's, and may be anything."""
+
+    name: str
+    stream: BinaryIO
+
+    @property
+    def flat_name(self) -> str:
+        """The name without whatever folders it has."""
+        return self.name.replace("\\", "/").rpartition("/")[2]
+
+
 @dataclass(slots=True)
 class _Budget:
     """What is left of the caps while a submission is read."""
@@ -149,6 +162,22 @@ def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
         budget.one_more()
         with _regular_file(f"{where}/{name}", os.fspath(path), None) as stream:
             files[name] = budget.read(name, stream)
+    return _with_archive_opened(RawFiles(files))
+
+
+def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
+    """The files that were sent, by their flat names; raises UsageError as ``read_folder`` does."""
+    budget = _Budget(where)
+    files: dict[str, bytes] = {}
+    for each in sent:
+        name = each.flat_name
+        if _is_ignored([name]):
+            continue
+        _check_name(where, name)
+        if name in files:
+            raise UsageError(f"{where}: has {shown(name)} twice, expected every file once.")
+        budget.one_more()
+        files[name] = budget.read(name, each.stream)
     return _with_archive_opened(RawFiles(files))
 
 

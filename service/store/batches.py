@@ -8,7 +8,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Select, func, select
+from sqlalchemy import ColumnElement, Row, Select, and_, func, or_, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store.codec import decode
@@ -82,6 +82,11 @@ class BatchLine:
     states: dict[JobState, int]
     regrade_of: str | None  # the batch whose submissions these are
 
+    @property
+    def unfinished(self) -> int:
+        """How many of its jobs have not ended."""
+        return sum(self.states.get(state, 0) for state in UNFINISHED)
+
 
 @dataclass(frozen=True, slots=True)
 class BatchProgress:
@@ -137,6 +142,16 @@ def list_batches(session: Session, limit: int = 50) -> list[BatchLine]:
     return _batch_lines(session, rows)
 
 
+def batches_of(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[BatchLine]:
+    """The newest batches of a course first, from the one on that was made ``after`` at, and has that id."""
+    query = select(Batch).where(Batch.course_id == course_id)
+    if after is not None:
+        earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
+        query = query.where(or_(Batch.created_at < after[0], earlier))
+    rows = session.scalars(query.order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
+    return _batch_lines(session, rows)
+
+
 def batch(session: Session, batch_id: str) -> BatchLine:
     """One batch. Raises UsageError if there is none of this id."""
     row = session.get(Batch, batch_id)
@@ -145,15 +160,24 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     return _batch_lines(session, [row])[0]
 
 
-def job_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs."""
-    which: tuple[ColumnElement[bool], ...]
+def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
+    """What holds of the job that stands for a submission of the batch; of a batch of regrades, of its own jobs."""
     if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
-        which = (Job.batch_id == batch_id, Job.suspect.is_(None))
-    else:
-        ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
-        which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
-    query = _job_lines().where(*which).order_by(Enrolment.student, Job.id)
+        return (Job.batch_id == batch_id, Job.suspect.is_(None))
+    ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
+    return (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+
+
+def job_lines(
+    session: Session, batch_id: str, limit: int | None = None, after: tuple[str, str] | None = None
+) -> list[JobLine]:
+    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs.
+
+    Where only some are wanted, those that follow on this student and id.
+    """
+    query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id).limit(limit)
+    if after is not None:
+        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(*after))
     return [_line(row) for row in session.execute(query)]
 
 

@@ -71,6 +71,12 @@ def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) 
     _there(session, course_id, assignment).names_hidden = hidden
 
 
+def with_names_hidden(session: Session, course_id: int) -> frozenset[str]:
+    """The assignments of a course whose instructors do not see whose work it is."""
+    of_them = (OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True))
+    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*of_them)))
+
+
 def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
     """All of a course, by id."""
     query = (

@@ -12,7 +12,7 @@ import secrets
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Depends, Request
+from fastapi import Depends, Path, Request
 from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException
 
@@ -28,6 +28,9 @@ SESSION_COOKIE = "robomark"
 CSRF_FIELD = "csrf"
 CSRF_HEADER = "x-csrf-token"
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+#: Numbers and names of rows in a path, within what every database can be asked for.
+RowNumber = Annotated[int, Path(ge=1, le=2**31 - 1)]
+RowName = Annotated[str, Path(pattern="^[0-9a-z]{1,32}$")]
 
 
 class SignInNeeded(RobomarkError):
@@ -123,13 +126,13 @@ def course_of_role(session: Session, identity: Identity, course_id: int, role: R
     return found
 
 
-def _instructing(course_id: int, reader: SignedIn, context: Context) -> InCourse:
+def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
     with context.store.reading() as session:
         course = course_of_role(session, reader.identity, course_id, Role.INSTRUCTOR)
         return InCourse(reader, course.id, course.name)
 
 
-def _studying(course_id: int, reader: SignedIn, context: Context) -> InCourse:
+def _studying(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
     with context.store.reading() as session:
         course = course_of_role(session, reader.identity, course_id, Role.STUDENT)
         return InCourse(reader, course.id, course.name)

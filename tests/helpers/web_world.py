@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,7 +11,9 @@ import report_builders
 from builders import grading_request
 from service.store import credentials, intake, jobs, results
 from service.store.people import Member
+from service.web.kept_uploads import KeptUploads
 from service.web.rendering import statics
+from submissions.raw_files import SentFile
 from web import COURSE, Web
 
 
@@ -40,8 +43,17 @@ def make_world(web: Web) -> World:
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "upload_id": _upload(web, grace),
     }
     return World(ada, grace, values)
+
+
+def _upload(web: Web, member: Member) -> str:
+    """An upload of which nothing can be taken in."""
+    kept_uploads = KeptUploads(web.settings.home)
+    begun = kept_uploads.begin(member.person_id, 1, "echo-responder")
+    kept_uploads.lay(begun, [SentFile("ada.py", io.BytesIO(b""))], "batch")
+    return begun.id
 
 
 def filled(path: str, values: dict[str, str]) -> str:
