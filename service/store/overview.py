@@ -1,4 +1,4 @@
-"""What came of a batch at a glance: marks, criteria, causes, and whom to look at; and who has not submitted. Only reads.
+"""What came of a batch at a glance: marks, criteria, causes, whom to look at, and who has not submitted. Only reads.
 
 What is made of marks is ``service.grading``'s; near copies are ``similarities.py``'s, which takes long.
 """

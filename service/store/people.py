@@ -87,6 +87,24 @@ def members(session: Session, course_id: int) -> list[Member]:
     return [_line(enrolment, person) for enrolment, person in session.execute(query)]
 
 
+def members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
+    """Some of the course, in the order in which they came in: those who came after this one."""
+    query = (
+        select(Enrolment, Person)
+        .join(Person, Enrolment.person_id == Person.id)
+        .where(Enrolment.course_id == course_id, Enrolment.id > enrolment_id)
+        .order_by(Enrolment.id)
+        .limit(limit)
+    )
+    return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+
+
+def is_more_than(session: Session, row: Enrolment) -> bool:
+    """Whether a person is more than this enrolment says: in other courses, or runs the installation."""
+    others = select(Enrolment.id).where(Enrolment.person_id == row.person_id, Enrolment.id != row.id).limit(1)
+    return session.get_one(Person, row.person_id).operator or session.scalar(others) is not None
+
+
 def courses(session: Session) -> list[CourseLine]:
     """All courses, by name."""
     return [CourseLine(row.id, row.name) for row in session.scalars(select(Course).order_by(Course.name))]

@@ -174,6 +174,14 @@ def submission_in(session: Session, course_id: int, submission_id: int) -> Submi
     return row
 
 
+def member_in(session: Session, course_id: int, enrolment_id: int, role: Role) -> Enrolment:
+    """Somebody who has this role in the course."""
+    row = session.get(Enrolment, enrolment_id)
+    if row is None or row.course_id != course_id or row.role is not role:
+        raise nothing_here()
+    return row
+
+
 def own_submission(session: Session, identity: Identity, course_id: int, submission_id: int) -> SubmissionRow:
     """A student's own submission in the course."""
     row = submission_in(session, course_id, submission_id)

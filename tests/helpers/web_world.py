@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import report_builders
-from builders import grading_request
-from service.store import credentials, intake, jobs, results
+from builders import echo, grading_request
+from service.store import credentials, intake, jobs, open_assignments, results
 from service.store.people import Member
+from service.store.versions import freeze
 from service.web.kept_uploads import KeptUploads
 from service.web.rendering import statics
 from submissions.raw_files import SentFile
@@ -31,6 +32,8 @@ def make_world(web: Web) -> World:
     ada, grace = web.student("ada"), web.instructor("grace")
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
     web.token(ada, "read")
     with web.store.reading() as session:
         (token,) = credentials.tokens(session, ada.person_id)
@@ -43,6 +46,7 @@ def make_world(web: Web) -> World:
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "enrolment_id": str(ada.enrolment_id),
         "upload_id": _upload(web, grace),
     }
     return World(ada, grace, values)

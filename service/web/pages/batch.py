@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
+from service.reports.formats import FORMATS
 from service.reports.words import verdict_words
 from service.store import audit, batch_control, batch_table, batches, metrics, regrades
 from service.store.batch_table import SORTS, STATES, TableAsked, TableLine
@@ -90,6 +91,7 @@ def submissions(
         columns=_columns(lines),
         verdicts={each.value: verdict_words(each).short for each in Verdict},
         done=done if done in _DONE else "",
+        formats=sorted(name for name, each in FORMATS.items() if each.filled_in is None),
     )
 
 
