@@ -56,7 +56,7 @@ def _upload(web: Web, member: Member) -> str:
     """An upload of which nothing can be taken in."""
     kept_uploads = KeptUploads(web.settings.home)
     begun = kept_uploads.begin(member.person_id, 1, "echo-responder")
-    kept_uploads.lay(begun, [SentFile("ada.py", io.BytesIO(b""))], "batch")
+    kept_uploads.lay(begun, [SentFile("ada.zip", io.BytesIO(b""))], "batch")
     return begun.id
 
 

@@ -29,8 +29,6 @@ from service.web.rendering import page
 from sim.recording import Verdict
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
-#: What is told of what somebody has just done, by the word for it in the audit.
-_DONE = ("submit", "pause", "resume", "cancel", "retry", "publish", "regrade")
 _STATES = {
     "queued": translatable("waits"),
     "running": translatable("is being graded"),
@@ -47,6 +45,7 @@ _COLUMNS = {
     "state": translatable("State"),
     "seconds": translatable("Seconds"),
 }
+#: What somebody did, by the word for it in the audit.
 _ACTIONS = {
     "submit": translatable("submitted"),
     "pause": translatable("paused"),
@@ -90,7 +89,7 @@ def submissions(
         remarked=remarked,
         columns=_columns(lines),
         verdicts={each.value: verdict_words(each).short for each in Verdict},
-        done=done if done in _DONE else "",
+        entry=next((each for each in shown["history"] if each.action == done in _ACTIONS), None),
         formats=sorted(name for name, each in FORMATS.items() if each.filled_in is None),
     )
 

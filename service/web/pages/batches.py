@@ -144,7 +144,7 @@ def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], p
     if not suffixes <= set(_SINGLE):
         wrong = min(suffixes - set(_SINGLE))
         raise UsageError(
-            f"a file that ends in {shown(wrong) or 'nothing'} was sent, expected one .zip, or a .py, .ipynb or .zip each"
+            f"a file that ends in {shown(wrong) or 'nothing'} was sent, expected a .zip, or a .py, .ipynb or .zip each"
         )
     names = kept_uploads.lay(begun, files, "batch")
     one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVES)
