@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "submit": Command("batch.submit:submit", "Queue a submission for each student."),
                 "list": Command("batch.listing:list_batches", "List the newest batches."),
                 "status": Command("batch.status:status", "Show how far a batch is, its marks and statistics."),
+                "overview": Command("batch.overview:show_overview", "Show what came of a batch at a glance."),
                 "similar": Command("batch.similar:similar", "Show whose submissions are alike, for staff."),
                 "export": Command("batch.export:export", "Write the marks of a batch for another program."),
                 "pause": Command("batch.control:pause", "Begin no more of a batch."),
@@ -46,6 +47,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "retry": Command("batch.control:retry", "Queue again what could not be graded."),
                 "regrade": Command("batch.regrade:regrade", "Grade a batch again."),
                 "publish": Command("batch.regrade:publish", "Let the newest grades stand, and release them."),
+                "publish-one": Command("batch.regrade:publish_one", "The same for one submission."),
             },
         ),
         "assignments": CommandGroup(
@@ -77,6 +79,9 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "policy": Command("course:policy", "Say what holds for all, or show it."),
                 "extend": Command("course:extend", "Allow one student more time or attempts."),
                 "enrol": Command("course:enrol", "Enrol students before they submit."),
+                "prepare": Command("course:prepare", "Put an assignment into a course."),
+                "open": Command("course:open_assignment", "Let students submit to it on the web."),
+                "close": Command("course:close_assignment", "Let nobody submit to it any more."),
             },
         ),
         "user": CommandGroup(

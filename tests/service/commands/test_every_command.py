@@ -18,10 +18,11 @@ from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
-from service.store import jobs, results
+from service.store import jobs, open_assignments, results
 from service.store.engine import now, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
+from service.store.versions import freeze
 from submissions.assignment.examples import examples
 from submissions.people import Refusal, Student
 
@@ -47,6 +48,8 @@ SHOWING = {
     "batch retry --all": "batch queued outdated",
     "batch regrade BATCH": "batch regraded",
     "batch publish BATCH": "batch published",
+    "batch publish-one GRADE": "grade published",
+    "batch overview BATCH": "batch classes refusals",
     "assignments list": "assignments",
     "assignments show echo-responder": (
         "id title section description version marks background robot program responder given criteria scenarios"
@@ -60,6 +63,9 @@ SHOWING = {
     "course policy": "policies",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
+    "course prepare echo-responder": "assignment title open opened_at closed_at version",
+    "course open echo-responder": "assignment title open opened_at closed_at version",
+    "course close echo-responder": "assignment title open opened_at closed_at version",
     "user add grace --name Grace": "id path url",
     "user link ada": "id path url",
     "user token ada --scope read": "id token scopes days",
@@ -114,6 +120,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     with open_store(Settings(home=folder)) as store:
         requests = [grading_request(student, assignment=echo()) for student in ("ada", "bob", "cyd")]
         batch = accept_batch(store, "class", requests, refused, max_attempts=2)
+        with store.transaction() as session:
+            open_assignments.prepare(session, 1, freeze(echo()))
         grades = []
         for grade in (shape_grade(wrong=2), faulty_grade()):
             claim = jobs.claim(store, "worker", 60)
