@@ -1,4 +1,4 @@
-"""An instructor's way in Chromium, with a real worker: an assignment, a batch of twenty, its overview, a replay, publishing."""
+"""An instructor's way in Chromium, with a real worker: an assignment, a batch of twenty, a replay, publishing."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
         page.locator("main button").click()
         page.get_by_role("link", name="Assignments").click()
         page.locator("#assignment").select_option(ASSIGNMENT)
-        page.get_by_role("button", name="Prepare it").click()
+        page.get_by_role("button", name="Prepare it", exact=True).click()
         page.get_by_role("button", name="Open for students").click()
         expect(page.locator(".tag.good").first).to_have_text("open")
         is_clean(page)
@@ -122,18 +122,13 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
 
         phone = browser.new_context(**PHONE, color_scheme="dark", storage_state=within.storage_state())
         narrow = phone.new_page()
-        for path in (
-            batch,
-            re.sub(r"\?.*", "/overview", batch),
-            f"{address}/courses/1/batches",
-            f"{address}/courses/1/people",
-        ):
+        course = f"{address}/courses/1"
+        for path in (batch, re.sub(r"\?.*", "/overview", batch), f"{course}/batches", f"{course}/people"):
             narrow.goto(path)
             is_clean(narrow)
 
-        plain = browser.new_context(
-            **DESKTOP, java_script_enabled=False, storage_state=within.storage_state()
-        ).new_page()
+        scriptless = browser.new_context(**DESKTOP, java_script_enabled=False, storage_state=within.storage_state())
+        plain = scriptless.new_page()
         plain.goto(f"{address}/courses/1/batches")
         plain.locator("#assignment").select_option(ASSIGNMENT)
         plain.locator("#files").set_input_files(a_class(tmp_path))
