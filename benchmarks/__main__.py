@@ -20,13 +20,16 @@ from benchmarks import (
     costs,
     grading,
     growth,
+    memory,
     original,
+    plots,
     queue,
     rows,
     sandbox,
     simulator,
     submission,
     table,
+    web,
 )
 from benchmarks.measurement import Measurement
 
@@ -39,11 +42,14 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "simulator": simulator.measure,
         "original": original.measure,
         "growth": growth.measure,
+        "plots": plots.measure,
+        "memory": memory.measure,
         "cold_batch": cold_batch.measure,
         "submission": submission.measure,
         "sandbox": sandbox.measure,
         "rows": rows.measure,
         "queue": queue.measure,
+        "web": web.measure,
     }
 )
 #: Those that ``--quick`` measures, under a minute in all.

@@ -81,10 +81,15 @@ def wall_seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def users_environment() -> dict[str, str]:
+    """As a user has it, who lets Python keep the bytecode of what it has compiled."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 def command_cpu_seconds(command: Sequence[str], environment: dict[str, str]) -> float:
     """CPU seconds of a command and of all that it waited for. Raises RuntimeError when it fails."""
     process = subprocess.Popen(
-        command, env=os.environ | environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        command, env=users_environment() | environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     said = process.stderr.read()

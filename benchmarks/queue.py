@@ -28,8 +28,8 @@ from service.store.models import Job
 from service.store.states import JobState, Lane
 
 _BATCH = 200
-_DEEP = 1000
-_SINGLE = 40
+_DEEP = 500
+_SINGLE = 20
 _PATIENCE = 900.0
 
 

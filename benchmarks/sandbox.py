@@ -21,7 +21,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import Child, ChildLimits
 from responders.sandbox.zygote import Role
-from sim.recording import TICK
+from sim.recording import TICK, Verdict
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": ChildLimits(2, 512 << 20)}
 _SCHEMAS = {"robot": wire.ROBOT, "responder with libraries": wire.RESPONDER}
@@ -44,7 +44,7 @@ from responders.sandbox.running_child import ChildLimits
 from sim.recording import TICK
 sandboxes = Sandboxes()
 child = sandboxes.spawn("robot", ChildLimits(60, 64 << 20))
-child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": [], "modules": {},
+child.send({"name": "robot.py", "text": "while True: pass", "seed": 1, "preamble": "none", "sensors": {}, "modules": {},
             "tick": TICK})
 print(child._pid, flush=True)
 input()
@@ -57,11 +57,11 @@ def measure(_times: int) -> list[Measurement]:
         cold = wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
         heavy = _many(100, lambda: _until_locked(sandboxes, "responder with libraries"))
-        answers = _many(50, lambda: _until_answer(sandboxes))
+        answers = _many(50, lambda: _until_answer(sandboxes, folder))
         ends = _many(100, lambda: _until_gone(sandboxes))
-        turns = _turns(sandboxes)
+        turns = _turns(sandboxes, folder)
         alone = _many(50, _lockdown_alone)
-        dirty, share = _memory(sandboxes)
+        dirty, share = _memory(sandboxes, folder)
         cpu = max(_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
         stalled = _stall_overshoot(sandboxes)
         output = _output_overshoot(sandboxes, folder)
@@ -113,25 +113,25 @@ def _until_gone(sandboxes: Sandboxes) -> float:
     return wall_seconds(_spawn(sandboxes, "responder with libraries").close)
 
 
-def _until_answer(sandboxes: Sandboxes) -> float:
+def _until_answer(sandboxes: Sandboxes, folder: Path) -> float:
     start = time.perf_counter()
-    child = _echo(sandboxes)
+    child = _echo(sandboxes, folder)
     _turn(child)
     taken = time.perf_counter() - start
     child.close()
     return taken
 
 
-def _turns(sandboxes: Sandboxes) -> list[float]:
-    child = _echo(sandboxes)
+def _turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
+    child = _echo(sandboxes, folder)
     try:
         return _many(500, lambda: wall_seconds(lambda: _turn(child)))
     finally:
         child.close()
 
 
-def _echo(sandboxes: Sandboxes) -> Child:
-    child = _spawn(sandboxes, "responder with libraries")
+def _echo(sandboxes: Sandboxes, folder: Path) -> Child:
+    child = _spawn(sandboxes, "responder with libraries", folder)
     _start(child, "responder with libraries", _ECHO)
     while child.receive(wire.RESPONDER)["do"] != "ready":
         pass
@@ -139,7 +139,7 @@ def _echo(sandboxes: Sandboxes) -> Child:
 
 
 def _start(child: Child, role: Role, text: str) -> None:
-    own = {"preamble": "none", "sensors": [], "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
+    own = {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 
@@ -168,9 +168,9 @@ def _lockdown_alone() -> float:
     return taken
 
 
-def _memory(sandboxes: Sandboxes) -> tuple[float, float]:
+def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
     """Megabytes that are a child's own, and its share of all when it is one of ten; not to be seen by everybody."""
-    children = [_echo(sandboxes) for _ in range(10)]
+    children = [_echo(sandboxes, folder) for _ in range(10)]
     try:
         lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()
     except PermissionError:
@@ -182,25 +182,27 @@ def _memory(sandboxes: Sandboxes) -> tuple[float, float]:
     return sizes["Private_Dirty"], sizes["Pss"]
 
 
-def _run_to_its_end(sandboxes: Sandboxes, text: str, limits: ChildLimits) -> None:
+def _run_until(sandboxes: Sandboxes, text: str, limits: ChildLimits, verdict: Verdict) -> None:
     child = sandboxes.spawn("robot", limits)
     _start(child, "robot", text)
     try:
         while True:
             child.receive(wire.ROBOT)
-    except ChildStopped:
+    except ChildStopped as stop:
         child.close()
+        if stop.verdict is not verdict:
+            raise RuntimeError(f"expected {verdict}, but {stop.message}") from None
 
 
 def _cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
     before = sandboxes.children_cpu_seconds
-    _run_to_its_end(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20))
+    _run_until(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20), Verdict.CPU_LIMIT)
     return sandboxes.children_cpu_seconds - before - _CPU_LIMIT
 
 
 def _stall_overshoot(sandboxes: Sandboxes) -> float:
     text = "import select; select.select([], [], [])"
-    return wall_seconds(lambda: _run_to_its_end(sandboxes, text, _LIMITS["robot"])) - _STALLED
+    return wall_seconds(lambda: _run_until(sandboxes, text, _LIMITS["robot"], Verdict.STALLED)) - _STALLED
 
 
 def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:

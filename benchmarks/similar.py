@@ -17,8 +17,8 @@ from benchmarks.harness.copyists import COPYISTS
 from models.intervals import wilson
 from service.similarity.sources import given_with
 from service.similarity.writing import ALIKE, FEWEST_TOKENS, compare, source_of
-from submissions.assignment.examples import REFERENCE, examples
-from submissions.assignment.folder import catalogue
+from submissions.assignment.examples import examples
+from submissions.assignment.folder import REFERENCE, catalogue
 from submissions.assignment.reader import find_assignment
 
 #: Solutions of one assignment of which none was made of another, as their texts show; one of each hand and idea.

@@ -5,18 +5,19 @@ The commands themselves are in modules of their own, named after them; ``cli.py`
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import signal
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 from typer.main import get_command
 
@@ -30,7 +31,39 @@ _CALLER, _OURS, _STOPPED = 2, 3, 130
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
 
 
-class _Commands(TyperGroup):
+class _ChecksLess:
+    """A command that has Typer check those words alone which are not yet what they should be.
+
+    To check even a flag that nobody gave, Typer imports pydantic, which takes longer than most of what only asks.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The words that are left over."""
+        command: Any = super()
+        for parameter in command.get_params(ctx):
+            parameter.process_value = _unless_needless(parameter)
+        left: list[str] = command.parse_args(ctx, args)
+        return left
+
+
+def _unless_needless(parameter: Any) -> Callable[[Any, Any], Any]:
+    """How the parameter takes a value: as it is when it is of its type, or may be missing and is."""
+    checked = parameter.process_value
+    may_be_missing = not (parameter.required or parameter.multiple or parameter.nargs == -1)
+
+    def taken(ctx: Any, value: Any) -> Any:
+        if type(value) is not parameter.type_descriptor.annotation and not (value is None and may_be_missing):
+            return checked(ctx, value)
+        return value if parameter.callback is None else parameter.callback(ctx, parameter, value)
+
+    return taken
+
+
+class _Command(_ChecksLess, TyperCommand):
+    """One that does something."""
+
+
+class _Commands(_ChecksLess, TyperGroup):
     """Commands by name and summary. One is imported when it is to run, which takes a while, and no other."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
@@ -38,7 +71,11 @@ class _Commands(TyperGroup):
         name, listed, rest = super().resolve_command(ctx, args)
         if name is None or isinstance(listed, _Commands):
             return name, listed, rest
-        return name, load_command(*ctx.command_path.split()[1:], name), rest
+        command = load_command(*ctx.command_path.split()[1:], name)
+        # What is imported stays, so that it is never looked through.
+        gc.freeze()
+        gc.enable()
+        return name, command, rest
 
 
 def load_command(*path: str) -> Any:
@@ -52,7 +89,7 @@ def load_command(*path: str) -> Any:
     module, _, attribute = command.where.partition(":")
     found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
     app = typer.Typer(context_settings=_CONTEXT, rich_markup_mode=None, add_completion=False)
-    app.command(name)(found)
+    app.command(name, cls=_Command)(found)
     loaded = get_command(app)
     if not command.serves:
         loaded.params += _shared_options()

@@ -72,6 +72,24 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
         ),
         "floors": Command("floors:floors", "Draw every floor with its scale."),
         "show": Command("show:show", "Show a grade that is stored."),
+        "mark": CommandGroup(
+            "Set marks by hand, and write to students.",
+            {
+                "set": Command("marking:set_marks", "Set the marks of a criterion."),
+                "excuse": Command("marking:excuse", "Let a criterion not count."),
+                "withdraw": Command("marking:withdraw", "Let the grader's marks count again."),
+                "comment": Command("marking:comment", "Write a comment for the student."),
+                "uncomment": Command("marking:uncomment", "Withdraw a comment."),
+                "history": Command("marking:history", "Show what was set and written, and by whom."),
+            },
+        ),
+        "appeals": CommandGroup(
+            "Answer students who ask for a second look.",
+            {
+                "list": Command("appeals:list_appeals", "List the open appeals."),
+                "answer": Command("appeals:answer", "Answer an appeal, which closes it."),
+            },
+        ),
         "verify": Command("verify:verify", "Run a stored grading again and compare."),
         "course": CommandGroup(
             "Say when and how often students may submit.",
@@ -82,6 +100,9 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "prepare": Command("course:prepare", "Put an assignment into a course."),
                 "open": Command("course:open_assignment", "Let students submit to it on the web."),
                 "close": Command("course:close_assignment", "Let nobody submit to it any more."),
+                "export-student": Command("privacy:export_student", "Write all there is of a student."),
+                "delete-student": Command("privacy:delete_student", "Remove all there is of a student."),
+                "purge": Command("privacy:purge_course", "Remove what is old."),
             },
         ),
         "user": CommandGroup(

@@ -15,7 +15,7 @@ from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
 from service.plotting import draw, own_floors
 from service.reports.html import BatchRow, ReportParts, batch_index, refusal_page, report, report_parts
-from service.reports.replay.document import replay_of_grade
+from service.reports.replay.document import Pixels, replay_of_grade
 from service.reports.rows import ReportPage, missing_words
 from service.reports.view import (
     NO_OTHERS,
@@ -35,8 +35,9 @@ from service.store.states import JobState, PlotState, Standing
 from sim.errors import UsageError
 from sim.floors import names
 from sim.recording import Verdict
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
 from submissions.people import Refusal
+from submissions.submission import Submission
 
 _INDEX = "index.html"
 
@@ -145,12 +146,22 @@ def report_body(store: Store, line: JobLine, view: View) -> ReportParts:
 
     Plots that are not drawn yet are left out: whoever waits for a page does not wait for them.
     """
+    return report_parts(view, *_kept(store, line, view))
+
+
+def report_alone(store: Store, line: JobLine, view: View) -> str:
+    """The same as a page of its own."""
+    return report(view, *_kept(store, line, view))
+
+
+def _kept(store: Store, line: JobLine, view: View) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
+    """The plots, the submission and the floors that a report shows."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else {}
         built_in = {trial.recording.background for trial in view.grade.trials} <= set(names())
         floors = {} if built_in else own_floors(intake.load_assignment(session, line.id))
-    return report_parts(view, drawn, submission, floors)
+    return drawn, submission, floors
 
 
 def _page(store: Store, line: JobLine, grade: Grade, over: JobLine | None = None) -> tuple[str, Mapping[str, bytes]]:

@@ -7,20 +7,20 @@ here opens a connection.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Self
-
-from pydantic import Field, SecretStr, ValidationError, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
-from pydantic_settings.exceptions import SettingsError
+from typing import Any, Self, TypeVar
 
 from sim.errors import UsageError
-from submissions.seeds import Secret
+from submissions.seeds import PUBLIC, Secret
 
 PREFIX = "ROBOMARK_"
 #: A folder with files that are named as settings; it is called so by systemd, too.
 SECRET_FILES = "CREDENTIALS_DIRECTORY"
 _SHORTEST_SECRET = 16
+_READ = "read"
+Written = TypeVar("Written", str, Path)
 
 
 def default_home() -> Path:
@@ -35,98 +35,148 @@ def default_home() -> Path:
     return base / "robomark"
 
 
-class Settings(BaseSettings):
-    """All settings. An empty ``broker_url`` means the bundled server, an empty ``database_url`` SQLite in ``home``."""
+def _setting(read: Callable[[Any], Any], **default: Any) -> Any:
+    """A setting; ``read`` takes it as it is written or given, and raises ValueError saying what was expected."""
+    return field(**default, metadata={_READ: read})
 
-    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, frozen=True, extra="forbid")
 
-    home: Path = Field(default_factory=default_home)
-    broker_url: str = ""
-    database_url: str = ""
-    concurrency: int = Field(default_factory=lambda: len(os.sched_getaffinity(0)), ge=1, le=256)
+def _folder(written: str | Path) -> Path:
+    try:
+        return Path(written).expanduser().absolute()
+    except RuntimeError:
+        raise ValueError("expected a folder; there is no such user's home") from None
+
+
+def _broker(url: str) -> str:
+    if url and url.partition("://")[0] not in {"redis", "rediss", "redis+socket"}:
+        raise ValueError("expected redis://host:port/number, rediss://... or redis+socket:///path")
+    return url
+
+
+def _database(url: str) -> str:
+    if not url:
+        return url
+    # Costs more than all else that settings do.
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import ArgumentError
+
+    try:
+        parsed = make_url(url)
+        kind = parsed.get_backend_name()
+    except ArgumentError as error:
+        raise ValueError("expected sqlite:///path or postgresql://user@host/name") from error
+    in_memory = kind == "sqlite" and parsed.database in (None, "", ":memory:")
+    if kind not in {"sqlite", "postgresql"} or in_memory:
+        raise ValueError("expected sqlite:///path or postgresql://user@host/name")
+    return url
+
+
+def _address(url: str) -> str:
+    scheme, _, name = url.rstrip("/").partition("://")
+    if url and (scheme not in {"https", "http"} or not name or "/" in name):
+        raise ValueError("expected https://name, as browsers are to write it")
+    return url.rstrip("/")
+
+
+def _log_level(level: str) -> str:
+    if level.upper() not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
+        raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
+    return level.upper()
+
+
+def _secret(given: str | Secret) -> Secret:
+    text = given.text if isinstance(given, Secret) else given.strip()
+    if 0 < len(text) < _SHORTEST_SECRET:
+        raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that nobody can guess")
+    return Secret(text)
+
+
+def _whether(written: str | bool) -> bool:
+    known = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+    if str(written).lower() not in known:
+        raise ValueError("expected true or false")
+    return known[str(written).lower()]
+
+
+def _seconds(least: float, most: float) -> Callable[[Any], float]:
+    def read(written: str | float) -> float:
+        try:
+            number = float(written)
+        except ValueError:
+            raise ValueError("input should be a valid number, unable to parse string as a number") from None
+        return _between(least, number, most)
+
+    return read
+
+
+def _count(least: int, most: int) -> Callable[[Any], int]:
+    def read(written: str | int) -> int:
+        try:
+            number = int(written)
+        except ValueError:
+            raise ValueError("input should be a valid integer, unable to parse string as an integer") from None
+        return int(_between(least, number, most))
+
+    return read
+
+
+def _between(least: float, number: float, most: float) -> float:
+    if not number >= least:
+        raise ValueError(f"input should be greater than or equal to {least}")
+    if number > most:
+        raise ValueError(f"input should be less than or equal to {most}")
+    return number
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings. An empty ``broker_url`` means the bundled server, an empty ``database_url`` SQLite in ``home``.
+
+    Raises UsageError: naming the variable, its value and what was expected.
+    """
+
+    home: Path = field(default_factory=default_home, metadata={_READ: _folder})
+    broker_url: str = _setting(_broker, default="")
+    database_url: str = _setting(_database, default="")
+    concurrency: int = _setting(_count(1, 256), default_factory=lambda: len(os.sched_getaffinity(0)))
     #: A worker that has not been heard of for this long has lost its job.
-    lease_seconds: float = Field(default=60.0, ge=0.5, le=3600)
+    lease_seconds: float = _setting(_seconds(0.5, 3600), default=60.0)
     #: How often a job is begun, at most, when machines fail under it.
-    max_attempts: int = Field(default=3, ge=1, le=20)
+    max_attempts: int = _setting(_count(1, 20), default=3)
     #: The wait before a second attempt; it doubles with each further one.
-    backoff_seconds: float = Field(default=5.0, ge=0, le=3600)
+    backoff_seconds: float = _setting(_seconds(0, 3600), default=5.0)
     #: How long one whole job may take in real time: the backstop behind all other limits.
-    job_seconds: float = Field(default=900.0, ge=1, le=86_400)
+    job_seconds: float = _setting(_seconds(1, 86_400), default=900.0)
     #: How often each process of a worker grades the known answer.
-    self_test_seconds: float = Field(default=300.0, ge=1, le=86_400)
+    self_test_seconds: float = _setting(_seconds(1, 86_400), default=300.0)
     #: A queued job whose notice is older than this may be notified again.
-    notify_seconds: float = Field(default=10.0, ge=0.1, le=3600)
+    notify_seconds: float = _setting(_seconds(0.1, 3600), default=10.0)
     #: What the processes of one grading may take together, where a worker has control groups; more where the
     #: assignment allows them more.
-    slot_memory_mb: int = Field(default=1536, ge=256, le=1_000_000)
-    log_level: str = "WARNING"
+    slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
+    log_level: str = _setting(_log_level, default="WARNING")
     #: Where browsers find the web server, when others than this machine are to reach it.
-    public_url: str = ""
+    public_url: str = _setting(_address, default="")
+    #: How often a token may call the API; as often again at once, after a rest.
+    api_calls_per_minute: float = _setting(_seconds(1, 1_000_000), default=600.0)
+    #: Whether webhooks may lead to addresses of the own network, which else are refused.
+    webhooks_inside: bool = _setting(_whether, default=False)
     #: Wins over the database's own; empty where there is none.
-    secret: SecretStr = SecretStr("")
+    secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
 
-    @field_validator("home")
-    @classmethod
-    def _absolute(cls, home: Path) -> Path:
-        try:
-            return home.expanduser().absolute()
-        except RuntimeError:
-            raise ValueError("expected a folder; there is no such user's home") from None
-
-    @field_validator("broker_url")
-    @classmethod
-    def _known_broker(cls, url: str) -> str:
-        if url and url.partition("://")[0] not in {"redis", "rediss", "redis+socket"}:
-            raise ValueError("expected redis://host:port/number, rediss://... or redis+socket:///path")
-        return url
-
-    @field_validator("database_url")
-    @classmethod
-    def _known_database(cls, url: str) -> str:
-        if not url:
-            return url
-        # Costs as much as all else that settings do.
-        from sqlalchemy.engine import make_url
-        from sqlalchemy.exc import ArgumentError
-
-        try:
-            parsed = make_url(url)
-            kind = parsed.get_backend_name()
-        except ArgumentError as error:
-            raise ValueError("expected sqlite:///path or postgresql://user@host/name") from error
-        in_memory = kind == "sqlite" and parsed.database in (None, "", ":memory:")
-        if kind not in {"sqlite", "postgresql"} or in_memory:
-            raise ValueError("expected sqlite:///path or postgresql://user@host/name")
-        return url
-
-    @field_validator("public_url")
-    @classmethod
-    def _whole_address(cls, url: str) -> str:
-        scheme, _, rest = url.partition("://")
-        if url and (scheme not in {"https", "http"} or not rest.rstrip("/") or "/" in rest.rstrip("/")):
-            raise ValueError("expected https://name, as browsers are to write it")
-        return url.rstrip("/")
-
-    @field_validator("log_level")
-    @classmethod
-    def _known_level(cls, level: str) -> str:
-        if level.upper() not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
-            raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
-        return level.upper()
-
-    @field_validator("secret")
-    @classmethod
-    def _long_enough(cls, secret: SecretStr) -> SecretStr:
-        text = secret.get_secret_value().strip()
-        if 0 < len(text) < _SHORTEST_SECRET:
-            raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that nobody can guess")
-        return SecretStr(text)
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            given = getattr(self, each.name)
+            try:
+                object.__setattr__(self, each.name, each.metadata[_READ](given))
+            except ValueError as error:
+                shown = "not usable" if each.name == "secret" else repr(given)
+                raise UsageError(f"{_variable(each.name)} is {shown}: {error}") from None
 
     @property
     def own_secret(self) -> Secret | None:
         """What the environment has in place of the database's secret."""
-        text = self.secret.get_secret_value()
-        return Secret(text) if text else None
+        return None if self.secret == PUBLIC else self.secret
 
     @property
     def database(self) -> str:
@@ -135,12 +185,12 @@ class Settings(BaseSettings):
 
     def with_broker(self, url: str) -> Self:
         """The same settings, with a broker that is known to be there."""
-        return self.model_copy(update={"broker_url": url})
+        return replace(self, broker_url=url)
 
     def environment(self) -> dict[str, str]:
         """The variables that make a child process read these same settings; but the secret, which it inherits."""
-        told = self.model_dump(exclude={"secret"})
-        return {f"{PREFIX}{name.upper()}": str(value) for name, value in told.items() if value != ""}
+        told = {name: str(value) for name, value in asdict(self).items() if name != "secret"}
+        return {_variable(name): text for name, text in told.items() if text}
 
 
 def load_settings(**overrides: object) -> Settings:
@@ -152,13 +202,24 @@ def load_settings(**overrides: object) -> Settings:
     folder = os.environ.get(SECRET_FILES) or None
     if folder is not None and not Path(folder).is_dir():
         raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with files named as the settings")
+    written = ({} if folder is None else _in_files(Path(folder))) | _of_settings(os.environ)
+    return Settings(**(written | overrides))  # type: ignore[arg-type]
+
+
+def _in_files(folder: Path) -> dict[str, str]:
     try:
-        return Settings(_secrets_dir=folder, **overrides)  # type: ignore[arg-type, call-arg]
-    except SettingsError as error:
-        raise UsageError(f"{SECRET_FILES}: a file in it cannot be read: {error.__cause__ or error}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = ".".join(str(part) for part in first["loc"]).upper()
-        message = first["msg"].removeprefix("Value error, ")
-        shown = "not usable" if name == "SECRET" else repr(first["input"])
-        raise UsageError(f"{PREFIX}{name} is {shown}: {message[:1].lower()}{message[1:]}") from None
+        paths = _of_settings({path.name: path for path in folder.iterdir()})
+        texts = {name: path.read_text().strip() for name, path in paths.items()}
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{SECRET_FILES}: a file in it cannot be read: {error}") from None
+    return {name: text for name, text in texts.items() if text}
+
+
+def _of_settings(named: Mapping[str, Written]) -> dict[str, Written]:
+    """What there is for settings; nothing is said by a variable that is empty."""
+    variables = {_variable(each.name): each.name for each in fields(Settings)}
+    return {variables[name.upper()]: found for name, found in named.items() if name.upper() in variables and found}
+
+
+def _variable(name: str) -> str:
+    return f"{PREFIX}{name.upper()}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections import OrderedDict
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ Bytes = NDArray[np.uint8]
 
 WIDTH, HEIGHT = 2362, 1143  # the floor, in pixels and in mm
 _METRE = 0.001  # metres a pixel
-_PAD = 256  # black pixels round the floor: off it the original's canvas reads 0, 0, 0
+_PAD = 192  # black pixels round what is seen, more than a tile reaches: off the floor the original reads 0, 0, 0
 _TILE = 128
 
 
@@ -52,13 +52,14 @@ def _orthographic(half: float, shift: float) -> tuple[float, ...]:
 
 
 class BulletCamera:
-    """The reference: every window is one image taken by PyBullet's software renderer of the textured floor."""
+    """The reference: every window is one image taken by PyBullet's software renderer of a textured floor."""
 
     def __init__(self, pixels: Bytes) -> None:
-        """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
+        """``pixels`` is a floor or a part of one, shape (height, width, 3), row 0 at the top."""
         self._client = Client()
         self._masks: dict[int, NDArray[np.bool_]] = {}
-        width, height = (WIDTH + 2 * _PAD) * _METRE, (HEIGHT + 2 * _PAD) * _METRE
+        self._height, self._width, _ = pixels.shape
+        width, height = (self._width + 2 * _PAD) * _METRE, (self._height + 2 * _PAD) * _METRE
         x, y = -_PAD * _METRE, -_PAD * _METRE
         # One triangle twice the size of the floor: the renderer tests one face a pixel and there is no seam.
         shape = pb.createVisualShape(
@@ -85,7 +86,7 @@ class BulletCamera:
 
     def window(self, column: int, row: int, side: int) -> Bytes:
         """RGB, shape (side, side, 3), top row first; black outside the floor."""
-        if not (-side < column < WIDTH and -side < row < HEIGHT):
+        if not (-side < column < self._width and -side < row < self._height):
             return np.zeros((side, side, 3), np.uint8)
         return self._shoot(column, row, side)
 
@@ -99,7 +100,7 @@ class BulletCamera:
 
     def _shoot(self, column: int, row: int, side: int, light: bool = False) -> Bytes:
         x = (column + side / 2) * _METRE
-        y = (HEIGHT - row - side / 2) * _METRE
+        y = (self._height - row - side / 2) * _METRE
         view = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -0.5, 1)
         projection = _orthographic(side * _METRE / 2, _METRE / 2)
         # Full ambient light and nothing else gives the texture's own colours; the client remembers it.
@@ -128,16 +129,41 @@ class BulletCamera:
         return rgb
 
 
+class _Part(NamedTuple):
+    """A part of the floor, in pixels; beyond the floor's own borders there is nothing to see."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    def has(self, column: int, row: int, side: int) -> bool:
+        """Whether all of a window that lies on the floor is in it."""
+        return (
+            self.left <= max(column, 0)
+            and self.top <= max(row, 0)
+            and min(column + side, WIDTH) <= self.right
+            and min(row + side, HEIGHT) <= self.bottom
+        )
+
+
+_WHOLE = _Part(0, 0, WIDTH, HEIGHT)
+
+
 class CachedCamera:
     """The same windows, cut from tiles of the floor that a BulletCamera photographed when they were first needed.
 
-    Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track.
+    That one sees only what lies round the first tile until a tile elsewhere is needed: most robots that stay where they
+    are have a floor of their own, and a texture of the whole floor takes long.
+    Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track. Tiles of
+    one colour are not photographed.
     """
 
     def __init__(self, pixels: Bytes) -> None:
         """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
         self._pixels = pixels
         self._camera: BulletCamera | None = None
+        self._seen = _WHOLE
         self._tiles: dict[tuple[int, int, int], Bytes] = {}
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
@@ -170,10 +196,26 @@ class CachedCamera:
         key = (tile_column, tile_row, side)
         tile = self._tiles.get(key)
         if tile is None:
-            if self._camera is None:
-                self._camera = BulletCamera(self._pixels)
-            tile = self._tiles[key] = self._camera.window(tile_column * _TILE, tile_row * _TILE, _TILE + side)
+            tile = self._tiles[key] = self._photograph(tile_column * _TILE, tile_row * _TILE, _TILE + side)
         return tile
+
+    def _photograph(self, column: int, row: int, side: int) -> Bytes:
+        if 0 <= column <= WIDTH - side and 0 <= row <= HEIGHT - side:
+            printed = self._pixels[row : row + side, column : column + side]
+            if (printed == printed[0, 0]).all():
+                # What is of one colour looks so in a photograph too, for which PyBullet would have to come.
+                return printed
+        if self._camera is None:
+            self._see(_Part(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
+        elif not self._seen.has(column, row, side):
+            self.close()
+            self._see(_WHOLE)
+        assert self._camera is not None
+        return self._camera.window(column - self._seen.left, row - self._seen.top, side)
+
+    def _see(self, part: _Part) -> None:
+        self._seen = _Part(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
+        self._camera = BulletCamera(self._pixels[self._seen.top : part.bottom, self._seen.left : part.right])
 
 
 def _disc_sums(tile: Bytes, side: int) -> memoryview:

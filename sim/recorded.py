@@ -5,13 +5,20 @@ Whatever is drawn or judged of it is the service's.
 
 from __future__ import annotations
 
-from sim.floors import Floor, floor, names
+from typing import TYPE_CHECKING
+
 from sim.recording import SECOND, Fault, Pose, Recording, Verdict
 from sim.robot import ROBOTS, Robot
+
+if TYPE_CHECKING:
+    from sim.floors import Floor
 
 
 def floor_of(recording: Recording) -> Floor | None:
     """The floor that was driven on; None for an image of an instructor's own, which is not kept with the recording."""
+    # Whoever only reads what happened needs no floor, nor what draws them.
+    from sim.floors import floor, names
+
     if recording.background not in names():
         return None
     return floor(recording.background, labels=recording.label_patches, seed=recording.sheet)

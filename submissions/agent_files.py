@@ -8,13 +8,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from responders.code import Code
 from sim.errors import UsageError
-from submissions.assignment.definition import Parts
 from submissions.raw_files import shown
 from submissions.source_text import decode_source
 from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Parts
 
 
 def with_agents(submission: Submission, asked: Parts, where: str) -> Submission:

@@ -16,12 +16,11 @@ from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from responders.code import Code
 from sim.errors import UsageError
 from submissions.agent_files import with_agents
-from submissions.assignment.definition import Parts
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
 from submissions.marked_cell import LAST, marked_site, sites
@@ -31,6 +30,9 @@ from submissions.raw_files import RawFiles, read_folder, read_single_file, read_
 from submissions.run_choice import asked_site
 from submissions.source_text import decode_source
 from submissions.submission import Notebook, Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Parts
 
 Part = Literal["program", "responder"]
 

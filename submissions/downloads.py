@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from submissions.bundle import named_by
 from submissions.people import NAMELESS, NOBODY, Student, told_apart
 from submissions.raw_files import shown
 
@@ -46,6 +45,9 @@ def student_files(folder: Path) -> list[StudentFiles]:
 
     Raises UsageError where the platform's own list of it cannot be read.
     """
+    # Who only wants the number in a name reads no submission.
+    from submissions.bundle import named_by
+
     entries = _visible(folder)
     if (folder / _GRADESCOPE_LIST).is_file():
         return list(_gradescope(folder, entries))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
-from builders import settings_in
+from builders import opened, settings_in
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
-from service.store.engine import Store, open_store
+from service.store.engine import Store
 
 # Two cores are shared with whatever else runs: how long an example takes says nothing.
 settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -21,9 +22,15 @@ settings.load_profile("robomark")
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Commands that tests run keep nothing in the home of whoever runs the tests."""
+    """Commands that tests run keep nothing in the home of whoever runs the tests, and do not go by their settings.
+
+    A worker of theirs has one process to grade with: each loads for seconds, and few have much to grade.
+    """
     with pytest.MonkeyPatch.context() as patched:
+        for name in [name for name in os.environ if name.startswith("ROBOMARK_")]:
+            patched.delenv(name)
         patched.setenv("ROBOMARK_HOME", str(tmp_path_factory.mktemp("home")))
+        patched.setenv("ROBOMARK_CONCURRENCY", "1")
         yield
 
 
@@ -50,5 +57,5 @@ def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings
 @pytest.fixture
 def store(service_settings: Settings) -> Iterator[Store]:
     """The tables in an empty database of each kind."""
-    with open_store(service_settings) as opened:
-        yield opened
+    with opened(service_settings) as empty:
+        yield empty

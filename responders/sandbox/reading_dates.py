@@ -30,7 +30,8 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
         path, rule = pending.pop()
         # A file may come and go, or not be for us to read: then it is not for a child of ours either.
         with contextlib.suppress(OSError):
-            mode = os.lstat(path).st_mode
+            status = os.lstat(path)
+            mode = status.st_mode
             # A device's driver dates nothing, however it is mounted: containers have /dev with strictatime.
             if stat.S_ISCHR(mode):
                 continue
@@ -38,7 +39,7 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
                 rule = os.statvfs(path).f_flag
             if not rule & (_NEVER_DATED | os.ST_RELATIME):
                 return f"each reading of {path} is dated: it is mounted with neither relatime nor noatime"
-            if not rule & _NEVER_DATED and _is_dated_again(path, mode):
+            if not rule & _NEVER_DATED and _is_dated_again(path, status):
                 return f"each reading of {path} is dated: its last change is dated in the future"
             if stat.S_ISDIR(mode) and path not in alone:
                 pending += [(entry.path, rule) for entry in os.scandir(path)]
@@ -51,11 +52,11 @@ def _and_links(paths: Iterable[str]) -> set[str]:
     return found | {str(above) for path in found for above in Path(path).parents if above.is_symlink()}
 
 
-def _is_dated_again(path: str, mode: int) -> bool:
+def _is_dated_again(path: str, before: os.stat_result) -> bool:
     """Read it if that would be dated, and see whether it would be the next time too."""
-    before = os.lstat(path)
     if not _is_due(before):
         return False
+    mode = before.st_mode
     if stat.S_ISLNK(mode):
         Path(path).readlink()
     elif stat.S_ISDIR(mode):

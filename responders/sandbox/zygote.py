@@ -9,6 +9,7 @@ from __future__ import annotations
 import array
 import contextlib
 import functools
+import importlib.machinery
 import importlib.util
 import json
 import os
@@ -271,6 +272,8 @@ class Zygote:
         """Let it import meanwhile: the first child will wait for it. Raises OSError if it cannot be started at all."""
         if self._process is not None and self._process.poll() is None:
             return
+        keep_bytecode(_HERE / "inside")
+        keep_bytecode(Path(own_modules(self._role)))
         wrapping: list[str] = []
         if self._sandbox.bubblewrap:
             wrapping = bubblewrap.wrapping([str(_HERE), own_modules(self._role)], self._folders.path)
@@ -367,6 +370,20 @@ def own_modules(role: Role) -> str:
     """The folder with what a role's children import of ours."""
     package, folder = _FOLDERS[role]
     return str(_package_folder(package) / folder)
+
+
+@functools.cache
+def keep_bytecode(folder: Path) -> None:
+    """Have Python keep what it compiles of these modules, as of any: zygotes keep nothing, each would do it anew."""
+    if sys.dont_write_bytecode:
+        return
+    for file in folder.rglob("*.py"):
+        kept = Path(importlib.util.cache_from_source(file))
+        if os.access(file.parent, os.W_OK) and not (kept.exists() and kept.stat().st_mtime >= file.stat().st_mtime):
+            found = importlib.machinery.PathFinder.find_spec(file.stem, [str(file.parent)])
+            assert found is not None
+            assert isinstance(found.loader, importlib.machinery.SourceFileLoader)
+            found.loader.get_code(file.stem)
 
 
 def _package_folder(name: str) -> Path:

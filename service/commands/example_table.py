@@ -13,7 +13,7 @@ from rich.text import Text
 from service.commands.shown import table
 from service.grading.example_check import CheckedAssignment, ComparedMeasure, ExampleResult
 from service.reports.readable import number, one_line
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
 
 
 def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:

@@ -47,9 +47,8 @@ def grade_all(
 
     Raises for the worst of them.
     """
-    if assignment is not None:
-        # A mistake of the instructor's is no submission's.
-        find_assignment(assignment)
+    # A mistake of the instructor's is no submission's.
+    named = None if assignment is None else find_assignment(assignment)
     chosen = FORMATS[form]
     together = chosen.table if len(submissions) > 1 else None
     rows: list[TableRow[Grade]] = []
@@ -68,7 +67,7 @@ def grade_all(
             try:
                 if path in near:
                     raise UsageError(near[path])
-                submission, asked = read_with_assignment(path, assignment)
+                submission, asked = read_with_assignment(path, named)
                 submission = _with_run(submission, run)
                 graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
                 graded = replace(graded, notes=(*_tried(given), *graded.notes))
@@ -142,13 +141,12 @@ def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
     return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
 
 
-def read_with_assignment(path: Path, assignment: str | None) -> tuple[Submission, Assignment]:
-    """A submission and what it is marked against: the assignment named, or else the one that the submission names.
+def read_with_assignment(path: Path, asked: Assignment | None) -> tuple[Submission, Assignment]:
+    """A submission and what it is marked against: ``asked``, or else the assignment that the submission names.
 
     Raises UsageError when either cannot be used.
     """
-    if assignment is not None:
-        asked = find_assignment(assignment)
+    if asked is not None:
         return read_submission(path, asked=asked.parts), asked
     submission = read_submission(path)
     if submission.assignment is None:

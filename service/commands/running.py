@@ -28,7 +28,6 @@ from service.commands.unsafe import warn_of_no_sandbox
 from service.grading.grade import TrialResult
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
-from service.reports.crossing import befell_in_full
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
@@ -36,6 +35,7 @@ from service.reports.replay.document import Pixels, replay_of_run
 from service.reports.replay.sources import Sources, sources_of_cells, sources_of_files
 from service.reports.robots import robots_of
 from service.reports.trace import storable, trace
+from service.reports.transcript import transcript
 from service.reports.view import NO_OTHERS, OtherTrials
 from service.reports.written import prepare_folder, write_film, write_replay
 from sim.errors import UsageError
@@ -56,7 +56,6 @@ _ALL_CPU = 150.0  # of all processes together, beside what the responder may com
 _OUTPUT_BYTES = 1_000_000
 _IMAGES = (".png", ".jpg", ".jpeg")
 _FILES_BYTES = 16 << 20
-_ARRIVED = {"responder": "answer", "partner": "heard"}
 _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 
@@ -298,19 +297,7 @@ def _files_beside(path: Path, text: str) -> dict[str, bytes]:
 
 def _show(recording: Recording) -> None:
     """What was printed, spoken, answered and heard, in order, and how it ended."""
-    shown: list[tuple[float, int, str]] = []
-    for which, own in robots_of(recording):
-        whose = "" if own is recording else f"{which}: "
-        shown += [(line.t, 0, whose + line.text) for line in own.printed]
-        shown += [(line.t, 1, f"{whose}(says) {line.text}") for line in own.spoken]
-        lost = [message for message in own.messages if message.lost and message.sender != "partner"]
-        shown += [(message.t, 2, f"{whose}(lost) {message.text}: {befell_in_full(message)}") for message in lost]
-        shown += [
-            (message.delivered, 2, f"{whose}({_ARRIVED[message.sender]}) {message.received}")
-            for message in own.messages
-            if message.sender in _ARRIVED and message.delivered is not None
-        ]
-    for t, _, text in sorted(shown, key=lambda each: (each[0], each[1])):
+    for t, text in transcript(recording):
         tell(f"{t:8.2f} s  {readable(text, 400)}")
     for which, own in robots_of(recording):
         end, whose = own.end, "" if own is recording else f"{which}: "

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from sqlalchemy.orm import Session
 
-from service.commands.batch.tables import remarks
+from service.commands.batch.words import remarks
 from service.commands.film_option import FilmOption
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
@@ -58,12 +58,10 @@ def show(
             document(job=line, grade=None)
             tell(_not_graded(line))
             return
-        # A stored grade has its recordings, and a report its plots: they take longer to load than to ask for a grade.
-        from service.report_files import write_grade_film, write_grade_replay, write_report
+        # A stored grade has its recordings, which take longer to load than to find that there is none.
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
-        from service.reports.written import file_stem
         from service.store import results
 
         with store.reading() as session:
@@ -72,6 +70,12 @@ def show(
         tell(plain_text(staff_view(graded)).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
+        if replay is None and film is None and output is None:
+            return
+        # A page draws plots that are not there yet.
+        from service.report_files import write_grade_film, write_grade_replay, write_report
+        from service.reports.written import file_stem
+
         if replay is not None:
             write_grade_replay(store, line, graded, replay, others)
             note(f"replay: {replay}")

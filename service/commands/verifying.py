@@ -26,7 +26,7 @@ def verify_grade(grade: str) -> None:
         own = secret_of(store)
         with store.reading() as session:
             job = session.get_one(Job, batches.find_job(session, grade))
-            stored = results.load(session, job.id)
+            stored = results.load_graded(session, job.id)
             grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
     with TrialRunner(spares=False) as runner:

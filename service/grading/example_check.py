@@ -19,7 +19,8 @@ from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recorded import faults_of
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXPECTED, REFERENCE, Expectation, OriginalMeasure, examples, expected
+from submissions.assignment.examples import EXPECTED, Expectation, OriginalMeasure, examples, expected
+from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 

@@ -130,8 +130,26 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class SetByHand:
+    """That an instructor set a criterion's marks or excused it, and what the grader had given."""
+
+    graded: Decimal | None  # None where it could not be judged
+    worth: Decimal  # the most there are for it, where nobody excuses it
+    reason: str
+    excused: bool
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenComment:
+    """What an instructor wrote to the student; an empty ``criterion`` is for all of the submission."""
+
+    criterion: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class CriterionResult:
-    """One marked line."""
+    """One marked line; an excused one is out of no marks."""
 
     id: str
     title: str
@@ -146,6 +164,12 @@ class CriterionResult:
     shown: Shown | None = None  # None where every trial is visible
     unjudged: str = ""  # why it could not be judged, for staff; empty if it was
     for_staff: str = ""  # where somebody should look, which no student is told
+    set_by_hand: SetByHand | None = None  # None of a grade as graded
+
+    @property
+    def worth(self) -> Decimal:
+        """The most marks there are for it, whoever excused it."""
+        return self.max_marks if self.set_by_hand is None else self.set_by_hand.worth
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +218,7 @@ class Grade:
     hints: tuple[str, ...] = ()  # what probably cost marks, the most telling first; no mark depends on them
     secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
     cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
+    comments: tuple[WrittenComment, ...] = ()
 
     @property
     def marks(self) -> Decimal:
@@ -202,8 +227,13 @@ class Grade:
 
     @property
     def max_marks(self) -> Decimal:
-        """The marks that all criteria together could have given."""
+        """The marks that all criteria together could have given, but for those that are excused."""
         return sum((result.max_marks for result in self.criteria), Decimal(0))
+
+    @property
+    def worth(self) -> Decimal:
+        """The marks that all criteria together could have given, those that are excused included."""
+        return sum((result.worth for result in self.criteria), Decimal(0))
 
     @property
     def verdict(self) -> Verdict:

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.lti.services import Score, send_scores
 from service.store import lti
-from service.store.engine import Store
+from service.store.engine import Store, now
 from service.store.lti import CourseLink
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.states import JobState, Standing
@@ -38,7 +38,7 @@ def _published(session: Session, link: CourseLink, course_id: int, assignment: s
     """The newest submission of each student whose grade stands and is published."""
     subjects = lti.subjects(session, link.platform, course_id)
     query = (
-        select(Enrolment.student, Job.marks, Job.max_marks, Job.published_at)
+        select(Enrolment.student, Job.marks, Job.max_marks)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .where(
@@ -52,8 +52,10 @@ def _published(session: Session, link: CourseLink, course_id: int, assignment: s
         )
         .order_by(SubmissionRow.attempt)
     )
+    # A platform passes over what is not newer than what it has, and marks change after they are published.
+    at = now(session)
     newest = {}
-    for student, marks, max_marks, published_at in session.execute(query):
-        if student in subjects and marks is not None and max_marks and published_at is not None:
-            newest[student] = Score(subjects[student], marks, max_marks, published_at)
+    for student, marks, max_marks in session.execute(query):
+        if student in subjects and marks is not None and max_marks:
+            newest[student] = Score(subjects[student], marks, max_marks, at)
     return list(newest.values())

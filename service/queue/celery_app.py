@@ -11,10 +11,12 @@ from kombu import Exchange, Queue
 from service.settings import Settings
 from service.store.states import Lane
 
+TRYOUTS = "tryouts"
 PLOTS = "plots"
-#: In the order in which a worker empties them.
-QUEUES = (Lane.INTERACTIVE.value, Lane.BATCH.value, PLOTS)
+#: In the order in which a worker empties them: whoever tries a program waits for it, and is bounded in how often.
+QUEUES = (Lane.INTERACTIVE.value, TRYOUTS, Lane.BATCH.value, PLOTS)
 GRADE_TASK = "robomark.grade"
+TRYOUT_TASK = "robomark.try"
 PLOT_TASK = "robomark.plot"
 
 #: The key under which the worker's command line tells its pool children that they are to do without the sandbox; no

@@ -74,7 +74,7 @@ def plot_next(store: Store, settings: Settings) -> str | None:
     if job_id is None:
         return None
     with store.reading() as session:
-        graded = results.load(session, job_id)
+        graded = results.load_graded(session, job_id)
         asked = intake.load_grading_request(session, job_id)
     drawn = draw(graded, asked.assignment, asked.submission)
     _persistent(lambda: plots.finish(store, job_id, drawn), settings.lease_seconds)

@@ -14,9 +14,9 @@ from celery import Celery
 from kombu.exceptions import OperationalError as BrokerError
 from redis.exceptions import RedisError
 
-from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES
+from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES, TRYOUT_TASK, TRYOUTS
 from service.settings import Settings
-from service.store import plots
+from service.store import plots, tryouts
 from service.store.engine import Store
 from service.store.jobs import Retry
 from service.store.lease_reaper import forget_notices, note_notices, requeue_lost, wanting_notices
@@ -44,6 +44,10 @@ class Notifier:
         if not self._publish(GRADE_TASK, lane.value, count):
             forget_notices(self.store, noted)
 
+    def try_out(self, count: int = 1) -> None:
+        """Notify for ``count`` programs that students try."""
+        self._publish(TRYOUT_TASK, TRYOUTS, count)
+
     def plot(self, count: int = 1) -> None:
         """Notify for the plots of ``count`` jobs."""
         self._publish(PLOT_TASK, PLOTS, count)
@@ -57,6 +61,9 @@ class Notifier:
         requeue_lost(self.store, Retry(self.settings.backoff_seconds))
         for lane, wanting in wanting_notices(self.store, self.settings.notify_seconds).items():
             self.grade(lane, min(wanting.stale, self._lacking(lane.value, wanting.due)))
+        tried = tryouts.due(self.store)
+        if tried:
+            self.try_out(self._lacking(TRYOUTS, tried))
         waiting = plots.due(self.store)
         if waiting:
             self.plot(self._lacking(PLOTS, waiting))

@@ -1,4 +1,4 @@
-"""The two Celery tasks, and what a pool child keeps warm for them: the runner and the database.
+"""The three Celery tasks, and what a pool child keeps warm for them: the runner and the database.
 
 A task is a notice and carries nothing; what to do is claimed in the database. The worker's first process knows the
 tasks by their names alone: what does them is loaded in the pool children.
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import structlog
 from celery import Task, current_app, shared_task, signals
 
-from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK
+from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK, TRYOUT_TASK
 from service.queue.logs import configure_logging
 from service.queue.notifier import Notifier
 from service.settings import Settings, load_settings
@@ -105,6 +105,20 @@ def grade_notice(task: WarmTask) -> None:
     if outcome is JobOutcome.GRADED:
         Notifier(task.app, child.store, child.settings).plot()
     elif outcome is JobOutcome.HOST_FAULT:
+        # Whatever broke may be something that was kept warm.
+        _children.drop()
+
+
+@shared_task(bind=True, base=WarmTask, name=TRYOUT_TASK)
+def tryout_notice(task: WarmTask) -> None:
+    """Run the program that a student has waited for longest."""
+    from service.queue.trying import try_next
+
+    child = task.child
+    child.watch.keep_looking()
+    with child.watch.busy():
+        ran_well = try_next(child.store, child.settings, child.runner)
+    if not ran_well:
         # Whatever broke may be something that was kept warm.
         _children.drop()
 

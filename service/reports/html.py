@@ -138,6 +138,12 @@ def replay_page(replay: Mapping[str, Any]) -> str:
     return _render("replay.html", report_style(), report_script(), context)
 
 
+def replay_section(document: bytes) -> Markup:
+    """A replay, ``packed``, as a part of a page that has the style and the script of reports."""
+    written = Markup(base64.b64encode(document).decode("ascii"))
+    return Markup(_environment().get_template("replay_section.html").render(replay=written))
+
+
 def refusal_page(row: TableRow[Grade]) -> str:
     """The page of one whose submission was refused: what was found, what was expected, what to do next."""
     found, _, expected = row.reason.partition(", expected ")

@@ -23,6 +23,7 @@ from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import (
     VerdictWords,
     channel_words,
+    comments_of,
     cost_words,
     grade_words,
     hints_of,
@@ -119,6 +120,7 @@ class Page:
     share: float
     words: VerdictWords
     hints: tuple[str, ...]
+    comments: tuple[str, ...]
     criteria: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     faults_title: str
@@ -150,6 +152,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         share=_share(float(grade.marks), float(grade.max_marks)),
         words=grade_words(grade),
         hints=hints_of(grade),
+        comments=comments_of(grade),
         criteria=tuple(_criterion_line(grade, result, played) for result in grade.criteria),
         faults=faults,
         faults_title="How it ended" if time_alone else "What went wrong",

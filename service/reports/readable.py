@@ -40,6 +40,11 @@ def one_line(text: str, limit: int = 120) -> str:
     return spelled if len(spelled) <= limit and len(text) <= 4 * limit else spelled[: limit - 1].rstrip() + "…"
 
 
+def flowing(text: str) -> str:
+    """Paragraphs on one line each, to be broken by whoever shows them; lists and indented lines stay."""
+    return re.sub(r"(?<=\S)\n(?=[^\W\d])", " ", text)
+
+
 def message_words(text: str, limit: int = 120) -> str:
     """A message on one line; the thousands of numbers of an image are named instead of listed."""
     if text.startswith("IMG_DATA::{") and len(text) > 200:

@@ -1,25 +1,30 @@
 """What a reader may see of a grade, decided once: staff, a student, or a gradebook that students look into.
 
-It hides, it never re-marks: what is left keeps the marks and messages it had. Nothing is rendered here, and what
-renders a view asks no more who reads it.
+It hides, it never re-marks: what is left keeps its marks, and its messages after what was set by hand. Nothing is
+rendered here, and what renders a view asks no more who reads it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
+from decimal import ROUND_HALF_UP, Decimal
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
-from service.similarity.pairs import Similarity
+from service.reports.words import by_hand_words
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment.examples import REFERENCE
+from submissions.assignment.folder import REFERENCE
+
+if TYPE_CHECKING:
+    from service.similarity.pairs import Similarity
 
 #: What a student sees before anything is published.
 BEFORE_PUBLICATION = frozenset({"visible"})
+_HUNDREDTH = Decimal("0.01")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,19 @@ class GradebookView:
 
     entry: Grade
     shown: Grade
+
+    @property
+    def marks(self) -> Decimal | None:
+        """The marks out of all that the assignment gives, as a gradebook knows but that; None if all is excused.
+
+        Where a criterion is excused, the others count for it.
+        """
+        grade = self.entry
+        if grade.worth == grade.max_marks:
+            return grade.marks
+        if not grade.max_marks:
+            return None
+        return (grade.marks * grade.worth / grade.max_marks).quantize(_HUNDREDTH, ROUND_HALF_UP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +86,14 @@ def staff_similarity(found: Sequence[Similarity]) -> SimilarityView:
 
 def staff_view(grade: Grade) -> View:
     """All of it."""
-    return View(grade, staff=True, withheld=False)
+    told = tuple(_with_by_hand(result) for result in grade.criteria)
+    return View(replace(grade, criteria=told), staff=True, withheld=False)
 
 
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> View:
     """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
+
+    A comment on a criterion is seen with that, one on all of the submission with whatever is seen of it.
 
     Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
     the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
@@ -80,15 +101,17 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     """
     kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
     new_index = {old: new for new, old in enumerate(kept)}
+    shown = {result.id for result in grade.criteria if result.visibility in released}
     left = replace(
         grade,
         criteria=tuple(
-            replace(_without_hidden_trials(result, new_index), for_staff="", unjudged="")
+            _with_by_hand(replace(_without_hidden_trials(result, new_index), for_staff="", unjudged=""))
             for result in grade.criteria
-            if result.visibility in released
+            if result.id in shown
         ),
         trials=tuple(grade.trials[index] for index in kept),
         cost=grade.cost and replace(grade.cost, spent=None),
+        comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
     )
     withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
     return View(left, staff=False, withheld=withheld)
@@ -149,7 +172,7 @@ def worst_trial(grade: Grade, scenario: str) -> int:
     for result in grade.criteria:
         for evidence in result.evidence:
             if not evidence.passed and 0 <= evidence.trial < len(lost):
-                lost[evidence.trial] += result.max_marks
+                lost[evidence.trial] += result.worth
     candidates = [index for index, trial in enumerate(grade.trials) if trial.scenario == scenario]
     return max(candidates, key=lambda index: (lost[index], _severity(grade.trials[index]), -index))
 
@@ -171,6 +194,11 @@ def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
     """The criterion with what is told to whoever sees it."""
     view = student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
     return replace(view.grade.criteria[0], evidence=(), predictions=())
+
+
+def _with_by_hand(result: CriterionResult) -> CriterionResult:
+    words = by_hand_words(result)
+    return replace(result, message=" ".join(filter(None, (words, result.message)))) if words else result
 
 
 def _severity(trial: TrialResult) -> int:

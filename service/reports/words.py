@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
-from service.grading.grade import Grade
+from service.grading.grade import CriterionResult, Grade
 from service.reports.readable import number, one_line, readable
 from sim.recording import LossReason, Verdict
 
@@ -224,6 +224,27 @@ def hints_of(grade: Grade) -> tuple[str, ...]:
     # The name of a file stays as it is.
     began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
     return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
+
+
+def by_hand_words(result: CriterionResult) -> str:
+    """What an instructor set in place of the grader's marks, and why; empty where nobody did."""
+    said = result.set_by_hand
+    if said is None:
+        return ""
+    reason = one_line(said.reason, 500)
+    reason += "" if reason.endswith((".", "!", "?", "…")) else "."
+    if said.excused:
+        had = "" if said.graded is None else f" (it had {number(said.graded)} of {number(said.worth)})"
+        return f"Excused, so that it does not count{had}: {reason}"
+    was = "" if said.graded is None else f" from {number(said.graded)}"
+    return f"Set by hand{was} to {number(result.marks)}: {reason}"
+
+
+def comments_of(grade: Grade) -> tuple[str, ...]:
+    """What instructors wrote, with the criterion that it is about; to be said beside the marks."""
+    titles = {result.id: one_line(result.title, 200) for result in grade.criteria}
+    about = ((titles.get(each.criterion, ""), readable(each.text, 2000)) for each in grade.comments)
+    return tuple(f"{title}: {text}" if title else text for title, text in about)
 
 
 def accuracy_words(grade: Grade) -> str:

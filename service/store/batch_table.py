@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from service.store import overrides
 from service.store.batches import standing_in
 from service.store.hidden_names import HiddenNames
 from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
@@ -153,7 +154,8 @@ def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked
     unjudged = dict(
         session.execute(
             select(CriterionResultRow.job_id, func.count())
-            .where(CriterionResultRow.job_id.in_(ids), CriterionResultRow.unjudged.is_not(None))
+            .join(Job, CriterionResultRow.job_id == Job.id)
+            .where(CriterionResultRow.job_id.in_(ids), overrides.waits_for_judgement())
             .group_by(CriterionResultRow.job_id)
         ).all()
     )

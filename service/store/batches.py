@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Row, Select, and_, func, or_, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
+from service.store import overrides
 from service.store.codec import decode
 from service.store.models import (
     AssignmentVersion,
@@ -23,10 +24,16 @@ from service.store.models import (
     TrialRow,
 )
 from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
+from service.store.web_tables import Override
 from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 from submissions.people import Refusal
 
+#: What is read of each job; the last three count.
+_Asked = tuple[
+    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
+    int | None,
+]  # fmt: skip
 #: The newest of which one may have been meant by an id that there is not.
 _MOST_COMPARED = 1000
 
@@ -36,6 +43,7 @@ class JobLine:
     """One job, as a table shows it."""
 
     id: str
+    submission_id: int
     student: str
     name: str  # the student's
     email: str
@@ -58,7 +66,8 @@ class JobLine:
     copied_from: str | None  # the identical grade that was run
     suspect: str | None  # why the grade is not to be trusted
     staff_only: str | None  # the limit that the submission was over
-    unjudged: int  # criteria that could not be judged
+    unjudged: int  # criteria that could not be judged, nor were set by hand
+    set_by_hand: int  # criteria that were
     surprises: int  # trials in which our own code stumbled over what a child sent
     days_late: int
     published_at: datetime | None
@@ -168,16 +177,15 @@ def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], .
     return (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
 
 
-def job_lines(
-    session: Session, batch_id: str, limit: int | None = None, after: tuple[str, str] | None = None
-) -> list[JobLine]:
+def job_lines(session: Session, batch_id: str, limit: int | None = None, after: str | None = None) -> list[JobLine]:
     """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs.
 
-    Where only some are wanted, those that follow on this student and id.
+    Where only some are wanted, those that follow on the job of this id.
     """
     query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id).limit(limit)
     if after is not None:
-        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(*after))
+        own = select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == after)
+        query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(own.scalar_subquery(), after))
     return [_line(row) for row in session.execute(query)]
 
 
@@ -236,9 +244,7 @@ def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, sta
     return found[0]
 
 
-def _job_lines() -> Select[
-    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
-]:
+def _job_lines() -> Select[*_Asked]:
     accuracy = (
         select(CriterionResultRow.accuracy)
         .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None))
@@ -248,7 +254,12 @@ def _job_lines() -> Select[
     )
     unjudged = (
         select(func.count())
-        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
+        .where(CriterionResultRow.job_id == Job.id, overrides.waits_for_judgement())
+        .scalar_subquery()
+    )
+    by_hand = (
+        select(func.count())
+        .where(Override.submission_id == Job.submission_id, Override.withdrawn_at.is_(None))
         .scalar_subquery()
     )
     surprises = select(func.count()).where(TrialRow.job_id == Job.id, TrialRow.surprise.is_not(None)).scalar_subquery()
@@ -265,6 +276,7 @@ def _job_lines() -> Select[
             SubmissionRow.staff_only,
             SubmissionRow.days_late,
             unjudged,
+            by_hand,
             surprises,
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -274,14 +286,12 @@ def _job_lines() -> Select[
     )
 
 
-def _line(
-    row: Row[
-        Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None
-    ],
-) -> JobLine:
-    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, unjudged, surprises = row
+def _line(row: Row[*_Asked]) -> JobLine:
+    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, *counts = row
+    unjudged, by_hand, surprises = counts
     return JobLine(
         id=job.id,
+        submission_id=job.submission_id,
         student=student,
         name=name,
         email=email or "",
@@ -290,7 +300,7 @@ def _line(
         state=job.state,
         verdict=job.verdict,
         marks=job.marks,
-        max_marks=version.max_marks,
+        max_marks=version.max_marks if job.max_marks is None else job.max_marks,
         accuracy=accuracy,
         attempt=attempt,
         error=job.error,
@@ -305,6 +315,7 @@ def _line(
         suspect=job.suspect,
         staff_only=staff_only,
         unjudged=unjudged or 0,
+        set_by_hand=by_hand or 0,
         surprises=surprises or 0,
         days_late=days_late,
         published_at=job.published_at,

@@ -7,15 +7,28 @@ from __future__ import annotations
 
 import base64
 import math
+import sys
 import types
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from enum import Enum
 from functools import cache
-from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
-from pydantic import BaseModel, TypeAdapter
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 T = TypeVar("T")
 Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
@@ -37,12 +50,12 @@ def encode(value: object) -> Json:
             return str(value)
         case bytes():
             return base64.b64encode(value).decode("ascii")
-        case BaseModel():
-            return cast(Json, value.model_dump(mode="json", by_alias=True))
         case Mapping():
             return {str(key): encode(item) for key, item in value.items()}
         case Sequence():
             return [encode(item) for item in value]
+    if _is_model(type(value)):
+        return cast(Json, cast(Any, value).model_dump(mode="json", by_alias=True))
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: encode(getattr(value, field.name)) for field in fields(value)}
     # Most of what reads the database has no arrays, and need not wait for numpy.
@@ -74,12 +87,20 @@ def _hints(kind: type) -> dict[str, Any]:
 
 @cache
 def _adapter(kind: Any) -> TypeAdapter[Any]:
+    from pydantic import TypeAdapter
+
     return TypeAdapter(kind)
+
+
+def _is_model(kind: Any) -> bool:
+    """Whether it is a model of pydantic's, which takes long to import: before it is, there is none."""
+    pydantic = sys.modules.get("pydantic.main")
+    return pydantic is not None and isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
 
 
 def _read(kind: Any, value: Any) -> Any:
     origin = get_origin(kind)
-    if origin is Annotated or (isinstance(kind, type) and issubclass(kind, BaseModel)):
+    if origin is Annotated or _is_model(kind):
         return _adapter(kind).validate_python(value)
     if origin is Union or origin is types.UnionType:
         return _read_union(get_args(kind), value)

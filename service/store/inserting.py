@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from sqlalchemy.dialects import postgresql, sqlite
+from typing import Any, cast
+
+from sqlalchemy import CursorResult
 from sqlalchemy.orm import Session
 
 from service.store import models
 
 
-def insert_if_new(session: Session, table: type[models.Base], **values: object) -> None:
-    """Insert a row, unless one with the same unique values is there."""
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    session.execute(insert(table).values(**values).on_conflict_do_nothing())
+def insert_if_new(session: Session, table: type[models.Base], **values: object) -> bool:
+    """Insert a row, unless one with the same unique values is there; whether it was inserted."""
+    # The other database's dialect takes longer to import than a command that only asks takes for the rest.
+    if session.get_bind().dialect.name == "postgresql":
+        from sqlalchemy.dialects.postgresql import insert
+    else:
+        from sqlalchemy.dialects.sqlite import insert  # type: ignore[assignment]
+    done = session.execute(insert(table).values(**values).on_conflict_do_nothing())
+    return cast("CursorResult[Any]", done).rowcount > 0

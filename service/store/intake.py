@@ -13,7 +13,7 @@ from typing import TypeVar
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import jobs, result_cache
+from service.store import jobs, outbox, result_cache
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.ids import new_id
@@ -39,6 +39,7 @@ class Accepted:
     """A submission that is now a job."""
 
     job_id: str
+    submission_id: int
     student: str
     attempt: int
     copied_from: str | None = None  # the identical grade that it has already
@@ -278,7 +279,9 @@ def _accept_batch(
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)
-    return AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in items))
+    accepted = AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in items))
+    outbox.batch_ended(session, batch.id)
+    return accepted
 
 
 def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
@@ -329,4 +332,4 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     )
     if source is not None:
         jobs.copy(session, job_id, source, at)
-    return Accepted(job_id, submission.student, row.attempt, source, ruling.over)
+    return Accepted(job_id, row.id, submission.student, row.attempt, source, ruling.over)

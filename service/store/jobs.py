@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, cast
 from sqlalchemy import ColumnElement, CursorResult, Select, select, update
 from sqlalchemy.orm import Session
 
-from service.store import phases, plots, result_cache, workers
+from service.store import outbox, overrides, phases, plots, result_cache, workers
 from service.store.codec import encode
 from service.store.engine import Store, now
 from service.store.installation import secret_of
@@ -101,12 +101,15 @@ def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
     if not _make(session, COPY, (Job.id == job_id,), at, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
+    overrides.recount(session, job_id)
+    outbox.grade_copied(session, job_id)
 
 
 def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
     """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
     which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
-    _make(session, SUPERSEDE, which, at, {"error": f"superseded by {by}"})
+    if _make(session, SUPERSEDE, which, at, {"error": f"superseded by {by}"}):
+        outbox.superseded(session, submissions, at)
 
 
 def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
@@ -173,8 +176,6 @@ def finish(
             "phases": phases.written(moments),
             "graded_at": graded_at,
             "verdict": grade.verdict.value,
-            "marks": grade.marks,
-            "max_marks": grade.max_marks,
             "grader_version": grade.grader_version,
             "grader_sha256": grader_sha256(),
             "secret_sha256": grade.secret_sha256,
@@ -190,6 +191,8 @@ def finish(
         _refuse_quarantined(session, claim)
         _make_held(session, FINISH, claim, at, values)
         results.insert(session, claim.job_id, prepared, at)
+        overrides.recount(session, claim.job_id)
+        outbox.grade_finished(session, claim.job_id)
 
 
 def finish_from_cache(store: Store, claim: Claim) -> bool:
@@ -209,6 +212,8 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
         at = now(session)
         _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
         result_cache.copy_rows(session, source, claim.job_id)
+        overrides.recount(session, claim.job_id)
+        outbox.grade_finished(session, claim.job_id)
         return True
 
 
@@ -226,6 +231,7 @@ def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetim
     if claim.attempt >= claim.max_attempts:
         times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
         _make_held(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
+        outbox.job_ended(session, claim.job_id)
         return GIVE_UP.after
     _make_held(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
     return TRY_AGAIN.after
@@ -235,6 +241,7 @@ def give_up(store: Store, claim: Claim, reason: str) -> None:
     """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
     with store.transaction() as session:
         _make_held(session, GIVE_UP, claim, now(session), {"error": reason})
+        outbox.job_ended(session, claim.job_id)
 
 
 def release_worker(store: Store, worker: str) -> int:
@@ -250,7 +257,10 @@ def give_back(session: Session, worker: str, at: datetime) -> int:
 
 def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
     """End the jobs of a batch that have not ended; a worker that runs one is told at its next heartbeat."""
-    return _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
+    ended = _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
+    if ended:
+        outbox.batch_ended(session, batch_id)
+    return ended
 
 
 def retry(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:

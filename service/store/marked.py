@@ -1,4 +1,4 @@
-"""The marks of jobs, as statistics are made of them: one look at the criteria's rows, and no recording. Only reads."""
+"""The marks of jobs as they count, as statistics are made of them: criteria's rows, and no recording. Only reads."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.grading.statistics import MarkedCriterion, MarkedSubmission
+from service.store import overrides
 from service.store.models import CriterionResultRow
 from service.store.states import JobState
 
@@ -43,6 +44,8 @@ def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmissi
     graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
     for begin in range(0, len(graded), _AT_ONCE):
+        some = [line.id for line in graded[begin : begin + _AT_ONCE]]
+        by_hand = overrides.of_jobs(session, some)
         rows = session.execute(
             select(
                 CriterionResultRow.job_id,
@@ -50,15 +53,17 @@ def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmissi
                 CriterionResultRow.title,
                 CriterionResultRow.marks,
                 CriterionResultRow.max_marks,
+                CriterionResultRow.unjudged,
             )
-            .where(
-                CriterionResultRow.job_id.in_([line.id for line in graded[begin : begin + _AT_ONCE]]),
-                CriterionResultRow.unjudged.is_(None),
-            )
+            .where(CriterionResultRow.job_id.in_(some))
             .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
         )
-        for job_id, criterion, title, marks, max_marks in rows:
-            criteria[job_id].append(MarkedCriterion(criterion, title, marks, max_marks))
+        for job_id, criterion, title, marks, worth, unjudged in rows:
+            override = by_hand.get(job_id, {}).get(criterion)
+            if override is not None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, *override.counted(worth)))
+            elif unjudged is None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
     return [
         MarkedSubmission(
             line.student, line.assignment, line.marks, line.max_marks, line.verdict or "", tuple(criteria[line.id])

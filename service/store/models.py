@@ -366,7 +366,7 @@ class Heartbeat(Base):
 
 
 class Audit(Base):
-    """Who did what to which row; never changed, never deleted."""
+    """Who did what to which row; never deleted, and changed only where the name of who is erased stands in it."""
 
     __tablename__ = "audit"
     __table_args__ = (Index(None, "subject", "subject_id"),)

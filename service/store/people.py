@@ -70,10 +70,15 @@ def make_operator(session: Session, person_id: int) -> None:
 
 def member(session: Session, course: str, written: str) -> Member:
     """Somebody in the course, by id. Raises UsageError for a course or a person that there is not."""
-    course_id = session.scalar(select(Course.id).where(Course.name == course))
+    return _member(session, Students(session, find_course(session, course)).find(written))
+
+
+def find_course(session: Session, name: str) -> int:
+    """The course of this name. Raises UsageError where there is none."""
+    course_id = session.scalar(select(Course.id).where(Course.name == name))
     if course_id is None:
-        raise UsageError(f"there is no course {course!r}")
-    return _member(session, Students(session, course_id).find(written))
+        raise UsageError(f"there is no course {name!r}")
+    return course_id
 
 
 def members(session: Session, course_id: int) -> list[Member]:

@@ -83,6 +83,11 @@ def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, subm
     return Ruling(days_late)
 
 
+def attempts_made(session: Session, enrolment_id: int, assignment: str) -> int:
+    """How many of a student's submissions count as attempts until now."""
+    return len(_counted(session, enrolment_id, assignment, ""))
+
+
 def released(session: Session, job_id: str) -> frozenset[str]:
     """Which visibilities a student may see of a grade now.
 

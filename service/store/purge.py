@@ -1,6 +1,7 @@
-"""Removes what was submitted before a day and has long been marked: submissions, grades, recordings, and their people.
+"""Removes what was submitted before a day and has long been marked, or all there is of one student.
 
-What is done to a batch before that is ``batch_control.py``'s; the audit trail stays.
+With submissions go grades, recordings and what was said of them. What is done to a batch before that is
+``batch_control.py``'s; the audit trail stays, without the names of those who are erased.
 """
 
 from __future__ import annotations
@@ -13,14 +14,27 @@ from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
 from service.store.engine import Store
-from service.store.models import AssignmentVersion, Batch, Enrolment, Extension, Job, Person, SubmissionRow
-from service.store.states import UNFINISHED
+from service.store.models import AssignmentVersion, Audit, Batch, Enrolment, Extension, Job, Person, SubmissionRow
+from service.store.states import UNFINISHED, JobState, Role
+from service.store.web_tables import (
+    Appeal,
+    Comment,
+    Credential,
+    IdempotentReply,
+    LtiPerson,
+    OpenAssignment,
+    Override,
+    Tryout,
+)
+from sim.errors import UsageError
+from submissions.names import shown_name
 
 _TEMPORARY = MetaData()
 #: Submissions and enrolments that go; there may be more of them than a statement takes as values.
 _GOING = Table("going", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _LEAVING = Table("leaving", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _AT_ONCE = 500
+_ERASED = "erased"
 _going = select(_GOING.c.id)
 _leaving = select(_LEAVING.c.id)
 
@@ -34,19 +48,18 @@ class Purged:
     students: int
 
 
-def purge(store: Store, before: datetime, actor: str, *, only_count: bool = False) -> Purged:
+def purge(
+    store: Store, before: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
+) -> Purged:
     """Remove the submissions taken in before a moment, with all that came of them, and students who have none left.
 
-    What still waits or runs stays, and so does what a later grade is a copy of. With ``only_count`` nothing is changed.
+    Of all courses, or of one. What still waits or runs stays, and so does what a later grade is a copy of. With
+    ``only_count`` nothing is changed.
     """
     with store.transaction() as session:
         _TEMPORARY.create_all(session.connection())
-        _choose(session, before)
-        found = Purged(
-            _count(session, _GOING),
-            session.scalar(select(func.count()).select_from(Job).where(Job.submission_id.in_(_going))) or 0,
-            _count(session, _LEAVING),
-        )
+        _choose(session, before, course_id)
+        found = _found(session)
         if found.submissions and not only_count:
             _remove(session)
             detail = {"submissions": found.submissions, "grades": found.grades, "students": found.students}
@@ -55,9 +68,57 @@ def purge(store: Store, before: datetime, actor: str, *, only_count: bool = Fals
         return found
 
 
-def _choose(session: Session, before: datetime) -> None:
+def erase_student(store: Store, enrolment_id: int, actor: str) -> Purged:
+    """Remove all there is of one student of a course: what was submitted and what came of it, and who they are.
+
+    Somebody who is in other courses, too, is only removed from this one. A grade that is a copy of one of theirs stays.
+    Raises UsageError for an instructor, and while something of theirs is being graded.
+    """
+    with store.transaction() as session:
+        enrolment = session.get_one(Enrolment, enrolment_id)
+        if enrolment.role is not Role.STUDENT:
+            raise UsageError(f"{enrolment.student} is no student of this course")
+        running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
+        if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
+            raise UsageError(f"a submission of {enrolment.student} is being graded; wait until it is, or cancel it")
+        _TEMPORARY.create_all(session.connection())
+        own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
+        session.execute(insert(_GOING).from_select(["id"], own))
+        session.execute(insert(_LEAVING).values(id=enrolment_id))
+        found = _found(session)
+        _forget_names(session, enrolment)
+        _remove(session)
+        detail = {"submissions": found.submissions, "grades": found.grades}
+        audit.note(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
+        _TEMPORARY.drop_all(session.connection())
+        return found
+
+
+def _found(session: Session) -> Purged:
+    grades = select(func.count()).select_from(Job).where(Job.submission_id.in_(_going))
+    return Purged(_count(session, _GOING), session.scalar(grades) or 0, _count(session, _LEAVING))
+
+
+def _forget_names(session: Session, enrolment: Enrolment) -> None:
+    """Where a student is named beside their own rows: among what was refused, and in the audit."""
+    for batch in session.scalars(select(Batch).where(Batch.course_id == enrolment.course_id)):
+        kept = [each for each in batch.refusals if shown_name(each["student"]["id"]) != enrolment.student]
+        if len(kept) < len(batch.refusals):
+            batch.refusals = kept
+    of_course = (Audit.subject == "course", Audit.subject_id == str(enrolment.course_id))
+    for row in session.scalars(select(Audit).where(*of_course)):
+        if row.detail.get("student") == enrolment.student:
+            row.detail = {**row.detail, "student": _ERASED}
+    by_them = Audit.actor.endswith(f"(person {enrolment.person_id})", autoescape=True)
+    session.execute(update(Audit).where(by_them).values(actor=f"{_ERASED} (person {enrolment.person_id})"))
+
+
+def _choose(session: Session, before: datetime, course_id: int | None) -> None:
     unfinished = select(Job.submission_id).where(Job.state.in_(UNFINISHED))
     old = select(SubmissionRow.id).where(SubmissionRow.created_at < before, SubmissionRow.id.not_in(unfinished))
+    if course_id is not None:
+        of_course = select(Enrolment.id).where(Enrolment.course_id == course_id)
+        old = old.where(SubmissionRow.enrolment_id.in_(of_course))
     session.execute(insert(_GOING).from_select(["id"], old))
     source = aliased(Job)
     needed = (
@@ -75,9 +136,13 @@ def _choose(session: Session, before: datetime) -> None:
 
 def _remove(session: Session) -> None:
     of_them = Job.submission_id.in_(_going)
-    session.execute(update(Job).where(of_them).values(copied_from=None, regrade_of=None))
+    theirs = select(Job.id).where(of_them)
+    session.execute(update(Job).where(or_(of_them, Job.copied_from.in_(theirs))).values(copied_from=None))
+    session.execute(update(Job).where(of_them).values(regrade_of=None))
     # Its trials, results and artifacts go with a job.
     session.execute(delete(Job).where(of_them))
+    for column in (Override.submission_id, Comment.submission_id, Appeal.submission_id):
+        session.execute(delete(column.class_).where(column.in_(_going)))
     session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(_going)))
     used = (
         Batch.id.in_(select(Job.batch_id).where(Job.batch_id.is_not(None))),
@@ -87,14 +152,21 @@ def _remove(session: Session) -> None:
     session.execute(delete(Batch).where(~or_(*used), Batch.regrade_of.is_not(None)))
     regraded = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
     session.execute(delete(Batch).where(~or_(*used), Batch.id.not_in(regraded)))
-    session.execute(delete(AssignmentVersion).where(AssignmentVersion.id.not_in(select(Job.assignment_version_id))))
     people = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_leaving))))
-    session.execute(delete(Extension).where(Extension.enrolment_id.in_(_leaving)))
+    for column in (Extension.enrolment_id, Tryout.enrolment_id):
+        session.execute(delete(column.class_).where(column.in_(_leaving)))
+    needed = [select(table.assignment_version_id) for table in (Job, OpenAssignment, Tryout)]
+    session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(each) for each in needed)))
     session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
     in_a_course = select(Enrolment.person_id)
     for start in range(0, len(people), _AT_ONCE):
-        some = Person.id.in_(people[start : start + _AT_ONCE])
-        session.execute(delete(Person).where(some, Person.id.not_in(in_a_course)))
+        some = (Person.id.in_(people[start : start + _AT_ONCE]), Person.id.not_in(in_a_course), ~Person.operator)
+        gone = select(Person.id).where(*some)
+        secrets = select(Credential.id).where(Credential.person_id.in_(gone))
+        session.execute(delete(IdempotentReply).where(IdempotentReply.credential_id.in_(secrets)))
+        for column in (Credential.person_id, LtiPerson.person_id):
+            session.execute(delete(column.class_).where(column.in_(gone)))
+        session.execute(delete(Person).where(*some))
 
 
 def _count(session: Session, table: Table) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Select, case, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit
+from service.store import audit, outbox, overrides
 from service.store.engine import Store, now
 from service.store.jobs import enqueue
 from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
@@ -233,6 +233,9 @@ def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) ->
         ids = select(Job.submission_id).where(Job.batch_id == batch_id)
         result = _publish(session, ids, actor=actor, anyway=anyway)
         audit.note(session, actor, "publish", "batch", batch_id, **_worth_noting(result))
+        if result.published:
+            course_id = session.get_one(Batch, batch_id).course_id
+            outbox.grades_published(session, course_id, batch=batch_id, published=result.published)
         return result
 
 
@@ -244,6 +247,9 @@ def publish_one(store: Store, job_id: str, *, actor: str, anyway: bool = False) 
         ids = select(Job.submission_id).where(Job.id == job_id)
         result = _publish(session, ids, actor=actor, anyway=anyway)
         audit.note(session, actor, "publish", "job", job_id, **_worth_noting(result))
+        if result.published:
+            course_id = session.get_one(Enrolment, session.get_one(Job, job_id).enrolment_id).course_id
+            outbox.grades_published(session, course_id, grade=job_id, published=result.published)
         return result
 
 
@@ -290,11 +296,11 @@ def _worth_noting(result: Published) -> dict[str, int]:
 
 
 def _unjudged(session: Session, ids: Select[int]) -> set[str]:
-    """The jobs for these submissions that have a criterion that could not be judged."""
+    """The jobs for these submissions that have a criterion that could not be judged, nor was set by hand."""
     query = (
         select(CriterionResultRow.job_id)
         .join(Job, CriterionResultRow.job_id == Job.id)
-        .where(Job.submission_id.in_(ids), CriterionResultRow.unjudged.is_not(None))
+        .where(Job.submission_id.in_(ids), overrides.waits_for_judgement())
     )
     return set(session.scalars(query))
 
@@ -378,8 +384,8 @@ _Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
 
 
 def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
-    query = select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
-    return {row.criterion: (row.title, row.marks, row.max_marks) for row in session.scalars(query)}
+    lines = overrides.criterion_marks(session, job_id)
+    return {line.criterion: (line.title, line.marks, line.max_marks) for line in lines}
 
 
 def _worth(marked: _Marked | None) -> tuple[Decimal, Decimal] | None:

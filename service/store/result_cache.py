@@ -73,7 +73,7 @@ def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[
     """What another job itself has of a grade that is copied to it."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    of_grade = ("verdict", "marks", "max_marks", "sandbox", "grader_version", "missing", "hints", "cost")
+    of_grade = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
     names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {

@@ -23,12 +23,15 @@ from service.grading.grade import (
     Evidence,
     Grade,
     Prediction,
+    SetByHand,
     Shown,
     TrialResult,
+    WrittenComment,
 )
-from service.store import artifacts, recordings
+from service.store import artifacts, comments, overrides, recordings
 from service.store.codec import decode, encode
 from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.overrides import OverrideLine
 from sim.errors import HostError, UsageError
 from sim.recorded import faults_of
 from sim.recording import Image, Recording
@@ -77,7 +80,33 @@ def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> N
 
 
 def load(session: Session, job_id: str) -> Grade:
-    """The grade of a job. Raises UsageError when it has none."""
+    """The grade of a job as it counts, with what instructors set and wrote. Raises UsageError when it has none."""
+    return _as_all_counts(session, job_id, load_graded(session, job_id))
+
+
+def load_graded(session: Session, job_id: str) -> Grade:
+    """The grade of a job as the grader gave it. Raises UsageError when it has none."""
+    return _load(session, job_id, load_trials(session, job_id))
+
+
+def load_marks(session: Session, job_id: str) -> Grade:
+    """The grade of a job as it counts, without its trials and predictions, for lists, which read no recordings.
+
+    Raises like ``load``.
+    """
+    return _as_all_counts(session, job_id, _load(session, job_id, ()))
+
+
+def _as_all_counts(session: Session, job_id: str, graded: Grade) -> Grade:
+    by_hand = overrides.of_jobs(session, [job_id]).get(job_id, {})
+    return replace(
+        graded,
+        criteria=tuple(_as_it_counts(result, by_hand.get(result.id)) for result in graded.criteria),
+        comments=tuple(WrittenComment(each.criterion, each.text) for each in comments.of_job(session, job_id)),
+    )
+
+
+def _load(session: Session, job_id: str, trials: tuple[TrialResult, ...]) -> Grade:
     query = (
         select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -89,7 +118,6 @@ def load(session: Session, job_id: str) -> Grade:
     if found is None or found[0].verdict is None:
         raise UsageError(f"{job_id} has no grade")
     job, sha256, student, version = found
-    trials = load_trials(session, job_id)
     rows = session.scalars(
         select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
     )
@@ -210,12 +238,25 @@ def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> Crit
         visibility=row.visibility,
         evidence=decode(tuple[Evidence, ...], row.evidence),
         accuracy=_accuracy(row),
-        predictions=tuple(_prediction(plain, trials) for plain in row.predictions),
+        predictions=tuple(_prediction(plain, trials) for plain in row.predictions) if trials else (),
         curves=decode(tuple[AccuracyCurve, ...], row.curves),
         shown=None if row.shown is None else decode(Shown, row.shown),
         unjudged=row.unjudged or "",
         for_staff=row.for_staff,
     )
+
+
+def _as_it_counts(result: CriterionResult, override: OverrideLine | None) -> CriterionResult:
+    if override is None:
+        return result
+    marks, max_marks = override.counted(result.max_marks)
+    excused = override.marks is None
+    if not result.unjudged:
+        said = SetByHand(result.marks, result.max_marks, override.reason, excused)
+        return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said)
+    # That staff will look at it is true no more.
+    said = SetByHand(None, result.max_marks, override.reason, excused)
+    return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said, message="", unjudged="")
 
 
 def _accuracy(row: CriterionResultRow) -> Accuracy | None:

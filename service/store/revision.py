@@ -5,7 +5,7 @@ Bringing them there is ``migrate.py``'s.
 
 from __future__ import annotations
 
-from importlib import resources
+from pathlib import Path
 
 from sqlalchemy import Engine, column, inspect, select, table
 
@@ -14,8 +14,8 @@ _TABLE = "alembic_version"
 
 def newest_revision() -> str:
     """The revision that this release needs; a migration's file is called after its own: ``v0009_people.py``."""
-    files = (resources.files("service.store") / "migrations" / "versions").iterdir()
-    return max(file.name[1:5] for file in files if file.name.startswith("v") and file.name.endswith(".py"))
+    files = (Path(__file__).parent / "migrations" / "versions").glob("v*.py")
+    return max(file.name[1:5] for file in files)
 
 
 def current_revision(engine: Engine) -> str | None:

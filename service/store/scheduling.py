@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, Subquery, and_, case, func, not_, or_, select
+from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, not_, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.models import Batch, Job
@@ -32,22 +32,26 @@ def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
     )
 
 
+def recently_begun(at: datetime) -> Select[Lane, str | None, int]:
+    """The lane, the batch and the student of every job that counts for a share."""
+    return select(Job.lane, Job.batch_id, Job.enrolment_id).where(Job.started_at > at - SHARE_WINDOW)
+
+
 def next_job(session: Session, at: datetime, worker: str) -> str | None:
     """The id of the job that ``worker`` should take next; None when none is due.
 
     The lane first: people before batches, but for one job in five. In a lane, the batch and then the student of
     whom fewest jobs were begun in the last minute; then the oldest job.
     """
-    begun = select(Job.lane, Job.batch_id, Job.enrolment_id).where(Job.started_at > at - SHARE_WINDOW)
     # A common table, or SQLite would walk all jobs there ever were to count each share.
-    recent = begun.cte("recent")
+    recent = recently_begun(at).cte("recent")
     counted = session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane))
     by_lane: dict[Lane, int] = dict(counted.all())
     people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
     first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
 
-    of_batch = _shares(recent.c.batch_id)
-    of_student = _shares(recent.c.enrolment_id)
+    of_batch = shares(recent.c.batch_id)
+    of_student = shares(recent.c.enrolment_id)
     query = (
         select(Job.id)
         .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
@@ -73,5 +77,6 @@ def _better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
     return and_(failed_here, Job.due_at > at - ELSEWHERE, another_lives(worker, at))
 
 
-def _shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
+def shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
+    """How many of the jobs recently begun each batch, or each student, has."""
     return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()

@@ -43,6 +43,15 @@ class JobState(StrEnum):
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 
 
+class TryoutState(StrEnum):
+    """How far a program has come that a student tries without submitting it."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"  # by a fault of ours; ``error`` says which
+
+
 class PlotState(StrEnum):
     """Plots come after the marks and never change them."""
 

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from service.store import credentials
 from service.store.credentials import Identity
 from service.store.states import CredentialKind, Role
-from service.web.access import SignInNeeded, actor_of, course_of_role, nothing_here
+from service.web.access import RowNumber, SignInNeeded, actor_of, course_of_role, nothing_here
 from service.web.api_scopes import SCOPES
 from service.web.context import Context
 
@@ -47,7 +47,8 @@ class CallerInCourse:
         return self.caller.actor
 
 
-def _caller(request: Request, context: Context) -> Caller:
+def caller_of(request: Request, context: Context) -> Caller:
+    """Whose token a request has. Raises SignInNeeded without one, HTTPException 429 where it comes too often."""
     scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
     if scheme.lower() != "bearer" or not secret:
         raise SignInNeeded("a token is needed")
@@ -55,12 +56,17 @@ def _caller(request: Request, context: Context) -> Caller:
         identity = credentials.identify(session, secret, CredentialKind.TOKEN)
     if identity is None:
         raise SignInNeeded("the token does not count")
+    context.limits.api_calls.spend(identity.credential_id)
     with context.store.transaction() as session:
         credentials.note_use(session, identity.credential_id)
     return Caller(identity)
 
 
-Called = Annotated[Caller, Depends(_caller)]
+def _called(request: Request, context: Context, _told: Annotated[object, Depends(bearer)]) -> Caller:
+    return caller_of(request, context)
+
+
+Called = Annotated[Caller, Depends(_called)]
 
 
 def with_scope(scope: str) -> Callable[[Caller], Caller]:
@@ -79,7 +85,7 @@ def in_course(role: Role, scope: str) -> Callable[[int, Caller, Context], Caller
     """A dependency: the caller with this role in the path's course, where their token may do this."""
     scoped = with_scope(scope)
 
-    def caller_in_course(course_id: int, caller: Called, context: Context) -> CallerInCourse:
+    def caller_in_course(course_id: RowNumber, caller: Called, context: Context) -> CallerInCourse:
         with context.store.reading() as session:
             course = course_of_role(session, caller.identity, course_id, role)
         return CallerInCourse(scoped(caller), course.id)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from functools import partial
 
 from fastapi import Depends, FastAPI
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
@@ -23,9 +24,11 @@ from service.store.engine import Store
 from service.version import GRADER_VERSION
 from service.web import api, pages
 from service.web.access import same_site
+from service.web.api_description import described
 from service.web.context import WebContext
 from service.web.errors import add_error_pages
 from service.web.metrics import metrics_text
+from service.web.rate_limits import RateLimit, RateLimits
 from service.web.rendering import static_files
 from service.web.security import Guarded
 
@@ -36,7 +39,10 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     app = FastAPI(
         title="Robomark", version=GRADER_VERSION, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
     )
-    app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings))
+    app.router.redirect_slashes = False
+    calls = settings.api_calls_per_minute
+    limits = RateLimits(api_calls=RateLimit(round(calls), calls))
+    app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings), limits)
     app.add_middleware(Guarded, public_url=settings.public_url)
     add_error_pages(app)
     _add_probes(app, settings, store)
@@ -58,6 +64,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
         if router := getattr(importlib.import_module(module.name), "router", None):
             app.include_router(router, prefix="/api/v1")
+    app.openapi = partial(described, app)  # type: ignore[method-assign]
     return app
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -20,7 +20,7 @@ class WebContext:
     settings: Settings
     store: Store
     notifier: Notifier
-    limits: RateLimits = field(default_factory=RateLimits)
+    limits: RateLimits
 
 
 def _context(request: Request) -> WebContext:

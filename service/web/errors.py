@@ -5,24 +5,28 @@ Never a traceback; what was ours is in the log.
 
 from __future__ import annotations
 
-from http import HTTPStatus
 from urllib.parse import quote
 
 import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, RedirectResponse, Response
+from fastapi.responses import RedirectResponse, Response
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from service.lti.fetching import PlatformError
 from service.web.access import SignInNeeded, reader_of
 from service.web.language import translatable
+from service.web.problems import API, problem
 from service.web.rendering import page
 from sim.errors import HostError, RobomarkError, UsageError
 
 _log = structlog.get_logger(__name__)
-API = "/api/"
+#: What the router says of paths and methods that there are not.
+_OF_THE_ROUTER = {
+    (404, "Not Found"): translatable("There is nothing here, or nothing that you may see."),
+    (405, "Method Not Allowed"): translatable("This can be asked for, but not by this method."),
+}
 _OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
 _NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
 
@@ -41,7 +45,7 @@ def add_error_pages(app: FastAPI) -> None:
 
 async def _sign_in_needed(request: Request, _error: Exception) -> Response:
     if request.url.path.startswith(API):
-        return _problem(401, "A token is needed: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
+        return problem(401, "A token is needed: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
     target = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
     where = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
     if request.headers.get("hx-request") == "true":
@@ -51,7 +55,8 @@ async def _sign_in_needed(request: Request, _error: Exception) -> Response:
 
 async def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    return answer(request, error.status_code, str(error.detail), dict(error.headers or {}))
+    sentence = _OF_THE_ROUTER.get((error.status_code, str(error.detail)), str(error.detail))
+    return answer(request, error.status_code, sentence, dict(error.headers or {}))
 
 
 async def _misread(request: Request, error: Exception) -> Response:
@@ -63,7 +68,7 @@ async def _misread(request: Request, error: Exception) -> Response:
 
 
 async def _usage(request: Request, error: Exception) -> Response:
-    return answer(request, 422, _sentence(error))
+    return answer(request, 422, sentence_of(error))
 
 
 async def _host(request: Request, error: Exception) -> Response:
@@ -72,7 +77,7 @@ async def _host(request: Request, error: Exception) -> Response:
 
 
 async def _platform(request: Request, error: Exception) -> Response:
-    return answer(request, 502, _sentence(error))
+    return answer(request, 502, sentence_of(error))
 
 
 async def _no_database(request: Request, error: Exception) -> Response:
@@ -88,7 +93,7 @@ async def _surprise(request: Request, error: Exception) -> Response:
 def answer(request: Request, status: int, sentence: str, headers: dict[str, str] | None = None) -> Response:
     """The sentence, as whoever asks can read it."""
     if request.url.path.startswith(API):
-        return _problem(status, sentence, headers)
+        return problem(status, sentence, headers)
     try:
         reader = reader_of(request, request.app.state.context)
     except (RobomarkError, SQLAlchemyError):
@@ -98,12 +103,9 @@ def answer(request: Request, status: int, sentence: str, headers: dict[str, str]
     return shown
 
 
-def _problem(status: int, sentence: str, headers: dict[str, str] | None = None) -> Response:
-    """A problem as RFC 9457 has it."""
-    body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": sentence}
-    return JSONResponse(body, status, headers, "application/problem+json")
-
-
-def _sentence(error: Exception) -> str:
+def sentence_of(error: Exception) -> str:
+    """What an error says, as a sentence on a page."""
     text = str(error)
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
+    # The name of a file stays as it is.
+    first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
+    return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

@@ -60,3 +60,9 @@ class RateLimits:
     failed_sign_ins: RateLimit = field(default_factory=lambda: RateLimit(burst=30, per_minute=30))
     #: Launches from learning platforms, by address.
     launches: RateLimit = field(default_factory=lambda: RateLimit(burst=300, per_minute=300))
+    #: Submissions of one person, whatever the course and the way.
+    submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
+    #: Programs of one person that are tried; how many are run in all is the store's to say.
+    tryouts: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
+    #: Calls of the API, by token; the settings say how many.
+    api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from fastapi import Request
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
@@ -94,6 +94,7 @@ def _environment(code: str) -> Environment:
     environment.filters["moment"] = _moment
     environment.filters["share"] = _share
     environment.filters["duration"] = _duration
+    environment.filters["typed"] = _typed
     return environment
 
 
@@ -114,6 +115,11 @@ def _moment(value: datetime | None) -> Markup | str:
         return "–"
     here = value.astimezone()
     return Markup('<time datetime="{}">{}</time>').format(here.isoformat(), f"{here:%Y-%m-%d %H:%M}")
+
+
+def _typed(text: str) -> Markup:
+    """What somebody typed, whole and as it was, for the field that they typed it into."""
+    return Markup("\n") + escape(text)
 
 
 def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:

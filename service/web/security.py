@@ -8,8 +8,11 @@ from __future__ import annotations
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.exceptions import HTTPException
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.web.problems import API, problem
 
 #: The longest body of a request: an upload of a batch; what an upload may hold is the bundle reader's to say.
 LARGEST_BODY = 200 * 2**20
@@ -31,8 +34,11 @@ _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 _FOR_ANY_NAME = ("/health/", "/metrics")
 
 
-class TooMuch(Exception):
+class TooMuch(HTTPException):
     """A body was longer than is read."""
+
+    def __init__(self) -> None:
+        super().__init__(413, f"This is too much: at most {LARGEST_BODY // 2**20} MB are read.")
 
 
 class Guarded:
@@ -55,12 +61,9 @@ class Guarded:
             return
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > LARGEST_BODY:
-            await _too_much()(scope, receive, send)
+            await _too_much(scope["path"])(scope, receive, self._headed(send))
             return
-        try:
-            await self._app(scope, _counted(receive), self._headed(send))
-        except TooMuch:
-            await _too_much()(scope, receive, send)
+        await self._app(scope, _counted(receive), self._headed(send))
 
     def _headed(self, send: Send) -> Send:
         async def headed(message: Message) -> None:
@@ -85,14 +88,17 @@ def _counted(receive: Receive) -> Receive:
         message = await receive()
         so_far += len(message.get("body", b""))
         if so_far > LARGEST_BODY:
-            raise TooMuch
+            raise TooMuch()
         return message
 
     return counted
 
 
-def _too_much() -> PlainTextResponse:
-    return PlainTextResponse(f"This is too much: at most {LARGEST_BODY // 2**20} MB are read.\n", status_code=413)
+def _too_much(path: str) -> Response:
+    error = TooMuch()
+    if path.startswith(API):
+        return problem(error.status_code, error.detail)
+    return PlainTextResponse(f"{error.detail}\n", status_code=error.status_code)
 
 
 def _host(header: str) -> str:

@@ -16,6 +16,7 @@ from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 from service.store.engine import open_store
 from service.web.app import make_app
+from service.web.webhook_sender import WebhookSender
 
 
 def serve_on(settings: Settings, listening: socket.socket) -> None:
@@ -32,7 +33,8 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
             lifespan="off",
             timeout_graceful_shutdown=5,
         )
-        uvicorn.Server(config).run(sockets=[listening])
+        with WebhookSender(store, inside=settings.webhooks_inside):
+            uvicorn.Server(config).run(sockets=[listening])
 
 
 if __name__ == "__main__":

@@ -25,8 +25,6 @@ from submissions.strict_table import StrictTable
 
 EXAMPLES = "examples"
 EXPECTED = "expected.toml"
-#: The example that must get full marks.
-REFERENCE = "reference"
 
 
 _Marks = Annotated[Decimal, BeforeValidator(str)]

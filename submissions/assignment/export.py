@@ -14,9 +14,9 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import FILE_NAME, assignment_folder
 from submissions.assignment.reader import ASIDE, read_assignment
+from submissions.assignment.task_sheet import TaskSheet, task_sheet
 
 _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
 _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
@@ -62,20 +62,19 @@ def export_for_students(assignment: str, target: Path) -> int:
     found = read_assignment(source)
     prefix = "starter/"
     starter = {name.removeprefix(prefix): data for name, data in _files(source).items() if name.startswith(prefix)}
-    return _write(target, {**found.given, **starter, "README.md": _task(found).encode()})
+    sheet = task_sheet(found)
+    return _write(target, {**sheet.given, **starter, "README.md": _task(sheet).encode()})
 
 
-def _task(assignment: Assignment) -> str:
-    """The task in Markdown. Of what is not visible to students it says only that there is more."""
-    shown = [criterion for criterion in assignment.criteria if criterion.visibility == "visible"]
-    lines = [f"# {assignment.title}", ""]
-    if assignment.description.strip():
-        lines += [assignment.description.strip(), ""]
+def _task(sheet: TaskSheet) -> str:
+    """The task in Markdown."""
+    lines = [f"# {sheet.title}", ""]
+    if sheet.description:
+        lines += [sheet.description, ""]
     lines += ["| Marks | For |", "|---:|---|"]
-    lines += [f"| {criterion.marks:g} | {criterion.title.replace('|', chr(92) + '|')} |" for criterion in shown]
-    if len(shown) < len(assignment.criteria):
-        rest = assignment.max_marks - sum(criterion.marks for criterion in shown)
-        lines += ["", f"{rest:g} more marks are for checks that are not shown here."]
+    lines += [f"| {marks:g} | {title.replace('|', chr(92) + '|')} |" for title, marks in sheet.criteria]
+    if sheet.more_marks:
+        lines += ["", f"{sheet.more_marks:g} more marks are for checks that are not shown here."]
     return "\n".join(lines) + "\n"
 
 

@@ -13,6 +13,8 @@ from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 
 FILE_NAME = "assignment.toml"
+#: The example that must get full marks.
+REFERENCE = "reference"
 
 
 def catalogue() -> tuple[str, ...]:

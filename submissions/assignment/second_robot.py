@@ -6,15 +6,17 @@ What a single table may hold is ``schema.py``; the rest of what has to fit toget
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from responders.code import Code
 from sim.recording import Pose
-from submissions.assignment.problems import Problems
-from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
-from submissions.assignment.toml_lines import Path as Place
-from submissions.document import list_of_tables
 from submissions.source_text import decode_source
 from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.problems import Problems
+    from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
+    from submissions.assignment.toml_lines import Path as Place
 
 #: As ``second_program``: what runs on the first robot runs on the second as well.
 SAME = "same"
@@ -33,6 +35,9 @@ def second_program_of(submission: Submission) -> Code | None:
 
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
     """Each robot has a program and a place to start from, and nobody has those of a robot that is not there."""
+    # With it come the schemas, which who only asks for the second robot's program does not need.
+    from submissions.document import list_of_tables
+
     scenarios = list(list_of_tables(document.get("scenario")))
     linked = world.robots == 2 and parts.responder == "none"
     for number, raw in enumerate(scenarios):

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ MANIFESTS = [
 ]
 UNITS = sorted(DEPLOY.glob("systemd/*.service"))
 FILES = [DEPLOY / "Dockerfile", *sorted(DEPLOY.rglob("*.yaml")), *UNITS]
-SETTINGS = {f"ROBOMARK_{name.upper()}" for name in Settings.model_fields}
+SETTINGS = {f"ROBOMARK_{each.name.upper()}" for each in fields(Settings)}
 
 
 def _containers() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:

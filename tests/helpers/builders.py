@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from secrets import token_hex
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from responders.code import Code
@@ -13,6 +16,7 @@ from service.grading.grade import Grade
 from service.settings import Settings
 from service.store import recordings
 from service.store.engine import Store, open_store
+from service.store.installation import secret_of
 from service.store.intake import Accepted, accept
 from service.store.states import Lane
 from sim.recording import Recording
@@ -32,8 +36,25 @@ def settings_in(folder: Path, **changes: Any) -> Settings:
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Store]:
+    """The tables in a database of these settings; an empty one is copied where the migrations would make the same."""
+    file = settings.home / "robomark.db"
+    if settings.database == f"sqlite:///{file}" and not file.exists():
+        settings.home.mkdir(mode=0o700, parents=True, exist_ok=True)
+        file.touch(mode=0o600)
+        tables, secret = _migrated()
+        file.write_bytes(tables.replace(secret, token_hex(32).encode()))
     with open_store(settings) as store:
         yield store
+
+
+@cache
+def _migrated() -> tuple[bytes, bytes]:
+    """What the migrations make of nothing, and the secret in it."""
+    with TemporaryDirectory() as folder:
+        settings = settings_in(Path(folder))
+        with open_store(settings) as store:
+            secret = secret_of(store)
+        return (settings.home / "robomark.db").read_bytes(), secret.text.encode()
 
 
 def echo() -> Assignment:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import report_builders
 from builders import echo, grading_request
-from service.store import credentials, intake, jobs, open_assignments, results
+from service.store import appeals, credentials, intake, jobs, open_assignments, results, webhooks
 from service.store.people import Member
 from service.store.versions import freeze
 from service.web.kept_uploads import KeptUploads
@@ -32,22 +32,32 @@ def make_world(web: Web) -> World:
     ada, grace = web.student("ada"), web.instructor("grace")
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
+    given = replace(echo(), given={"notes.txt": b"counts from 0"})
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare(session, 1, freeze(given))
+        open_assignments.open_for_students(session, 1, given.id)
     web.token(ada, "read")
-    with web.store.reading() as session:
+    with web.store.transaction() as session:
         (token,) = credentials.tokens(session, ada.person_id)
+        appeal = appeals.ask(session, 1, "Please look again.")
+        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"], "grace")
     values = {
         "course_id": "1",
         "batch_id": batch.id,
         "job_id": batch.jobs[0].job_id,
         "submission_id": "1",
         "assignment": "echo-responder",
+        "file": "notes.txt",
+        "enrolment_id": str(ada.enrolment_id),
+        "student_id": str(web.student("leaver").enrolment_id),
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
-        "enrolment_id": str(ada.enrolment_id),
         "upload_id": _upload(web, grace),
+        "webhook_id": hook.id,
+        "criterion": report_builders.faulty_grade().criteria[0].id,
+        "comment_id": "1",
+        "appeal_id": str(appeal),
     }
     return World(ada, grace, values)
 

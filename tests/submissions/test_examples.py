@@ -18,8 +18,8 @@ from service.grading.hints import near_misses
 from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment.examples import REFERENCE, Expectation, examples, expected
-from submissions.assignment.folder import catalogue
+from submissions.assignment.examples import Expectation, examples, expected
+from submissions.assignment.folder import REFERENCE, catalogue
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import pack_submission, read_submission, unpack_submission
 from submissions.criteria import Criterion

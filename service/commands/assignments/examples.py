@@ -18,8 +18,8 @@ from service.grading.statistics import statistics_of
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
 from sim.errors import AssignmentError
-from submissions.assignment.examples import EXAMPLES, EXPECTED, REFERENCE, add_expected
-from submissions.assignment.folder import FILE_NAME, catalogue
+from submissions.assignment.examples import EXAMPLES, EXPECTED, add_expected
+from submissions.assignment.folder import FILE_NAME, REFERENCE, catalogue
 
 
 def check(assignment: str | None, *, write_expected: bool) -> None:

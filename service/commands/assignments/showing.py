@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from service.commands.assignments.which import Which, count_words
@@ -17,7 +16,7 @@ def show(assignment: Which) -> None:
     """What an assignment asks for, and how it is marked."""
     from rich.text import Text
 
-    from service.reports.readable import one_line, readable
+    from service.reports.readable import flowing, one_line, readable
     from submissions.assignment.reader import find_assignment
 
     found = find_assignment(assignment)
@@ -26,7 +25,7 @@ def show(assignment: Which) -> None:
     title = Text(one_line(found.title), style="bold")
     show_parts(title.append(f" ({found.id}), {found.max_marks:g} marks", style="not bold"))
     if found.description:
-        show_parts(Text(_flowing(readable(found.description.strip(), 20_000, lines=500))))
+        show_parts(Text(flowing(readable(found.description.strip(), 20_000, lines=500))))
     show_parts(f"\n{_setting(found)}")
     if found.given:
         show_parts(f"given files: {', '.join(sorted(found.given))}")
@@ -80,8 +79,3 @@ def _setting(found: Assignment) -> str:
         f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
         f"of a notebook: {_cell(found.parts.cell)}"
     )
-
-
-def _flowing(text: str) -> str:
-    """Paragraphs on one line each, to be broken by whoever shows them; lists and indented lines stay."""
-    return re.sub(r"(?<=\S)\n(?=[^\W\d])", " ", text)

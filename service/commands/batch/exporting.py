@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from service.batch_rows import rows_of, why_not_shown
-from service.commands.batch.tables import unjudged_words
+from service.commands.batch.words import unjudged_words
 from service.commands.shown import document, note, tell
 from service.grading.grade import Grade
 from service.home import for_the_user

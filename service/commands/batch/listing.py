@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.commands.batch.tables import summary
+from service.commands.batch.words import summary
 from service.commands.shown import document, show, table
 from service.settings import load_settings
 from service.store import batches

@@ -8,9 +8,8 @@ from service.commands.batch.tables import (
     history_table,
     marks_table,
     rank_table,
-    summary,
-    unjudged_words,
 )
+from service.commands.batch.words import summary, unjudged_words
 from service.commands.shown import document, show, tell
 from service.commands.statistics_shown import statistics_parts
 from service.grading.statistics import statistics_of

@@ -9,35 +9,23 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
+from service.commands.batch.words import out_of, remarks
 from service.commands.shown import table
-from service.store.policies import in_days
-from service.store.states import BatchState, JobState, Standing
+from service.store.states import JobState, Standing
 
 if TYPE_CHECKING:
-    from decimal import Decimal
-
     from rich.console import RenderableType
     from rich.table import Table
 
     from service.grading.ranks import RankTable
     from service.store.audit import AuditEntry
-    from service.store.batches import BatchLine, JobLine
+    from service.store.batches import JobLine
     from service.store.regrades import Change, CriterionChange
     from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
 )
-
-#: Students that a sentence names.
-_MOST_NAMED = 10
-
-
-def summary(line: BatchLine) -> str:
-    """How many jobs of a batch are in each state."""
-    parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
-    return held + (", ".join(parts) or "empty")
 
 
 def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> Table:
@@ -54,7 +42,7 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
         outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
         made.add_row(
             *who(line.student, line.name, line.assignment),
-            _out_of(line.marks, line.max_marks),
+            out_of(line.marks, line.max_marks),
             accuracy,
             Text("; ".join([outcome, *remarks(line)]), style=_STYLES.get(line.state, "")),
             line.id,
@@ -80,8 +68,8 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
     for change in shown:
         made.add_row(
             change.student,
-            _out_of(change.before, change.before_max),
-            _out_of(change.after, change.after_max),
+            out_of(change.before, change.before_max),
+            out_of(change.after, change.after_max),
             "; ".join(_criterion(criterion) for criterion in change.criteria),
             Text(change.reason, style=_STYLES.get(change.state, "")),
             change.job_id,
@@ -111,31 +99,6 @@ def history_table(history: Sequence[AuditEntry]) -> Table:
     return made
 
 
-def remarks(line: JobLine) -> list[str]:
-    """What else is to be known of a grade, beside its marks."""
-    told = {
-        f"same as {line.copied_from}": line.copied_from is not None,
-        f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
-        f"staff only: {line.staff_only}": line.staff_only is not None,
-        f"no {line.missing}": bool(line.missing),
-        f"{line.unjudged} criteria not judged": line.unjudged > 0,
-        f"{line.surprises} trials that the log explains": line.surprises > 0,
-        "suspect": line.suspect is not None,
-        "published": line.published_at is not None,
-    }
-    return [remark for remark, holds in told.items() if holds]
-
-
-def unjudged_words(lines: Sequence[JobLine]) -> str:
-    """Whose grades lack the judgement of a criterion; empty where none does."""
-    students = [line.student for line in lines if line.unjudged]
-    if not students:
-        return ""
-    told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
-    whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
-    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
-
-
 def _worth_a_row(change: Change) -> bool:
     return (
         change.differs or bool(change.criteria) or change.state is not JobState.DONE or "unexplained" in change.reason
@@ -143,11 +106,5 @@ def _worth_a_row(change: Change) -> bool:
 
 
 def _criterion(change: CriterionChange) -> str:
-    before, after = (_out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
+    before, after = (out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
     return f"{change.title}: {before} to {after}"
-
-
-def _out_of(marks: Decimal | None, most: Decimal | None) -> str:
-    if marks is None:
-        return ""
-    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"

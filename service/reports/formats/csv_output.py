@@ -14,7 +14,7 @@ from service.reports.formats.registry import table
 from service.reports.readable import number, one_line
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
-from service.reports.words import hints_of
+from service.reports.words import comments_of, hints_of
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 _WHO = ("student", "name", "email", "assignment")
@@ -58,7 +58,8 @@ def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
 
 
 def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
-    by_id = {result.id: number(result.marks) for result in grade.criteria}
+    excused = {each.id for each in grade.criteria if each.set_by_hand is not None and each.set_by_hand.excused}
+    by_id = {result.id: "" if result.id in excused else number(result.marks) for result in grade.criteria}
     accuracy = grade.accuracy
     measured = [f"{accuracy.value:.4f}", f"{accuracy.low:.4f}", f"{accuracy.high:.4f}"] if accuracy else [""] * 3
     return [
@@ -71,7 +72,7 @@ def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
         "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
-        "; ".join(grade.notes[:20]),
+        "; ".join([*(f"Comment: {comment}" for comment in comments_of(grade)), *grade.notes[:20]]),
         " ".join(hints_of(grade)),
     ]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from decimal import Decimal
 from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
@@ -16,14 +17,14 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import grade_words, hints_of
+from service.reports.words import comments_of, grade_words, hints_of
 
 
 def gradescope_document(view: GradebookView) -> dict[str, Any]:
     """The grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
     grade = view.entry
     return {
-        "score": json_number(grade.marks),
+        "score": json_number(view.marks or Decimal(0)),
         "output": _output(view),
         "output_format": "text",
         "test_output_format": "text",
@@ -89,7 +90,8 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
 def _output(view: GradebookView) -> str:
     shown = view.shown
     words = grade_words(shown)
-    lines = [*hints_of(shown), words.happened, words.whose, words.next_step]
+    lines = [f"Comment: {comment}" for comment in comments_of(shown)]
+    lines += [*hints_of(shown), words.happened, words.whose, words.next_step]
     for group in fault_groups(shown, limit=10):
         lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
     lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from service.grading.grade import Accuracy, Grade
+from service.grading.grade import Accuracy, Grade, SetByHand
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
 from service.reports.rows import TableRow
@@ -40,6 +40,7 @@ def json_document(view: View) -> dict[str, Any]:
                 "max_marks": json_number(result.max_marks),
                 "message": storable(result.message),
                 **({"for_staff": storable(result.for_staff)} if result.for_staff else {}),
+                **({"set_by_hand": _by_hand(result.set_by_hand)} if result.set_by_hand is not None else {}),
             }
             for result in grade.criteria
         ],
@@ -58,6 +59,7 @@ def json_document(view: View) -> dict[str, Any]:
         ],
         "accuracy": _accuracy(grade.accuracy),
         "notes": [storable(note) for note in grade.notes],
+        **({"comments": [asdict(comment) for comment in grade.comments]} if grade.comments else {}),
         **({"missing": grade.missing} if grade.missing else {}),
         **({"cost": asdict(grade.cost)} if grade.cost else {}),
     }
@@ -89,6 +91,12 @@ def _of_several(row: TableRow[View]) -> dict[str, Any]:
         none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
         return {**who, **why, **none}
     return {**who, **why, **json_document(row.grade)}
+
+
+def _by_hand(said: SetByHand) -> dict[str, Any]:
+    """What the grader gave of how much, None where it could not be judged; and what was done about it."""
+    graded = None if said.graded is None else json_number(said.graded)
+    return {"from": graded, "of": json_number(said.worth), "excused": said.excused, "reason": storable(said.reason)}
 
 
 def _said(recording: Recording) -> dict[str, Any]:

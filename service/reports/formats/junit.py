@@ -13,7 +13,7 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
-from service.reports.words import hints_of
+from service.reports.words import comments_of, hints_of
 from sim.recording import Verdict
 
 _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
@@ -102,6 +102,7 @@ def _properties(grade: Grade) -> list[tuple[str, str]]:
         ("marks", number(grade.marks)),
         ("max_marks", number(grade.max_marks)),
         ("verdict", grade.verdict.value),
+        *(("comment", comment) for comment in comments_of(grade)),
         *(("hint", hint) for hint in hints_of(grade)),
         ("assignment_version", grade.assignment_version),
         ("submission", grade.submission),

@@ -19,7 +19,7 @@ from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import hints_of
+from service.reports.words import comments_of, hints_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -66,7 +66,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         line = lines[place]
         line += [""] * (len(lines[0]) - len(line))
         if row.grade is not None:
-            _check_maximum(row.grade.entry.max_marks, line, places)
+            _check_maximum(row.grade.entry.worth, line, places)
             line[places[_GRADE]] = _marks(row)
         feedback = places.get(_FEEDBACK)
         # What waits leaves standing what somebody wrote.
@@ -95,7 +95,7 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
 
 
 def _marks(row: TableRow[GradebookView]) -> str:
-    return "" if row.grade is None else number(row.grade.entry.marks)
+    return "" if row.grade is None or row.grade.marks is None else number(row.grade.marks)
 
 
 def _feedback(row: TableRow[GradebookView]) -> str:
@@ -104,8 +104,8 @@ def _feedback(row: TableRow[GradebookView]) -> str:
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    hints = () if row.grade is None else hints_of(row.grade.shown)
-    return one_line(" ".join([*hints, "; ".join(lines)]), _LONGEST)
+    said = () if row.grade is None else (*comments_of(row.grade.shown), *hints_of(row.grade.shown))
+    return one_line(" ".join([*said, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:

@@ -16,7 +16,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.formats.registry import on_terminal
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, channel_words, cost_words, grade_words, hints_of
+from service.reports.words import accuracy_words, channel_words, comments_of, cost_words, grade_words, hints_of
 
 _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 
@@ -29,7 +29,8 @@ def rich_report(view: View) -> RenderableType:
     heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
     verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", f"{words.happened} {words.next_step}")
     hints = [Padding(Text(hint, style="bold"), (0, 0, 0, 2)) for hint in hints_of(grade)]
-    parts: list[RenderableType] = [heading, *hints, marks_table(grade), verdict]
+    written = [Padding(Text(f"Comment: {comment}"), (0, 0, 0, 2)) for comment in comments_of(grade)]
+    parts: list[RenderableType] = [heading, *hints, *written, marks_table(grade), verdict]
     parts += [_fault(group) for group in fault_groups(grade)]
     if grade.accuracy is not None:
         parts.append(Text(accuracy_words(grade)))

@@ -11,7 +11,7 @@ from service.reports.faults import FaultGroup, fault_groups
 from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, channel_words, cost_words, grade_words, hints_of
+from service.reports.words import accuracy_words, channel_words, comments_of, cost_words, grade_words, hints_of
 
 _WIDTH = 96
 
@@ -26,6 +26,8 @@ def plain_text(view: View) -> str:
     lines += [f"{number(grade.marks)} of {number(grade.max_marks)} marks; {words.short}", ""]
     for hint in hints_of(grade):
         lines += [*_wrapped(f"→ {hint}", indent=2), ""]
+    for comment in comments_of(grade):
+        lines += [*_wrapped(f"Comment: {comment}", indent=2), ""]
     for result in grade.criteria:
         marks = f"{number(result.marks)}/{number(result.max_marks)}"
         lines += _wrapped(f"{marks:>9}  {one_line(result.title)}", indent=11)

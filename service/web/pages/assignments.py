@@ -27,8 +27,8 @@ from service.web.moments import written_moment
 from service.web.rendering import page
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXAMPLES, REFERENCE
-from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
+from submissions.assignment.examples import EXAMPLES
+from submissions.assignment.folder import FILE_NAME, REFERENCE, assignment_folder, catalogue
 from submissions.assignment.overview import overview
 from submissions.assignment.reader import find_in_catalogue, read_assignment
 from submissions.bundle import read_submission

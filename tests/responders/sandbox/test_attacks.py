@@ -9,7 +9,7 @@ import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -30,8 +30,9 @@ from battery import (
     run,
     unread,
 )
-from responders.sandbox import private_folders, zygote
+from responders.sandbox import private_folders, reading_dates, zygote
 from responders.sandbox.manager import Sandboxes
+from responders.sandbox.reading_dates import read_beforehand
 from responders.sandbox.zygote import Isolation, Role
 
 ATTACKS = attacks()
@@ -161,12 +162,27 @@ def test_without_its_layer_it_gets_through(
     assert outcome.startswith("LEAK"), outcome
 
 
+@pytest.fixture(scope="module")
+def read() -> set[str]:
+    """What was read beforehand and holds for all trees: of Python and its packages."""
+    return set()
+
+
 @pytest.fixture
-def tree(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def tree(monkeypatch: pytest.MonkeyPatch, read: set[str]) -> Iterator[Path]:
     """What is readable of ours, with more in it to leave a trace on."""
+
+    def read_the_rest(paths: Iterable[str], listed: Iterable[str] = ()) -> str | None:
+        rest = set(paths) - read
+        dated = read_beforehand(rest, listed)
+        if dated is None:
+            read.update(path for path in rest if not path.startswith(made))
+        return dated
+
     with tempfile.TemporaryDirectory() as made:
         folder = readable_tree(Path(made))
         monkeypatch.setattr(zygote, "_package_folder", lambda name: folder / name)
+        monkeypatch.setattr(reading_dates, "read_beforehand", read_the_rest)
         yield folder
 
 

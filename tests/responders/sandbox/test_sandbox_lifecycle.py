@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 
 from benchmarks.harness.process_tree import command_line
 from paths import HELPERS
+from responders.sandbox import zygote
 from responders.sandbox.meter import JobMeter
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -172,3 +174,20 @@ def _wait_until(condition: object, seconds: float = 30) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.01)
+
+
+def test_what_children_import_is_compiled_once_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    (tmp_path / "package").mkdir()
+    sources = [tmp_path / "module.py", tmp_path / "package" / "__init__.py"]
+    for source in sources:
+        source.write_text("value = 1\n")
+    kept = [Path(importlib.util.cache_from_source(source)) for source in sources]
+    zygote.keep_bytecode(tmp_path)
+    before = [each.read_bytes() for each in kept]
+    sources[0].write_text("value = 'another'\n")
+    os.utime(kept[0], (1, 1))
+    zygote.keep_bytecode.cache_clear()
+    zygote.keep_bytecode(tmp_path)
+    assert b"another" in kept[0].read_bytes()
+    assert kept[1].read_bytes() == before[1]

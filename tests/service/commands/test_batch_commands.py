@@ -10,7 +10,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
+import command
 from service.reports.written import file_stem
 from service.settings import Settings
 from service.store.engine import open_store
@@ -35,10 +35,7 @@ class Ended:
 
 def robomark(home: Path, *arguments: str | Path, **environment: str) -> Ended:
     """Run the command with its home in ``home``; a traceback is never an answer."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("ROBOMARK_")}
-    environment = {**kept, "ROBOMARK_HOME": str(home), "COLUMNS": "200", **environment}
-    command = [sys.executable, "-c", "from service.cli import main; main()", *map(str, arguments)]
-    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    ended = command.robomark(*arguments, ROBOMARK_HOME=str(home), **{"COLUMNS": "200", **environment})
     assert "Traceback" not in ended.stderr
     return Ended(ended.returncode, ended.stdout, ended.stderr)
 
@@ -153,10 +150,9 @@ def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
     shutil.copytree(examples("echo-responder") / "reference", own)
     (own / "robot.py").write_text("while True:\n    pass\n")
     home = tmp_path / "home"
-    command = [sys.executable, "-c", "from service.cli import main; main()"]
-    command += ["batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]
+    submit = [*command.COMMAND, "batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]
     environment = {**os.environ, "ROBOMARK_HOME": str(home)}
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as waiting:
+    with subprocess.Popen(submit, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as waiting:
         while _running(home) == 0:
             assert waiting.poll() is None
             time.sleep(0.1)

@@ -5,23 +5,25 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
 
 from builders import echo, grading_request
 from command import robomark
-from forked_command import EndedCommand, forked
 from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
-from service.store import jobs, open_assignments, results
+from service.store import appeals, comments, jobs, open_assignments, overrides, results
 from service.store.engine import now, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
+from service.store.models import Job
 from service.store.versions import freeze
 from submissions.assignment.examples import examples
 from submissions.people import Refusal, Student
@@ -60,12 +62,23 @@ SHOWING = {
     "models list": "models",
     "models compare digits digits-28": "models curves",
     "show GRADE": "job grade",
+    "mark set GRADE asks-aloud 1.5 --reason heard": "job",
+    "mark excuse GRADE asks-aloud --reason ill": "job",
+    "mark withdraw GRADE names-the-right-shape": "job",
+    "mark comment GRADE good --criterion asks-aloud": "job",
+    "mark uncomment GRADE 1": "job",
+    "mark history GRADE": "grade criteria comments history",
+    "appeals list": "appeals",
+    "appeals answer 1 yes": "appeal",
     "course policy": "policies",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
     "course prepare echo-responder": "assignment title open opened_at closed_at version",
     "course open echo-responder": "assignment title open opened_at closed_at version",
     "course close echo-responder": "assignment title open opened_at closed_at version",
+    "course export-student ada -o ada-all.zip": "student output bytes",
+    "course delete-student cyd --for-good": "submissions grades",
+    "course purge --older-than 9000": "removed archive submissions grades students",
     "user add grace --name Grace": "id path url",
     "user link ada": "id path url",
     "user token ada --scope read": "id token scopes days",
@@ -131,6 +144,10 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
             own = replace(grade, secret_sha256=secret_of(store).sha256)
             jobs.finish(store, claim, results.prepare(own), at)
             grades.append(claim.job_id)
+        with store.transaction() as session:
+            overrides.set_marks(session, grades[0], "names-the-right-shape", Decimal(6), "seen again", "staff")
+            comments.comment(session, grades[0], "", "Well done.", "staff")
+            appeals.ask(session, session.get_one(Job, grades[0]).submission_id, "Why?")
     return folder, {"BATCH": batch.id, "GRADE": grades[0]}
 
 
@@ -141,10 +158,10 @@ def test_a_command_tells_the_same_in_words_and_as_a_document(
     database, ids = home
     words = [ids.get(word, word) for word in line.split()]
     plain, document = (_ended(tmp_path / option, database, *words, option) for option in ("--quiet", "--json"))
-    assert plain.err == ""
-    assert plain.out.strip()
-    assert not _BOXES_AND_ESCAPES.search(plain.out), plain.out
-    told = json.loads(document.out)
+    assert plain.stderr == ""
+    assert plain.stdout.strip()
+    assert not _BOXES_AND_ESCAPES.search(plain.stdout), plain.stdout
+    told = json.loads(document.stdout)
     assert told["schema"] == 1
     assert told.keys() == {"schema", *keys.split()}
 
@@ -152,7 +169,7 @@ def test_a_command_tells_the_same_in_words_and_as_a_document(
 def test_a_pipe_gets_whole_names_and_a_row_a_line(home: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
     database, ids = home
     ended = _ended(tmp_path / "at work", database, "batch", "status", ids["BATCH"], COLUMNS="40", FORCE_COLOR="")
-    row = next(line for line in ended.out.splitlines() if line.startswith("eve"))
+    row = next(line for line in ended.stdout.splitlines() if line.startswith("eve"))
     assert f"[red]odd.txt: is {_LONG} and no submission" in row
 
 
@@ -164,13 +181,13 @@ def test_no_command_has_another_meaning_for_the_assignments_letter_or_another_na
         assert "--report" not in options or words == ("grade",), words
 
 
-def _ended(folder: Path, database: Path, *words: str, **environment: str) -> EndedCommand:
+def _ended(folder: Path, database: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """The command in a folder with what the lines name, on a copy of the database."""
     folder.mkdir()
     shutil.copytree(database, folder / "home")
     shutil.copytree(examples("echo-responder") / "reference", folder / "new" / "dan")
     (folder / "robot.py").write_text("print('hello')\n")
     (folder / "people.csv").write_text("id,name,email\nada,Ada Lovelace,ada@example.org\n")
-    ended = forked(folder, *words, ROBOMARK_HOME=str(folder / "home"), **environment)
-    assert ended.status == 0, ended
+    ended = robomark(*words, folder=folder, ROBOMARK_HOME=str(folder / "home"), **environment)
+    assert ended.returncode == 0, ended
     return ended

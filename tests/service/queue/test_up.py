@@ -39,15 +39,23 @@ def _environment(settings: Settings) -> dict[str, str]:
 
 
 def _address(up: subprocess.Popen[str]) -> str:
+    return _first_words(up)[0]
+
+
+def _first_words(up: subprocess.Popen[str]) -> tuple[str, str]:
+    """Where it answers, and all that it said of itself."""
     assert up.stdout is not None
     first = up.stdout.readline()
     found = re.search(r"http://[\w.:]+", first)
     assert found is not None, first + (up.stderr.read() if up.stderr and up.poll() is not None else "")
-    return found[0]
+    return found[0], first
 
 
 def _ready(up: subprocess.Popen[str]) -> str:
-    address = _address(up)
+    address, first = _first_words(up)
+    link = re.search(r"sign in by (http://[\w.:]+/sign-in/rml_[\w-]+)", first)
+    assert link is not None, first
+    until(lambda: "This link signs you in as" in _get(link[1])[1])
     assert up.stdout is not None
     ready = json.loads(up.stdout.readline())
     assert ready["event"] == "up.ready"

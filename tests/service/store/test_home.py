@@ -16,7 +16,7 @@ import pytest
 from sqlalchemy import text
 
 from builders import settings_in
-from command import COMMAND
+from command import robomark
 from service.home import open_home
 from service.queue.processes import end_processes, start_process
 from service.store.engine import open_store
@@ -28,15 +28,7 @@ AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files
 
 
 def _robomark(home: Path, umask: int, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        env=os.environ | {"ROBOMARK_HOME": str(home)},
-        umask=umask,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    return robomark(*arguments, umask=umask, ROBOMARK_HOME=str(home))
 
 
 def _mode(path: Path) -> int:

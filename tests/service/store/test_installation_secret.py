@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import re
 import shutil
 import sqlite3
+from dataclasses import replace
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import pytest
 from sqlalchemy import update
 
 from battery import scrambled
-from command import robomark
+from command import FORKING, robomark
 from first_release import lay_first_release
 from responders.code import Code
 from service import home_secret
@@ -42,9 +42,8 @@ def _put_secret(settings: Settings, found: Queue[str]) -> None:
 
 
 def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
-    spawned = multiprocessing.get_context("spawn")
-    found: Queue[str] = spawned.Queue()
-    processes = [spawned.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
+    found: Queue[str] = FORKING.Queue()
+    processes = [FORKING.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
     for process in processes:
         process.start()
     secrets = {found.get(timeout=120) for _ in processes}
@@ -52,7 +51,7 @@ def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
         process.join()
     (secret,) = secrets
     assert re.fullmatch(r"[0-9a-f]{64}", secret)
-    _put_secret(service_settings, again := spawned.Queue())
+    _put_secret(service_settings, again := FORKING.Queue())
     assert again.get(timeout=60) == secret
 
 
@@ -78,7 +77,7 @@ def test_a_database_that_lost_it_is_not_graded_with(service_settings: Settings) 
 
 
 def test_the_environments_wins(service_settings: Settings) -> None:
-    settings = service_settings.model_copy(update={"secret": Settings(secret=SECRET).secret})
+    settings = replace(service_settings, secret=Secret(SECRET))
     with open_store(settings) as store:
         assert secret_of(store) == secret_here(settings) == Secret(SECRET)
     with open_store(service_settings) as store:

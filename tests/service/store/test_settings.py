@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,8 @@ from sim.errors import UsageError
 @pytest.fixture(autouse=True)
 def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(SECRET_FILES, raising=False)
-    for name in Settings.model_fields:
-        monkeypatch.delenv(f"ROBOMARK_{name.upper()}", raising=False)
+    for each in fields(Settings):
+        monkeypatch.delenv(f"ROBOMARK_{each.name.upper()}", raising=False)
 
 
 def test_the_home_is_the_users_data_directory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import report_builders
 from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request, settings_in
 from service.settings import Settings
-from service.store import jobs, regrades, results
+from service.store import appeals, comments, jobs, overrides, regrades, results
 from service.store.backup import back_up, restore
 from service.store.engine import Store, open_engine, open_store
 from service.store.installation import secret_of
@@ -22,7 +22,7 @@ from service.store.intake import accept_batch, accept_new
 from service.store.models import Artifact, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.purge import Purged, purge
 from service.store.states import JobState
-from service.store.web_tables import METADATA
+from service.store.web_tables import METADATA, Appeal, Comment, Override
 from sim.errors import HostError, UsageError
 
 GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
@@ -52,13 +52,24 @@ def _grade_all(store: Store) -> None:
 
 
 def _filled(store: Store) -> str:
-    """Two students, a copy of a grade, a regrade, and one submission that still waits. The first batch."""
+    """Two students, a copy of a grade that an instructor looked at, a regrade, and one that waits. The first batch."""
     first = _batch(store, "first", "ada", "bob 🤖")
-    accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3)
+    copied = accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
+    assert copied is not None
+    _look_again(store, copied.jobs[0].job_id)
     regrades.regrade(store, first, None, max_attempts=3, actor="staff")
     _grade_all(store)
     accept_batch(store, "waits", [grading_request("mia")], [], max_attempts=3)
     return first
+
+
+def _look_again(store: Store, job_id: str) -> None:
+    """The student appeals, and an instructor sets marks, comments and answers."""
+    with store.transaction() as session:
+        appeal = appeals.ask(session, session.get_one(Job, job_id).submission_id, "Why?")
+        overrides.excuse(session, job_id, GRADE.criteria[0].id, "was ill", "staff")
+        comments.comment(session, job_id, "", "Well done.", "staff")
+        appeals.answer(session, 1, appeal, "See there.", "staff")
 
 
 def _rows(store: Store) -> dict[str, list[Any]]:
@@ -129,7 +140,7 @@ def _counts(store: Store) -> dict[str, int]:
     return {kind.__tablename__: count for kind, count in found.items()}
 
 
-_COUNTED = (Batch, SubmissionRow, Job, TrialRow, Artifact, Enrolment, Person)
+_COUNTED = (Batch, SubmissionRow, Job, TrialRow, Artifact, Enrolment, Person, Override, Comment, Appeal)
 
 
 def _age(store: Store, *students: str) -> None:
@@ -153,6 +164,7 @@ def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
     assert {name: before[name] - after[name] for name in before} == {
         "batch": 1, "submission": 1, "job": 1, "trial": before["trial"] - after["trial"],
         "artifact": before["artifact"] - after["artifact"], "enrolment": 1, "person": 1,
+        "override": 1, "comment": 1, "appeal": 1,
     }  # fmt: skip
     assert after["trial"] < before["trial"]
     # Of the same students' newer work nothing is missing.
@@ -180,4 +192,5 @@ def test_nothing_is_left_when_all_is_old(store: Store) -> None:
     assert jobs_left.submissions == 3
     assert _counts(store) == {
         "batch": 1, "submission": 1, "job": 1, "trial": 0, "artifact": 0, "enrolment": 1, "person": 1,
+        "override": 0, "comment": 0, "appeal": 0,
     }  # fmt: skip

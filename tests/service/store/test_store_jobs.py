@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections import Counter
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,6 +12,7 @@ from sqlalchemy import func, select, update
 
 import report_builders
 from builders import accept_one, grading_request, settings_in
+from command import FORKING
 from service.settings import Settings
 from service.store import batch_control, batches, jobs, plots, results
 from service.store.engine import Store, open_store
@@ -292,9 +292,8 @@ def _race(settings: Settings, number: int, counts: Any) -> None:
 def test_four_processes_claim_no_job_twice(service_settings: Settings) -> None:
     with open_store(service_settings) as store:
         _batch(store, "race", 60)
-    spawned = multiprocessing.get_context("spawn")
-    counts = spawned.Queue()
-    racers = [spawned.Process(target=_race, args=(service_settings, number, counts)) for number in range(4)]
+    counts = FORKING.Queue()
+    racers = [FORKING.Process(target=_race, args=(service_settings, number, counts)) for number in range(4)]
     for racer in racers:
         racer.start()
     claimed = [job_id for _ in racers for job_id in counts.get(timeout=120)]
@@ -311,8 +310,7 @@ def test_four_processes_claim_no_job_twice(service_settings: Settings) -> None:
 def test_two_batches_at_once_number_attempts_one_by_one(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     open_store(settings).close()
-    spawned = multiprocessing.get_context("spawn")
-    submitters = [spawned.Process(target=_submit_again, args=(settings,)) for _ in range(3)]
+    submitters = [FORKING.Process(target=_submit_again, args=(settings,)) for _ in range(3)]
     for submitter in submitters:
         submitter.start()
     for submitter in submitters:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
+from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
@@ -14,6 +14,7 @@ from sqlalchemy import func, inspect, select, text
 
 import report_builders
 from builders import accept_one
+from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
 from service.store import artifacts, batches, intake, jobs, results
@@ -42,8 +43,7 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:
-    spawned = multiprocessing.get_context("spawn")
-    processes = [spawned.Process(target=_open, args=(service_settings,)) for _ in range(4)]
+    processes = [FORKING.Process(target=_open, args=(service_settings,)) for _ in range(4)]
     for process in processes:
         process.start()
     for process in processes:
@@ -122,6 +122,6 @@ def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None
 def test_a_database_that_is_away_is_named_without_its_password(service_settings: Settings) -> None:
     url = "postgresql+psycopg://someone:hush@127.0.0.1:1/nowhere"
     with pytest.raises(HostError) as caught:
-        open_store(service_settings.model_copy(update={"database_url": url}))
+        open_store(replace(service_settings, database_url=url))
     assert "127.0.0.1" in str(caught.value)
     assert "hush" not in str(caught.value)

@@ -12,7 +12,7 @@ from sqlalchemy import select, update
 
 import report_builders
 from builders import echo, grading_request
-from service.commands.batch.tables import unjudged_words
+from service.commands.batch.words import unjudged_words
 from service.grading.grade import Grade
 from service.store import audit, batch_control, batches, jobs, regrades, results
 from service.store.engine import Store

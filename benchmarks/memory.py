@@ -1,0 +1,58 @@
+"""What a worker holds in memory, with the processes that it forks from, and how that grows from trial to trial.
+
+Of memory that processes share each counts its part, which other processes change; growth is of what is each one's own.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+from benchmarks.measurement import MEGABYTES, Measurement
+
+_WARM, _TRIALS = 400, 1000
+#: Grades short submissions, and prints the megabytes held in the end, and its own after the first and after the last.
+_WORKER = """
+import gc, json, os, sys
+from pathlib import Path
+from benchmarks.graded_store import short_request
+from benchmarks.harness.process_tree import descendants
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+
+def held(kind):
+    gc.collect()
+    total = 0
+    for pid in (os.getpid(), *descendants(os.getpid())):
+        lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+        total += next(int(line.split()[1]) for line in lines if line.startswith(kind))
+    return total / 1024
+
+def graded(count, first):
+    done = 0
+    while done < count:
+        asked = short_request(f"student {first + done}")
+        done += len(grade(asked.submission, asked.assignment, runner=runner).trials)
+
+with TrialRunner() as runner:
+    graded(int(sys.argv[1]), 0)
+    before = held("Private_Dirty:")
+    graded(int(sys.argv[2]), 10_000)
+    print(json.dumps([held("Pss:"), before, held("Private_Dirty:")]))
+"""
+
+
+def measure(_times: int) -> list[Measurement]:
+    """About half a minute."""
+    command = [sys.executable, "-c", _WORKER, str(_WARM), str(_TRIALS)]
+    try:
+        held, before, after = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    except subprocess.CalledProcessError as error:
+        raise RuntimeError(f"the worker ends with {error.returncode}: {error.stderr}") from None
+    return [
+        Measurement("memory of a worker and of what it forks from", held, MEGABYTES, 400),
+        Measurement(
+            f"its growth in {_TRIALS} trials", after - before, MEGABYTES, 1, told=f"from {before:.1f} MB of its own"
+        ),
+    ]

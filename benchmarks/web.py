@@ -1,0 +1,177 @@
+"""What people wait for on the web: the page of a batch of 2000, and a class of 200 that uploads within a minute.
+
+Real time, so a busy machine shows: run it alone. ``python -m benchmarks web`` runs it by itself.
+"""
+
+from __future__ import annotations
+
+import http.client
+import random
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+
+from sqlalchemy import func, select
+
+from benchmarks import many_rows
+from benchmarks.graded_store import ASSIGNMENT, graded_batch, short_request
+from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.measurement import COUNT, MILLISECONDS, SECONDS, Measurement, median
+from service.queue.supervisor import Supervisor
+from service.settings import load_settings
+from service.store import credentials, open_assignments, people
+from service.store.engine import Store, open_store
+from service.store.metrics import quantile
+from service.store.models import Job
+from service.store.states import CredentialKind, JobState
+from service.store.students import DEFAULT_COURSE
+from service.store.versions import freeze
+from service.web.access import CSRF_HEADER, SESSION_COOKIE, csrf_word
+from service.web.listening import listen
+from submissions.assignment.reader import find_assignment
+from submissions.people import Student
+
+_STUDENTS = 200
+_WITHIN_SECONDS = 60.0
+_AT_A_TIME = 20
+_PATIENCE_SECONDS = 900.0
+_BOUNDARY = "part"
+
+
+@dataclass(frozen=True, slots=True)
+class _Browser:
+    """Somebody who is signed in at a server on this machine."""
+
+    port: int
+    secret: str
+
+    def get(self, path: str) -> tuple[int, float]:
+        """The status of an answer, and how many seconds it took to the last byte."""
+        return self._ask("GET", path, b"", {})
+
+    def upload(self, path: str, files: Sequence[tuple[str, str]]) -> tuple[int, float]:
+        parts = [
+            f'--{_BOUNDARY}\r\nContent-Disposition: form-data; name="files"; filename="{name}"\r\n\r\n{text}\r\n'
+            for name, text in files
+        ]
+        body = ("".join(parts) + f"--{_BOUNDARY}--\r\n").encode()
+        headers = {
+            "content-type": f"multipart/form-data; boundary={_BOUNDARY}",
+            CSRF_HEADER: csrf_word(self.secret),
+        }
+        return self._ask("POST", path, body, headers)
+
+    def _ask(self, method: str, path: str, body: bytes, headers: dict[str, str]) -> tuple[int, float]:
+        begun = time.perf_counter()
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            connection.request(method, path, body, {"cookie": f"{SESSION_COOKIE}={self.secret}", **headers})
+            answer = connection.getresponse()
+            answer.read()
+            return answer.status, time.perf_counter() - begun
+        finally:
+            connection.close()
+
+
+def measure(times: int) -> list[Measurement]:
+    """The page, then the class; both on PostgreSQL."""
+    with PostgresqlServer() as server:
+        return [*_page(server, max(times, 5)), *_class(server)]
+
+
+def _page(server: PostgresqlServer, times: int) -> list[Measurement]:
+    with ExitStack() as held:
+        store, port = _served(held, server, workers=1)
+        many_rows.fill(store, graded_batch(store))
+        with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            connection.exec_driver_sql("VACUUM ANALYZE")
+        browser = _Browser(port, _session(store, _instructor(store)))
+        path = f"/courses/1/batches/{many_rows.batch_name(3)}"
+        for _ in range(2):
+            status, _ = browser.get(path)
+        taken = [browser.get(path)[1] for _ in range(times)]
+    if status != 200:
+        raise RuntimeError(f"the page of a batch answered {status}")
+    told = f"most {1000 * max(taken):.0f} ms"
+    return [Measurement("web, PostgreSQL: page of a batch of 2000", 1000 * median(taken), MILLISECONDS, 300, told=told)]
+
+
+def _instructor(store: Store) -> int:
+    """An instructor of the first course."""
+    with store.transaction() as session:
+        return people.make_instructor(session, DEFAULT_COURSE, Student("instructor")).person_id
+
+
+def _class(server: PostgresqlServer) -> list[Measurement]:
+    with ExitStack() as held:
+        store, port = _served(held, server, workers=2)
+        names = [f"student-{number}" for number in range(_STUDENTS)]
+        with store.transaction() as session:
+            members = [people.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
+            open_assignments.prepare(session, 1, freeze(find_assignment(ASSIGNMENT)))
+            open_assignments.open_for_students(session, 1, ASSIGNMENT)
+        browsers = [_Browser(port, _session(store, person_id)) for person_id in members]
+        begun = time.monotonic()
+        moments = sorted(random.Random(1).uniform(0, _WITHIN_SECONDS) for _ in names)
+
+        def upload(number: int) -> tuple[int, float]:
+            time.sleep(max(0.0, begun + moments[number] - time.monotonic()))
+            asked = short_request(names[number]).submission
+            assert asked.program is not None
+            assert asked.responder is not None
+            files = [("robot.py", asked.program.text), ("responder.py", asked.responder.text)]
+            return browsers[number].upload(f"/courses/1/mine/{ASSIGNMENT}", files)
+
+        with ThreadPoolExecutor(_AT_A_TIME) as pool:
+            answers = list(pool.map(upload, range(_STUDENTS)))
+        last = _until_graded(store, begun)
+        with store.reading() as session:
+            kept = session.scalar(select(func.count()).select_from(Job)) or 0
+            graded = session.scalar(select(func.count()).where(Job.state == JobState.DONE)) or 0
+    taken = sorted(seconds for _, seconds in answers)
+    lost = _STUDENTS - min(kept, graded, sum(status == 303 for status, _ in answers))
+    what = f"web, PostgreSQL, 2 workers: {_STUDENTS} students upload within a minute"
+    told = f"half {quantile(taken, 0.5):.3f} s, 19 of 20 {quantile(taken, 0.95):.3f} s"
+    return [
+        Measurement(f"{what}: slowest answer", taken[-1], SECONDS, 1.0, told=told),
+        Measurement(f"{what}: lost", lost, COUNT, 0),
+        Measurement(f"{what}: the last is graded after", last, SECONDS),
+    ]
+
+
+def _served(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
+    """The service on an empty database, when it is ready; and the port that its web server answers on."""
+    folder = held.enter_context(tempfile.TemporaryDirectory())
+    settings = load_settings(home=Path(folder), database_url=fresh_database(server.url), concurrency=1)
+    store = held.enter_context(open_store(settings))
+    listening = held.enter_context(listen("127.0.0.1", 0))
+    service = held.enter_context(Supervisor(settings, store, workers, listening))
+    service.ensure()
+    begun = time.monotonic()
+    while not service.ready:
+        if time.monotonic() - begun > _PATIENCE_SECONDS:
+            raise RuntimeError("the service does not come up")
+        time.sleep(0.1)
+    port: int = listening.getsockname()[1]
+    return store, port
+
+
+def _session(store: Store, person_id: int) -> str:
+    with store.transaction() as session:
+        return credentials.issue(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
+
+
+def _until_graded(store: Store, begun: float) -> float:
+    while True:
+        with store.reading() as session:
+            left = session.scalar(select(func.count()).where(Job.state.in_((JobState.QUEUED, JobState.RUNNING))))
+        if not left:
+            return time.monotonic() - begun
+        if time.monotonic() - begun > _PATIENCE_SECONDS:
+            raise RuntimeError("the class's submissions do not come to an end")
+        time.sleep(0.1)

@@ -1,0 +1,53 @@
+"""What commands say of a batch and of its jobs in words; the tables beside it are ``tables.py``'s."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import Decimal
+
+from service.store.batches import BatchLine, JobLine
+from service.store.policies import in_days
+from service.store.states import BatchState, JobState
+
+#: Students that a sentence names.
+_MOST_NAMED = 10
+
+
+def summary(line: BatchLine) -> str:
+    """How many jobs of a batch are in each state."""
+    parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
+    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
+    return held + (", ".join(parts) or "empty")
+
+
+def remarks(line: JobLine) -> list[str]:
+    """What else is to be known of a grade, beside its marks."""
+    told = {
+        f"same as {line.copied_from}": line.copied_from is not None,
+        f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
+        f"staff only: {line.staff_only}": line.staff_only is not None,
+        f"no {line.missing}": bool(line.missing),
+        f"{line.unjudged} criteria not judged": line.unjudged > 0,
+        f"{line.set_by_hand} criteria set by hand": line.set_by_hand > 0,
+        f"{line.surprises} trials that the log explains": line.surprises > 0,
+        "suspect": line.suspect is not None,
+        "published": line.published_at is not None,
+    }
+    return [remark for remark, holds in told.items() if holds]
+
+
+def unjudged_words(lines: Sequence[JobLine]) -> str:
+    """Whose grades lack the judgement of a criterion; empty where none does."""
+    students = [line.student for line in lines if line.unjudged]
+    if not students:
+        return ""
+    told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
+    whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
+    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
+
+
+def out_of(marks: Decimal | None, most: Decimal | None) -> str:
+    """Marks and the most there are; empty where there are none."""
+    if marks is None:
+        return ""
+    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"

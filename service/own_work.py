@@ -1,0 +1,176 @@
+"""What a student asks of their own work: what is open, what they submitted, and what marks they see of it.
+
+Reads what is stored and lets ``reports.view`` decide what of it is shown; what to do with it is the pages'.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from decimal import Decimal
+
+from sqlalchemy import Select, func, select
+from sqlalchemy.orm import Session
+
+from service.reports.view import student_view
+from service.store import open_assignments, policies, results
+from service.store.engine import now
+from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.policies import PolicyLimits
+from service.store.states import UNFINISHED, BatchState, JobState, Standing
+
+#: Of one student and one assignment; a student who submits more often sees the newest.
+MOST_SHOWN = 50
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSubmission:
+    """One of a student's submissions, with the marks that its student sees; None while there are none."""
+
+    id: int
+    job_id: str
+    assignment: str
+    title: str
+    attempt: int
+    source: str
+    submitted_at: datetime
+    days_late: int
+    staff_only: str  # the limit that it is over
+    state: JobState
+    held_back: bool  # its batch is paused or called off
+    progress: float
+    suspect: bool
+    superseded: bool
+    marks: Decimal | None = None
+    max_marks: Decimal | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether something is still to come."""
+        return self.state in UNFINISHED
+
+    @property
+    def shown(self) -> bool:
+        """Whether its student may see its grade."""
+        return self.state is JobState.DONE and not self.suspect and not self.staff_only
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """How often, and for how long yet, a student may submit to an assignment."""
+
+    limits: PolicyLimits
+    attempts_made: int
+    left: timedelta | None  # until the due date, their own; below zero when it is over, None where there is none
+    late_left: timedelta | None  # until nothing counts any more
+
+    @property
+    def attempts_left(self) -> int | None:
+        """None where there is no limit."""
+        return None if self.limits.attempts is None else max(0, self.limits.attempts - self.attempts_made)
+
+    @property
+    def days_left(self) -> int:
+        """Whole days until the due date, and what is left of the last one."""
+        return 0 if self.left is None else max(0, math.ceil(self.left / timedelta(days=1)))
+
+
+@dataclass(frozen=True, slots=True)
+class OwnAssignment:
+    """An assignment as its student sees it in a list."""
+
+    assignment: str
+    title: str
+    open: bool
+    allowance: Allowance
+    newest: OwnSubmission | None
+
+
+def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
+    """What is open to a student or was submitted by them: first what is open and due soonest."""
+    newest: dict[str, OwnSubmission] = {}
+    # Only the newest of each assignment is looked at closely.
+    latest = (
+        select(SubmissionRow.assignment, func.max(SubmissionRow.attempt).label("attempt"))
+        .where(SubmissionRow.enrolment_id == enrolment_id)
+        .group_by(SubmissionRow.assignment)
+        .subquery()
+    )
+    query = _submissions(enrolment_id).join(
+        latest, (latest.c.assignment == SubmissionRow.assignment) & (latest.c.attempt == SubmissionRow.attempt)
+    )
+    for row in session.execute(query):
+        found = _submission(session, *row)
+        newest[found.assignment] = found
+    prepared = open_assignments.of_course(session, course_id)
+    titles = {each.assignment: each.title for each in prepared if each.open}
+    is_open = frozenset(titles)
+    titles = {name: each.title for name, each in newest.items()} | titles
+    lines = [
+        OwnAssignment(name, title, name in is_open, allowance(session, enrolment_id, name), newest.get(name))
+        for name, title in titles.items()
+    ]
+    return sorted(lines, key=_by_urgency)
+
+
+def own_submissions(session: Session, enrolment_id: int, assignment: str) -> list[OwnSubmission]:
+    """A student's submissions to an assignment, the newest first."""
+    query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment)
+    rows = session.execute(query.order_by(SubmissionRow.attempt.desc()).limit(MOST_SHOWN))
+    return [_submission(session, *row) for row in rows]
+
+
+def own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
+    """One of a student's submissions; None where they have none of this id."""
+    row = session.execute(_submissions(enrolment_id).where(SubmissionRow.id == submission_id)).one_or_none()
+    return None if row is None else _submission(session, *row)
+
+
+def allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
+    """What a student may still do, extensions included."""
+    limits, at = policies.limits(session, enrolment_id, assignment), now(session)
+    return Allowance(
+        limits,
+        policies.attempts_made(session, enrolment_id, assignment),
+        None if limits.due_at is None else limits.due_at - at,
+        None if limits.closed_at is None else limits.closed_at - at,
+    )
+
+
+def _submissions(enrolment_id: int) -> Select[SubmissionRow, Job, str, BatchState | None]:
+    return (
+        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state)
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+    )
+
+
+def _submission(session: Session, row: SubmissionRow, job: Job, title: str, batch: BatchState | None) -> OwnSubmission:
+    found = OwnSubmission(
+        id=row.id,
+        job_id=job.id,
+        assignment=row.assignment,
+        title=title,
+        attempt=row.attempt,
+        source=row.source,
+        submitted_at=row.submitted_at or row.created_at,
+        days_late=row.days_late,
+        staff_only=row.staff_only or "",
+        state=job.state,
+        held_back=batch not in (None, BatchState.OPEN),
+        progress=job.progress,
+        suspect=job.suspect is not None,
+        superseded=(job.error or "").startswith("superseded by "),
+    )
+    if not found.shown:
+        return found
+    shown = student_view(results.load_marks(session, job.id), policies.released(session, job.id)).grade
+    return replace(found, marks=shown.marks, max_marks=shown.max_marks)
+
+
+def _by_urgency(line: OwnAssignment) -> tuple[bool, bool, timedelta, str]:
+    left = line.allowance.left
+    return not line.open, left is None or left < timedelta(0), left or timedelta(0), line.title

@@ -1,0 +1,74 @@
+"""One tryout from claim to what came of it: what a worker does when it is notified that a student tries a program.
+
+Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
+"""
+
+from __future__ import annotations
+
+import time
+
+import structlog
+
+from service.grading.grader import GradingProgress
+from service.grading.trial_runner import TrialRunner
+from service.settings import Settings
+from service.store import tryouts
+from service.store.engine import Store
+from service.store.tryouts import TryoutClaim
+from service.store.versions import assignment_from_bytes
+from service.trying import run_tryout, tryout_assignment
+from sim.errors import Cancelled, HostError, UsageError
+from sim.recording import Verdict
+from submissions.bundle import unpack_submission
+
+_log = structlog.get_logger(__name__)
+
+
+def try_next(store: Store, settings: Settings, runner: TrialRunner) -> bool:
+    """Run the tryout that has waited longest, if there is one; false where a fault of ours ended it."""
+    claimed = tryouts.claim(store, settings.lease_seconds)
+    if claimed is None:
+        return True
+    with structlog.contextvars.bound_contextvars(tryout=claimed.id, attempt=claimed.attempt):
+        try:
+            _run(store, settings, runner, claimed)
+        except Cancelled as error:
+            _log.info("tryout.stopped", reason=str(error))
+        except UsageError as error:
+            tryouts.finish(store, claimed, {"refused": str(error)}, None)
+        except Exception:
+            # Whatever it was, it was not the student: their faults come back as verdicts.
+            _log.exception("tryout.host_error")
+            tryouts.fail(store, claimed, "Something went wrong here, not with your program; try it again in a minute.")
+            return False
+    return True
+
+
+def _run(store: Store, settings: Settings, runner: TrialRunner, claimed: TryoutClaim) -> None:
+    with store.reading() as session:
+        packed, content = tryouts.kept(session, claimed.id)
+    assignment = assignment_from_bytes(content)
+    once = tryout_assignment(assignment)
+    if once is None:
+        raise UsageError(f"{assignment.id} has nothing to try: no robot is run that you see.")
+    result = run_tryout(unpack_submission(packed), once, runner, _LeaseOfTryout(store, settings, claimed))
+    if result.verdict is Verdict.HOST_ERROR:
+        raise HostError("a trial ended by a fault of the machine")
+    tryouts.finish(store, claimed, result.words, result.replay)
+
+
+class _LeaseOfTryout:
+    """Keeps the lease while a program runs, and stops it when the lease is lost."""
+
+    def __init__(self, store: Store, settings: Settings, claimed: TryoutClaim) -> None:
+        self._store = store
+        self._seconds = settings.lease_seconds
+        self._claimed = claimed
+        self._kept = time.monotonic()
+
+    def __call__(self, progress: GradingProgress, /) -> None:
+        if time.monotonic() - self._kept < self._seconds / 3:
+            return
+        if not tryouts.keep(self._store, self._claimed, self._seconds):
+            raise Cancelled("another worker has it")
+        self._kept = time.monotonic()

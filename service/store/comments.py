@@ -1,0 +1,71 @@
+"""What instructors write to the student of a submission, for all of it or one criterion. It changes no marks.
+
+When a student sees it is ``reports/view.py``'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import exists, select
+from sqlalchemy.orm import Session
+
+from service.store import audit
+from service.store.engine import now
+from service.store.models import CriterionResultRow, Job
+from service.store.web_tables import Comment
+from sim.errors import UsageError
+
+LONGEST_COMMENT = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class CommentLine:
+    """One comment; an empty ``criterion`` is for all of the submission."""
+
+    id: int
+    criterion: str
+    text: str
+    actor: str
+    made_at: datetime
+
+
+def comment(session: Session, job_id: str, criterion: str, text: str, actor: str) -> int:
+    """Write a comment on this grade's submission. Returns its id.
+
+    Raises UsageError for a criterion that the grade does not have, or a text that is empty or too long.
+    """
+    text = text.replace("\r\n", "\n").strip()
+    if not 0 < len(text) <= LONGEST_COMMENT:
+        raise UsageError(f"the comment has {len(text)} characters, expected 1 to {LONGEST_COMMENT}")
+    known = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
+    if criterion and not session.scalar(select(known)):
+        raise UsageError(f"grade {job_id} has no criterion {criterion[:80]!r}")
+    submission_id = session.get_one(Job, job_id).submission_id
+    row = Comment(submission_id=submission_id, criterion=criterion, text=text, actor=actor, made_at=now(session))
+    session.add(row)
+    session.flush()
+    audit.note(session, actor, "comment", "submission", str(submission_id), criterion=criterion, comment=row.id)
+    return row.id
+
+
+def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None:
+    """Show a comment to nobody any more. Raises UsageError where this grade's submission has none of this id."""
+    submission_id = session.get_one(Job, job_id).submission_id
+    row = session.get(Comment, comment_id)
+    if row is None or row.submission_id != submission_id or row.withdrawn_at is not None:
+        raise UsageError(f"grade {job_id} has no comment {comment_id}")
+    row.withdrawn_at = now(session)
+    audit.note(session, actor, "withdraw comment", "submission", str(submission_id), comment=comment_id)
+
+
+def of_job(session: Session, job_id: str) -> list[CommentLine]:
+    """The comments on the submission of a job, the oldest first."""
+    query = (
+        select(Comment)
+        .join(Job, Job.submission_id == Comment.submission_id)
+        .where(Job.id == job_id, Comment.withdrawn_at.is_(None))
+        .order_by(Comment.id)
+    )
+    return [CommentLine(row.id, row.criterion, row.text, row.actor, row.made_at) for row in session.scalars(query)]

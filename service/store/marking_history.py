@@ -1,0 +1,57 @@
+"""What was done by hand to the marks of a submission, and by whom: the audit trail with its reasons and texts.
+
+They go when the submission is purged, and the trail stays without them. Only reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from service.store import audit
+from service.store.audit import AuditEntry
+from service.store.web_tables import Appeal, Comment, Override
+
+
+@dataclass(frozen=True, slots=True)
+class MarkingStep:
+    """One thing that somebody did; empty is what does not apply."""
+
+    at: datetime
+    actor: str
+    action: str
+    criterion: str
+    before: str
+    after: str
+    text: str  # a reason, a comment, an answer
+
+
+def history(session: Session, submission_id: int) -> list[MarkingStep]:
+    """All that was done, in order."""
+    texts = {
+        "override": _texts(session, submission_id, Override, Override.reason),
+        "comment": _texts(session, submission_id, Comment, Comment.text),
+        "appeal": _texts(session, submission_id, Appeal, Appeal.answer),
+    }
+    return [_step(entry, texts) for entry in audit.entries(session, "submission", str(submission_id))]
+
+
+def _step(entry: AuditEntry, texts: Mapping[str, Mapping[int, str]]) -> MarkingStep:
+    criterion, before, after = (str(entry.detail.get(name, "")) for name in ("criterion", "before", "after"))
+    text = next((found.get(entry.detail[kind], "") for kind, found in texts.items() if kind in entry.detail), "")
+    return MarkingStep(entry.at, entry.actor, entry.action, criterion, before, after, text)
+
+
+def _texts(
+    session: Session,
+    submission_id: int,
+    table: type[Override | Comment | Appeal],
+    text: InstrumentedAttribute[Any],
+) -> dict[int, str]:
+    rows = session.execute(select(table.id, text).where(table.submission_id == submission_id))
+    return {number: written or "" for number, written in rows}

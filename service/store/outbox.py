@@ -1,0 +1,196 @@
+"""What is to be told to webhooks: written in the transaction of what it tells of, then claimed and sent.
+
+Sending is the web server's, which addresses there are ``webhooks.py``'s. Where a course has none, nothing is written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import StrEnum
+from typing import Any
+
+from sqlalchemy import Select, and_, delete, func, or_, select, update
+from sqlalchemy.orm import Session
+
+from service.store.engine import Store, now
+from service.store.models import Batch, Enrolment, Job, SubmissionRow
+from service.store.states import UNFINISHED, JobState
+from service.store.web_tables import Delivery, Webhook
+
+#: For so long a delivery is tried; then it is given up.
+TRIED_FOR = timedelta(days=1)
+_FIRST_WAIT = timedelta(seconds=15)
+_LONGEST_WAIT = timedelta(hours=2)
+#: Whoever claimed a delivery has so long to send it, before another may.
+_LEASE = timedelta(minutes=2)
+_FORGOTTEN = timedelta(days=30)
+
+
+class WebhookEvent(StrEnum):
+    """What webhooks can be told of."""
+
+    GRADE_FINISHED = "grade.finished"
+    BATCH_FINISHED = "batch.finished"
+    GRADES_PUBLISHED = "grades.published"
+    APPEAL_OPENED = "appeal.opened"
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimedDelivery:
+    """One thing to be sent now, by whoever claimed it."""
+
+    id: str
+    url: str
+    secret: str
+    event: str
+    payload: Any
+    made_at: datetime
+    attempt: int  # 1 is the first
+
+
+def grade_finished(session: Session, job_id: str) -> None:
+    """A job has a grade now; its batch may have come to its end with it."""
+    if hooks := _of_job(session, job_id):
+        _grade_finished(session, hooks, job_id)
+        _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
+
+
+def grade_copied(session: Session, job_id: str) -> None:
+    """A job has the grade of an identical one, while its batch is still being taken in."""
+    if hooks := _of_job(session, job_id):
+        _grade_finished(session, hooks, job_id)
+
+
+def job_ended(session: Session, job_id: str) -> None:
+    """A job ended without a grade; its batch may have come to its end with it."""
+    if hooks := _of_job(session, job_id):
+        _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
+
+
+def batch_ended(session: Session, batch_id: str) -> None:
+    """Jobs of a batch ended; where none is left, tell that it is finished."""
+    course_id = select(Batch.course_id).where(Batch.id == batch_id).scalar_subquery()
+    if hooks := _hooks(session, select(Webhook).where(Webhook.course_id == course_id)):
+        _batch_ended(session, hooks, batch_id)
+
+
+def superseded(session: Session, submissions: Select[int], at: datetime) -> None:
+    """Jobs of these submissions were cancelled at this moment for newer ones."""
+    which = (Job.submission_id.in_(submissions), Job.state == JobState.CANCELLED, Job.finished_at == at)
+    for batch_id in session.scalars(select(Job.batch_id).where(*which, Job.batch_id.is_not(None)).distinct()).all():
+        batch_ended(session, str(batch_id))
+
+
+def grades_published(session: Session, course_id: int, **told: object) -> None:
+    """Grades were released to their students."""
+    _tell(session, _of_course(session, course_id), WebhookEvent.GRADES_PUBLISHED, told)
+
+
+def appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
+    """A student asks for a second look."""
+    of_submission = select(Enrolment.course_id).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
+    course_id = session.scalars(of_submission.where(SubmissionRow.id == submission_id)).one()
+    told = {"appeal": appeal_id, "submission": submission_id}
+    _tell(session, _of_course(session, course_id), WebhookEvent.APPEAL_OPENED, told)
+
+
+def claim(store: Store, most: int) -> list[ClaimedDelivery]:
+    """Take what is due; nobody else has it for a while."""
+    with store.reading() as session:
+        at = now(session)
+        due = (Delivery.delivered_at.is_(None), Delivery.due_at <= at)
+        if session.scalar(select(Delivery.id).where(*due).limit(1)) is None:
+            return []
+    with store.transaction() as session:
+        at = now(session)
+        given_up = (Delivery.delivered_at.is_(None), Delivery.due_at.is_(None), Delivery.made_at < at - _FORGOTTEN)
+        session.execute(delete(Delivery).where(or_(Delivery.delivered_at < at - _FORGOTTEN, and_(*given_up))))
+        query = (
+            select(Delivery, Webhook)
+            .join(Webhook, Delivery.webhook_id == Webhook.id)
+            .where(*due)
+            .order_by(Delivery.due_at, Delivery.id)
+            .limit(most)
+            .with_for_update(of=Delivery, skip_locked=True)
+        )
+        claimed = []
+        for delivery, hook in session.execute(query):
+            attempt = delivery.attempts + 1
+            mine = Delivery.id == delivery.id
+            session.execute(update(Delivery).where(mine).values(attempts=attempt, due_at=at + _LEASE))
+            claimed.append(
+                ClaimedDelivery(
+                    delivery.id,
+                    hook.url,
+                    hook.secret,
+                    delivery.event,
+                    delivery.payload,
+                    delivery.made_at,
+                    attempt,
+                )
+            )
+        return claimed
+
+
+def delivered(store: Store, claimed: ClaimedDelivery) -> None:
+    """It has arrived."""
+    with store.transaction() as session:
+        values = {"delivered_at": now(session), "error": None}
+        session.execute(update(Delivery).where(Delivery.id == claimed.id).values(**values))
+
+
+def failed(store: Store, claimed: ClaimedDelivery, error: str) -> None:
+    """It has not arrived: it is tried again later, or given up when a day has gone."""
+    wait = min(_FIRST_WAIT * 2 ** min(claimed.attempt - 1, 20), _LONGEST_WAIT)
+    with store.transaction() as session:
+        again = now(session) + wait
+        due_at = again if again < claimed.made_at + TRIED_FOR else None
+        mine = (Delivery.id == claimed.id, Delivery.attempts == claimed.attempt, Delivery.due_at.is_not(None))
+        session.execute(update(Delivery).where(*mine).values(due_at=due_at, error=error[:500]))
+
+
+def _grade_finished(session: Session, hooks: Sequence[Webhook], job_id: str) -> None:
+    query = select(Job.batch_id, Job.standing, SubmissionRow.id, SubmissionRow.assignment, SubmissionRow.attempt)
+    found = session.execute(query.join(SubmissionRow, Job.submission_id == SubmissionRow.id).where(Job.id == job_id))
+    batch_id, standing, submission_id, assignment, attempt = found.one()
+    told: dict[str, object] = {"job": job_id, "batch": batch_id, "standing": standing.value}
+    told |= {"submission": submission_id, "assignment": assignment, "attempt": attempt}
+    _tell(session, hooks, WebhookEvent.GRADE_FINISHED, told)
+
+
+def _of_job(session: Session, job_id: str) -> Sequence[Webhook]:
+    query = select(Webhook).join(Enrolment, Enrolment.course_id == Webhook.course_id)
+    return _hooks(session, query.join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == job_id))
+
+
+def _of_course(session: Session, course_id: int) -> Sequence[Webhook]:
+    return _hooks(session, select(Webhook).where(Webhook.course_id == course_id))
+
+
+def _hooks(session: Session, query: Select[Webhook]) -> Sequence[Webhook]:
+    return session.scalars(query.where(Webhook.revoked_at.is_(None)).order_by(Webhook.id)).all()
+
+
+def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | None) -> None:
+    if batch_id is None:
+        return
+    if session.get_bind().dialect.name == "postgresql":
+        # Of two workers that end the last two jobs at once, the second has to see what the first did.
+        number = int.from_bytes(hashlib.sha256(batch_id.encode()).digest()[:8], signed=True)
+        session.execute(select(func.pg_advisory_xact_lock(number)))
+    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
+    states = dict(session.execute(counted.group_by(Job.state)).all())
+    if states and not any(state in UNFINISHED for state in states):
+        told = {"batch": batch_id, "states": {state.value: count for state, count in states.items()}}
+        _tell(session, hooks, WebhookEvent.BATCH_FINISHED, told)
+
+
+def _tell(session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: Mapping[str, object]) -> None:
+    for hook in hooks:
+        if event.value in hook.events:
+            at = now(session)
+            payload = {"course": hook.course_id, "data": dict(told)}
+            session.add(Delivery(webhook_id=hook.id, event=event.value, payload=payload, made_at=at, due_at=at))

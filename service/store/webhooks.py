@@ -1,0 +1,124 @@
+"""Where a course wants to be told of what happens in it, and what became of what it was told.
+
+What is told, and when, is ``outbox.py``'s; sending is the web server's.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Collection
+from dataclasses import dataclass
+from datetime import datetime
+from urllib.parse import urlsplit
+
+from sqlalchemy import func, select, update
+from sqlalchemy.orm import Session
+
+from service.store import audit
+from service.store.engine import now
+from service.store.outbox import WebhookEvent
+from service.store.web_tables import Delivery, Webhook
+from sim.errors import UsageError
+
+LONGEST_URL = 1000
+MOST = 20
+
+
+@dataclass(frozen=True, slots=True)
+class WebhookLine:
+    """A webhook, as its course sees it."""
+
+    id: str
+    url: str
+    events: tuple[str, ...]
+    created_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class DeliveryLine:
+    """One thing that was told, or is to be."""
+
+    id: str
+    webhook_id: str
+    event: str
+    made_at: datetime
+    due_at: datetime | None  # None: given up
+    attempts: int
+    delivered_at: datetime | None
+    error: str | None
+
+
+def create(session: Session, course_id: int, url: str, events: Collection[str], actor: str) -> tuple[WebhookLine, str]:
+    """A new webhook, and the secret that its deliveries are signed with, which is told this once.
+
+    Raises UsageError for an address or an event that there is not, or where the course has many already.
+    """
+    _check_url(url)
+    known = [event.value for event in WebhookEvent]
+    if not events or not set(events) <= set(known):
+        raise UsageError(f"events: expected some of {', '.join(known)}")
+    of_course = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
+    if (session.scalar(select(func.count()).select_from(Webhook).where(*of_course)) or 0) >= MOST:
+        raise UsageError(f"this course has {MOST} webhooks; revoke one first")
+    secret = secrets.token_hex(32)
+    chosen = [event for event in known if event in events]
+    row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen, created_at=now(session))
+    session.add(row)
+    session.flush()
+    audit.note(session, actor, "create webhook", "course", str(course_id), webhook=row.id, url=url)
+    return _line(row), secret
+
+
+def of_course(session: Session, course_id: int) -> list[WebhookLine]:
+    """The webhooks of a course that are not revoked, the oldest first."""
+    mine = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
+    return [_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
+
+
+def revoke(session: Session, course_id: int, webhook_id: str, actor: str) -> bool:
+    """Tell it nothing any more, not even what waits; false where the course has none of this id."""
+    row = session.get(Webhook, webhook_id)
+    if row is None or row.course_id != course_id or row.revoked_at is not None:
+        return False
+    row.revoked_at = now(session)
+    waiting = (Delivery.webhook_id == webhook_id, Delivery.delivered_at.is_(None))
+    session.execute(update(Delivery).where(*waiting).values(due_at=None, error="the webhook was revoked"))
+    audit.note(session, actor, "revoke webhook", "course", str(course_id), webhook=webhook_id)
+    return True
+
+
+def deliveries(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[DeliveryLine]:
+    """What a course was told or is to be, the newest first; what follows on the one of this moment and id."""
+    query = select(Delivery).join(Webhook, Delivery.webhook_id == Webhook.id).where(Webhook.course_id == course_id)
+    if after is not None:
+        same = (Delivery.made_at == after[0]) & (Delivery.id > after[1])
+        query = query.where((Delivery.made_at < after[0]) | same)
+    return [
+        DeliveryLine(
+            row.id,
+            row.webhook_id,
+            row.event,
+            row.made_at,
+            row.due_at,
+            row.attempts,
+            row.delivered_at,
+            row.error,
+        )
+        for row in session.scalars(query.order_by(Delivery.made_at.desc(), Delivery.id).limit(limit))
+    ]
+
+
+def _check_url(url: str) -> None:
+    try:
+        parts = urlsplit(url)
+        well = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+    except ValueError:
+        well = False
+    if not well or not url.isascii() or not url.isprintable() or " " in url or len(url) > LONGEST_URL:
+        raise UsageError("url: expected http:// or https:// with a name, in ASCII")
+    if parts.username is not None or parts.fragment:
+        raise UsageError("url: expected neither a user nor a fragment in it")
+
+
+def _line(row: Webhook) -> WebhookLine:
+    return WebhookLine(row.id, row.url, tuple(row.events), row.created_at)

@@ -1,0 +1,108 @@
+"""A program run once without being marked: in the first scenario that students see, by a seed that everybody may know.
+
+The sandbox and the simulator are those of grading; whose program it is and who waits for it is ``store.tryouts``'s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service.grading.grade import Grade
+from service.grading.grader import Observe, grade
+from service.grading.trial_runner import TrialRunner
+from service.plotting import own_floors
+from service.reports.faults import fault_groups
+from service.reports.readable import readable
+from service.reports.replay.document import packed, replay_of_grade
+from service.reports.replay.trial import moment_hash
+from service.reports.transcript import transcript
+from service.reports.view import student_view
+from service.reports.words import grade_words
+from sim.recorded import faults_of
+from sim.recording import Verdict
+from submissions.assignment.definition import Assignment
+from submissions.criteria.code import SourceRules
+from submissions.seeds import PUBLIC
+from submissions.submission import Submission
+from submissions.sweep import NO_SWEEP
+
+#: Simulated; of an assignment that runs shorter, its own.
+LONGEST_SECONDS = 30.0
+_PROGRAM_CPU, _RESPONDER_CPU, _ALL_CPU, _ALL_SLEEP, _ALL_OUTPUT_MB = 3.0, 5.0, 10.0, 10.0, 8
+_MOST_LINES = 400
+_LONGEST_LINE = 400
+
+
+@dataclass(frozen=True, slots=True)
+class TryoutResult:
+    """What came of it: what is told, as plain data, and what the replay plays, compressed."""
+
+    verdict: Verdict
+    words: dict[str, Any]
+    replay: bytes | None
+
+
+def tryout_assignment(assignment: Assignment) -> Assignment | None:
+    """The one trial in which programs are tried; None where no robot is run that students see.
+
+    Nothing of it follows from a secret, nothing is marked, and no more is allowed than an assignment allows itself.
+    """
+    shown = next((each for each in assignment.scenarios if each.visibility == "visible"), None)
+    if shown is None or assignment.training is not None:
+        return None
+    limits = assignment.limits
+    once = replace(
+        shown,
+        poses=shown.poses[:1],
+        second_poses=shown.second_poses[:1],
+        choose="each",
+        trials=1,
+        seconds=min(shown.seconds, LONGEST_SECONDS),
+        light_noise=shown.light_noise[:1],
+        motor_noise=shown.motor_noise[:1],
+        sweep=NO_SWEEP,
+    )
+    return replace(
+        assignment,
+        scenarios=(once,),
+        # What may not be imported there may not be imported here.
+        criteria=tuple(each for each in assignment.criteria if isinstance(each, SourceRules)),
+        limits=replace(
+            limits,
+            program_cpu=min(limits.program_cpu, _PROGRAM_CPU),
+            responder_cpu=min(limits.responder_cpu, _RESPONDER_CPU),
+            all_cpu=min(limits.all_cpu or _ALL_CPU, _ALL_CPU),
+            all_sleep=min(limits.all_sleep, _ALL_SLEEP),
+            all_output_mb=min(limits.all_output_mb, _ALL_OUTPUT_MB),
+        ),
+        secret="",
+    )
+
+
+def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, observe: Observe) -> TryoutResult:
+    """Run a submission in the trial of a ``tryout_assignment``; raises as ``grade`` does."""
+    run = replace(grade(submission, once, secret=PUBLIC, runner=runner, observe=observe), criteria=(), hints=())
+    replay = replay_of_grade(student_view(run), submission, own_floors(once)) if run.trials else None
+    return TryoutResult(run.verdict, _words(run, submission), packed(replay) if replay else None)
+
+
+def _words(run: Grade, submission: Submission) -> dict[str, Any]:
+    ended = grade_words(run)
+    notes = (*run.notes, *(note for trial in run.trials for note in trial.recording.notes))
+    faults = [fault for trial in run.trials for fault in faults_of(trial.recording)]
+    lines = [line for trial in run.trials for line in transcript(trial.recording)]
+    return {
+        "tone": ended.tone,
+        "happened": ended.happened,
+        "whose": ended.whose,
+        "seconds": run.trials[0].recording.end_t if run.trials else 0.0,
+        "lines": [[round(t, 2), readable(text, _LONGEST_LINE)] for t, text in lines[:_MOST_LINES]],
+        "more_lines": max(0, len(lines) - _MOST_LINES),
+        "faults": [
+            {"where": fault.where, "message": fault.message, "hint": fault.hint}
+            for fault in fault_groups(run, submission)
+        ],
+        "failed": moment_hash(1, faults[0].t) if faults else "",
+        "notes": [readable(text, _LONGEST_LINE) for text in notes],
+    }

@@ -1,0 +1,63 @@
+"""Whose token it is, and the courses that they have a role in."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends
+from pydantic import Field
+from sqlalchemy import select
+
+from service.store.models import Course
+from service.web.api.shapes import CourseShape, Shape, like
+from service.web.api_access import Called, Caller, with_scope
+from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.context import Context, WebContext
+
+router = api_router("me")
+
+
+class MeShape(Shape):
+    """The owner of the token."""
+
+    name: str
+    operator: bool = Field(description="Whether they run the installation.")
+    scopes: list[str] = Field(description="What the token may do of what its owner may.")
+    courses: list[CourseShape]
+
+    model_config = like(
+        name="Grace Hopper",
+        operator=False,
+        scopes=["mark", "read"],
+        courses=[{"id": 1, "name": "TM129", "role": "instructor"}],
+    )
+
+
+@router.get("/me")
+def me(caller: Called, context: Context) -> MeShape:
+    """Whose token this is, and what it may do."""
+    identity = caller.identity
+    return MeShape(
+        name=identity.name,
+        operator=identity.operator,
+        scopes=sorted(identity.scopes or ()),
+        courses=_courses(context, caller),
+    )
+
+
+@router.get("/courses")
+def courses(
+    caller: Annotated[Caller, Depends(with_scope("read"))], context: Context, limit: Limit = 50, after: After = ""
+) -> Listed[CourseShape]:
+    """The courses that the token's owner has a role in, in the order in which they were made."""
+    place = place_after(after, int)
+    beyond = 0 if place is None else place[0]
+    found = [each for each in _courses(context, caller) if each.id > beyond]
+    return page_of(found[: limit + 1], limit, lambda each: [each.id])
+
+
+def _courses(context: WebContext, caller: Caller) -> list[CourseShape]:
+    roles = caller.identity.roles
+    with context.store.reading() as session:
+        rows = session.scalars(select(Course).where(Course.id.in_(roles)).order_by(Course.id)).all()
+    return [CourseShape(id=row.id, name=row.name, role=roles[row.id]) for row in rows]

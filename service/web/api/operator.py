@@ -1,0 +1,191 @@
+"""What whoever runs the installation asks: how much waits, who works, what could not be graded."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import Depends
+from pydantic import BaseModel, Field
+
+from service.doctor import examine_service
+from service.store import batch_control, dead_letters, workers
+from service.store.metrics import collect
+from service.store.models import Batch
+from service.store.states import JobState, Lane
+from service.version import GRADER_VERSION
+from service.web.access import nothing_here
+from service.web.api.batches import RetriedShape
+from service.web.api.shapes import Shape, like
+from service.web.api_access import Caller, operating
+from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.context import Context
+
+router = api_router("operator")
+Reads = Annotated[Caller, Depends(operating("read"))]
+Manages = Annotated[Caller, Depends(operating("manage"))]
+
+
+class LaneShape(Shape):
+    """How much waits in a lane."""
+
+    lane: Lane
+    queued: int
+    running: int
+    oldest_seconds: float = Field(description="How long the oldest job that could be claimed has waited.")
+
+
+class FindingShape(Shape):
+    """One thing that grading needs, and how it is."""
+
+    what: str
+    well: bool
+    sentence: str
+
+
+class ServiceShape(Shape):
+    """The whole service at one moment."""
+
+    version: str
+    ready: bool
+    lanes: list[LaneShape]
+    findings: list[FindingShape]
+    dead: int = Field(description="Jobs that could not be graded.")
+    paused_batches: int
+
+    model_config = like(
+        version="0.2.0",
+        ready=True,
+        lanes=[{"lane": "batch", "queued": 12, "running": 2, "oldest_seconds": 3.5}],
+        findings=[{"what": "database", "well": True, "sentence": "answers"}],
+        dead=0,
+        paused_batches=0,
+    )
+
+
+class WorkerShape(Shape):
+    """One worker."""
+
+    name: str
+    host: str
+    concurrency: int
+    grader_version: str
+    sandbox: str
+    started_at: datetime
+    seen_at: datetime
+    lately: bool = Field(description="Whether it was heard of just now.")
+    quarantine: str | None = Field(description="What it got wrong, where it may grade no more.")
+
+    model_config = like(
+        name="worker@host",
+        host="host",
+        concurrency=2,
+        grader_version="0.2.0",
+        sandbox="user namespace, Landlock, seccomp",
+        started_at="2026-11-02T09:00:00Z",
+        seen_at="2026-11-02T10:00:00Z",
+        lately=True,
+        quarantine=None,
+    )
+
+
+class DeadShape(Shape):
+    """One job that was given up."""
+
+    job_id: str
+    course: str
+    batch_id: str | None
+    lane: Lane
+    error: str
+    attempts: int
+    worker: str
+    finished_at: datetime | None
+
+    model_config = like(
+        job_id="7xk2v9q4m0ab",
+        course="TM129",
+        batch_id="0c5w1r8zt3ye",
+        lane="batch",
+        error="Tried 3 times, the last time: the disk is full",
+        attempts=3,
+        worker="worker@host",
+        finished_at="2026-11-02T09:10:00Z",
+    )
+
+
+class RetryAsked(BaseModel):
+    """Which dead jobs to queue again."""
+
+    batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="None: of all batches.")
+
+
+@router.get("/operator")
+def service(_operator: Reads, context: Context) -> ServiceShape:
+    """How the service is: what waits, and whether all that grading needs is well."""
+    findings = examine_service(context.settings, context.store)
+    with context.store.reading() as session:
+        found = collect(session)
+        dead = dead_letters.count(session)
+    return ServiceShape(
+        version=GRADER_VERSION,
+        ready=all(finding.well for finding in findings),
+        lanes=[
+            LaneShape(
+                lane=lane,
+                queued=found.jobs.get((lane, JobState.QUEUED), 0),
+                running=found.jobs.get((lane, JobState.RUNNING), 0),
+                oldest_seconds=found.oldest_seconds.get(lane, 0.0),
+            )
+            for lane in Lane
+        ],
+        findings=[FindingShape.model_validate(finding) for finding in findings],
+        dead=dead,
+        paused_batches=found.paused_batches,
+    )
+
+
+@router.get("/operator/workers")
+def list_workers(_operator: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
+    """The workers that are known, by name."""
+    place = place_after(after, str)
+    with context.store.reading() as session:
+        quarantined = {each.worker: each.reason for each in workers.in_quarantine(session)}
+        seen = workers.known_workers(session)
+    shown = [
+        WorkerShape(
+            name=each.worker.name,
+            host=each.worker.host,
+            concurrency=each.worker.concurrency,
+            grader_version=each.worker.grader_version,
+            sandbox=each.worker.sandbox,
+            started_at=each.started_at,
+            seen_at=each.seen_at,
+            lately=each.lately,
+            quarantine=quarantined.get(each.worker.name),
+        )
+        for each in seen
+        if place is None or each.worker.name > place[0]
+    ]
+    return page_of(shown[: limit + 1], limit, lambda each: [each.name])
+
+
+@router.get("/operator/dead")
+def list_dead(_operator: Reads, context: Context) -> Listed[DeadShape]:
+    """The newest jobs that could not be graded."""
+    with context.store.reading() as session:
+        found = dead_letters.dead_letters(session)
+    return Listed(items=[DeadShape.model_validate(each) for each in found])
+
+
+@router.post("/operator/retry")
+def retry(operator: Manages, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
+    """Queue again what could not be graded, of one batch or of all."""
+    batch_id = None if asked is None else asked.batch_id
+    if batch_id is not None:
+        with context.store.reading() as session:
+            if session.get(Batch, batch_id) is None:
+                raise nothing_here()
+    retried = batch_control.retry(context.store, batch_id, actor=operator.actor)
+    for lane in Lane:
+        context.notifier.grade(lane, retried.queued)
+    return RetriedShape.model_validate(retried)

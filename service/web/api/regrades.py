@@ -1,0 +1,198 @@
+"""Grading a batch again, what that changes, letting grades stand and releasing them; and writing them out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+from fastapi import Depends, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from service.batch_export import ExportedFile, export_file
+from service.reports.formats import FORMATS
+from service.store import batches, open_assignments, regrades
+from service.store.states import JobState, Lane, Role, Standing
+from service.web.access import RowName, batch_in
+from service.web.api.grades import nameless
+from service.web.api.shapes import Shape, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.batch_uploads import assignment_of
+from service.web.context import Context, WebContext
+
+router = api_router("batches")
+Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
+Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
+#: A form of another system, filled in.
+_LONGEST_WORKSHEET = 10 * 2**20
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The file.", "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}}}
+}
+_CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}}, **NO_KEY}
+Form = Annotated[
+    str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
+]
+Published = Annotated[bool, Query(description="Only grades that are published.")]
+
+
+class RegradeAsked(BaseModel):
+    """What to grade a batch again by."""
+
+    assignment: str = Field(
+        "",
+        max_length=100,
+        description="An assignment as the course or the catalogue has it now; empty: as each was graded before.",
+        examples=["shape-recognition"],
+    )
+
+
+class RegradedShape(Shape):
+    """A batch of regrades, and how many submissions were left out."""
+
+    batch_id: str
+    jobs: int
+    other_assignment: int
+    unfinished: int
+
+    model_config = like(batch_id="4pd83mzs7k1h", jobs=20, other_assignment=0, unfinished=0)
+
+
+class CriterionChangeShape(Shape):
+    """One criterion whose marks differ, as [marks, the most there are]; null where the assignment did not have it."""
+
+    title: str
+    before: tuple[float, float] | None
+    after: tuple[float, float] | None
+
+
+class ChangeShape(Shape):
+    """A regrade beside the grade that it may replace."""
+
+    student: str
+    job_id: str
+    before_id: str
+    state: JobState
+    standing: Standing
+    before: float | None
+    after: float | None
+    before_max: float | None
+    after_max: float | None
+    differs: bool
+    criteria: list[CriterionChangeShape]
+    reason: str
+
+    model_config = like(
+        student="ada",
+        job_id="7xk2v9q4m0ab",
+        before_id="9c0e2b7h5rtw",
+        state="done",
+        standing="proposed",
+        before=10,
+        after=12,
+        before_max=12,
+        after_max=12,
+        differs=True,
+        criteria=[{"title": "Names the shapes", "before": [4, 6], "after": [6, 6]}],
+        reason="assignment changed",
+    )
+
+
+class PublishAsked(BaseModel):
+    """How grades are published."""
+
+    anyway: bool = Field(False, description="Also where a criterion could not be judged: it gives no marks.")
+
+
+class PublishedShape(Shape):
+    """How many grades are published now that were not, and what was left out."""
+
+    published: int
+    replaced: int
+    unfinished: int
+    dead: int
+    staff_only: int
+    unjudged: int
+
+    model_config = like(published=19, replaced=0, unfinished=0, dead=1, staff_only=0, unjudged=0)
+
+
+@router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
+def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
+    """Grade a batch again; the old grades stand until somebody publishes."""
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+        changed = assignment_of(session, here.course_id, asked.assignment) if asked and asked.assignment else None
+    most = context.settings.max_attempts
+    made = regrades.regrade(context.store, batch_id, changed, max_attempts=most, actor=here.actor)
+    context.notifier.grade(Lane.BATCH, made.jobs)
+    return RegradedShape.model_validate(made)
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/changes")
+def changes(
+    here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+) -> Listed[ChangeShape]:
+    """What a batch of regrades changes, by student; nothing for a batch that is none."""
+    place = place_after(after, str)
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+        found = regrades.changes(session, batch_id)
+        hidden = open_assignments.with_names_hidden(session, here.course_id)
+        shown = {line.id: nameless(line, hidden).student for line in batches.job_lines(session, batch_id)}
+    ids = [each.job_id for each in found]
+    start = 0 if place is None else ids.index(place[0]) + 1 if place[0] in ids else len(ids)
+    page = page_of(found[start : start + limit + 1], limit, lambda each: [each.job_id])
+    told = [replace(each, student=shown.get(each.job_id, each.student)) for each in page.items]
+    return Listed(items=[ChangeShape.model_validate(each) for each in told], next=page.next)
+
+
+@router.post("/courses/{course_id}/batches/{batch_id}/publish")
+def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
+    """Let the newest grades of a batch stand, and release them to the students."""
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+    anyway = asked is not None and asked.anyway
+    return PublishedShape.model_validate(regrades.publish(context.store, batch_id, actor=here.actor, anyway=anyway))
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE, response_class=Response)
+def export(
+    here: Reads, context: Context, batch_id: RowName, form: Form = "csv", published: Published = False
+) -> Response:
+    """The grades of a batch in a format of `robomark batch export`; one without a table is a zip with a file each."""
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+    return _file(export_file(context.store, batch_id, form, published=published))
+
+
+@router.post(
+    "/courses/{course_id}/batches/{batch_id}/worksheet", responses=_FILE, response_class=Response, openapi_extra=_CSV
+)
+async def worksheet(
+    request: Request, here: Reads, context: Context, batch_id: RowName, published: Published = False
+) -> Response:
+    """Moodle's grading worksheet, which is sent, with the grades in it; changes nothing here."""
+    given = b""
+    async for chunk in request.stream():
+        given += chunk
+        if len(given) > _LONGEST_WORKSHEET:
+            raise HTTPException(413, f"Expected at most {_LONGEST_WORKSHEET // 2**20} MB.")
+    try:
+        text = given.decode("utf-8")
+    except UnicodeDecodeError:
+        raise HTTPException(422, "The worksheet is not UTF-8; expected it as Moodle wrote it.") from None
+    return await run_in_threadpool(_filled_in, context, here, batch_id, text, published=published)
+
+
+def _filled_in(context: WebContext, here: CallerInCourse, batch_id: str, given: str, *, published: bool) -> Response:
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+    return _file(export_file(context.store, batch_id, "moodle-worksheet", published=published, given=given))
+
+
+def _file(exported: ExportedFile) -> Response:
+    headers = {"content-disposition": f'attachment; filename="{exported.name}"'}
+    return Response(exported.data, media_type=exported.media_type, headers=headers)

@@ -1,0 +1,213 @@
+"""What the answers of the API are made of, as their description tells it; each is read off what the store gives.
+
+What only one subject answers is told in its module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from types import MappingProxyType
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.store.states import BatchState, JobState, Role, Standing
+
+
+class Shape(BaseModel):
+    """Read off an object of the store that has fields of these names."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+
+def like(**example: Any) -> ConfigDict:
+    """A shape with an example."""
+    return ConfigDict(from_attributes=True, json_schema_extra={"examples": [example]})
+
+
+BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
+    {
+        "id": "0c5w1r8zt3ye",
+        "name": "week one",
+        "state": "open",
+        "created_at": "2026-11-02T09:00:00Z",
+        "jobs": 20,
+        "states": {"done": 18, "running": 2},
+        "refusals": [{"source": "bob", "sentence": "bob: holds no robot program.", "assignment": "shape-recognition"}],
+        "regrade_of": None,
+    }
+)
+
+
+def example_of(shape: type[Shape]) -> Any:
+    """The example that a shape has."""
+    extra: Any = shape.model_config["json_schema_extra"]
+    return extra["examples"][0]
+
+
+class CourseShape(Shape):
+    """A course, and what the token's owner is in it."""
+
+    id: int
+    name: str
+    role: Role
+
+    model_config = like(id=1, name="TM129", role="instructor")
+
+
+class RefusalShape(Shape):
+    """What was not taken in of a batch, and why."""
+
+    source: str = Field(description="The name that it came under.")
+    sentence: str
+    assignment: str = ""
+
+
+class JobShape(Shape):
+    """One grading of one submission, as a table of a batch has it."""
+
+    id: str
+    student: str = Field(description="What the course knows them by; a number where names are hidden.")
+    name: str
+    source: str = Field(description="The name that it came under.")
+    assignment: str
+    state: JobState
+    standing: Standing = Field(description="Of a submission's grades the one that `stands` counts.")
+    verdict: str | None
+    marks: float | None
+    max_marks: float
+    attempt: int = Field(description="The student's, counted for this assignment.")
+    error: str | None
+    queued_at: datetime
+    finished_at: datetime | None
+    published_at: datetime | None
+    days_late: int
+    staff_only: str | None = Field(description="The limit that the submission was over; it is shown to no student.")
+    suspect: str | None = Field(description="Why the grade is not to be trusted.")
+    missing: str = Field(description="The part that was asked for and not submitted.")
+    copied_from: str | None = Field(description="The identical grade that was run.")
+    unjudged: int = Field(description="Criteria that could not be judged; somebody has to look.")
+
+    model_config = like(
+        id="7xk2v9q4m0ab",
+        student="ada",
+        name="Ada Lovelace",
+        source="ada.zip",
+        assignment="shape-recognition",
+        state="done",
+        standing="stands",
+        verdict="finished",
+        marks=10,
+        max_marks=12,
+        attempt=1,
+        error=None,
+        queued_at="2026-11-02T09:00:00Z",
+        finished_at="2026-11-02T09:00:04Z",
+        published_at=None,
+        days_late=0,
+        staff_only=None,
+        suspect=None,
+        missing="",
+        copied_from=None,
+        unjudged=0,
+    )
+
+
+class BatchShape(Shape):
+    """A batch, and how many of its jobs are in each state."""
+
+    id: str
+    name: str
+    state: BatchState
+    created_at: datetime
+    jobs: int
+    states: dict[JobState, int]
+    refusals: list[RefusalShape]
+    regrade_of: str | None = Field(description="The batch whose submissions these are.")
+
+    model_config = like(**BATCH_EXAMPLE)
+
+
+class CriterionShape(Shape):
+    """One marked line."""
+
+    id: str
+    title: str
+    marks: float
+    max_marks: float
+    message: str
+    for_staff: str = Field(description="Where somebody should look; told to staff alone.", default="")
+    set_by_hand: dict[str, Any] | None = Field(description="What an instructor set, and why.", default=None)
+
+
+class TrialShape(Shape):
+    """One run of the simulation."""
+
+    scenario: str
+    seed: int
+    verdict: str
+    sha256: str = Field(description="Of the recording; the same work gives the same.")
+    spoken: list[str]
+    messages: list[dict[str, Any]]
+    partner: dict[str, Any] | None = Field(description="The same of a second robot.", default=None)
+    notes: list[str]
+
+    model_config = ConfigDict(extra="allow")
+
+
+class AccuracyShape(Shape):
+    """How much of what was to be recognised was recognised, with a 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    n: int
+
+
+class GradeShape(Shape):
+    """A grade, as `robomark show --json` and the format `json` write it; a student's has nothing of what is hidden."""
+
+    job: str
+    schema_: int = Field(alias="schema")
+    assignment: str
+    marks: float
+    max_marks: float
+    verdict: str
+    hints: list[str] = []
+    criteria: list[CriterionShape]
+    trials: list[TrialShape]
+    accuracy: AccuracyShape | None
+    notes: list[str]
+    comments: list[dict[str, Any]] = Field(description="What instructors wrote.", default=[])
+    missing: str = ""
+    cost: dict[str, Any] | None = None
+    withheld: bool = Field(description="Whether there is more to it than is shown to the token's owner now.")
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "job": "7xk2v9q4m0ab",
+                    "schema": 1,
+                    "assignment": "shape-recognition",
+                    "marks": 10,
+                    "max_marks": 12,
+                    "verdict": "finished",
+                    "criteria": [
+                        {
+                            "id": "named",
+                            "title": "Names the shapes",
+                            "marks": 4,
+                            "max_marks": 6,
+                            "message": "4 of 6 shapes were named.",
+                        }
+                    ],
+                    "trials": [],
+                    "accuracy": {"value": 0.67, "low": 0.3, "high": 0.9, "n": 6},
+                    "notes": [],
+                    "withheld": False,
+                }
+            ]
+        }
+    )

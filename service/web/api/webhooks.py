@@ -1,0 +1,117 @@
+"""Webhooks of a course: where it is told of what happens in it, and what became of what it was told."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import Depends
+from fastapi.responses import Response
+from pydantic import BaseModel, Field
+
+from service.store import webhooks
+from service.store.outbox import WebhookEvent
+from service.store.states import Role
+from service.web.access import RowName, nothing_here
+from service.web.api.shapes import Shape, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.context import Context
+
+router = api_router("webhooks")
+Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+
+
+class WebhookShape(Shape):
+    """Where somebody is told of what happens."""
+
+    id: str
+    url: str
+    events: list[WebhookEvent]
+    created_at: datetime
+
+    model_config = like(
+        id="5h2n8q0v3w7x",
+        url="https://hooks.example.org/robomark",
+        events=["grade.finished"],
+        created_at="2026-11-02T09:00:00Z",
+    )
+
+
+class NewWebhookShape(WebhookShape):
+    """A new webhook, with what its deliveries are signed with."""
+
+    secret: str = Field(description="Told this once.")
+
+    model_config = like(
+        id="5h2n8q0v3w7x",
+        url="https://hooks.example.org/robomark",
+        events=["grade.finished"],
+        created_at="2026-11-02T09:00:00Z",
+        secret="5f0c...",
+    )
+
+
+class WebhookAsked(BaseModel):
+    """Where to tell what."""
+
+    url: str = Field(max_length=webhooks.LONGEST_URL, examples=["https://hooks.example.org/robomark"])
+    events: list[WebhookEvent] = Field(min_length=1, max_length=20)
+
+
+class DeliveryShape(Shape):
+    """One thing that was told, or is to be."""
+
+    id: str
+    webhook_id: str
+    event: WebhookEvent
+    made_at: datetime
+    due_at: datetime | None = Field(description="When it is tried next; null when it has arrived or was given up.")
+    attempts: int
+    delivered_at: datetime | None
+    error: str | None
+
+    model_config = like(
+        id="1d6f9k2m4p8r",
+        webhook_id="5h2n8q0v3w7x",
+        event="grade.finished",
+        made_at="2026-11-02T09:00:04Z",
+        due_at=None,
+        attempts=1,
+        delivered_at="2026-11-02T09:00:06Z",
+        error=None,
+    )
+
+
+@router.get("/courses/{course_id}/webhooks")
+def list_webhooks(here: Manages, context: Context) -> Listed[WebhookShape]:
+    """The webhooks of the course."""
+    with context.store.reading() as session:
+        found = webhooks.of_course(session, here.course_id)
+    return Listed(items=[WebhookShape.model_validate(each) for each in found])
+
+
+@router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
+def create(here: Manages, context: Context, asked: WebhookAsked) -> NewWebhookShape:
+    """Be told at this address. Its secret is told this once, so the request is not answered again by its key."""
+    events = [event.value for event in asked.events]
+    with context.store.transaction() as session:
+        line, secret = webhooks.create(session, here.course_id, asked.url, events, here.actor)
+    return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
+
+
+@router.delete("/courses/{course_id}/webhooks/{webhook_id}", status_code=204, response_class=Response)
+def revoke(here: Manages, context: Context, webhook_id: RowName) -> None:
+    """Tell it nothing any more."""
+    with context.store.transaction() as session:
+        if not webhooks.revoke(session, here.course_id, webhook_id, here.actor):
+            raise nothing_here()
+
+
+@router.get("/courses/{course_id}/deliveries")
+def list_deliveries(here: Manages, context: Context, limit: Limit = 50, after: After = "") -> Listed[DeliveryShape]:
+    """What was told to the course's webhooks lately, or is to be, the newest first."""
+    place = place_after(after, datetime, str)
+    with context.store.reading() as session:
+        found = webhooks.deliveries(session, here.course_id, limit + 1, (place[0], place[1]) if place else None)
+    return page_of([DeliveryShape.model_validate(each) for each in found], limit, lambda each: [each.made_at, each.id])

@@ -1,0 +1,161 @@
+"""What every route of the API has: it can be asked for again by a key, lists come in pages, answers have a tag.
+
+What a route does is told in ``api/``; how the whole is described in ``api_description.py``.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from types import MappingProxyType
+from typing import Annotated, Any, Generic, TypeVar
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+from starlette.types import Message, Receive
+
+from service.store import replies
+from service.store.replies import InProgress, Reply
+from service.web.api_access import caller_of
+from service.web.context import WebContext
+
+KEY_HEADER = "idempotency-key"
+LONGEST_KEY = 200
+#: For a route that takes no key: it changes nothing, or answers a secret that is to be kept nowhere.
+NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
+_Item = TypeVar("_Item")
+
+Limit = Annotated[int, Query(ge=1, le=200, description="How many at most.")]
+After = Annotated[
+    str, Query(max_length=1000, description="Where the page before ended: its `next`. Empty: from the first.")
+]
+
+
+class Listed(BaseModel, Generic[_Item]):
+    """One page of a list."""
+
+    items: list[_Item]
+    next: str | None = Field(description="Ask for `after=` this to have what follows; null at the end.", default=None)
+
+
+def page_of(
+    found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]
+) -> Listed[_Item]:
+    """The page of a list of which one more than ``limit`` was looked for; ``place`` says where in it something is."""
+    more = len(found) > limit
+    return Listed(items=list(found[:limit]), next=_cursor(place(found[limit - 1])) if more else None)
+
+
+def _cursor(place: Sequence[str | int | datetime]) -> str:
+    told = [part.isoformat() if isinstance(part, datetime) else part for part in place]
+    return base64.urlsafe_b64encode(json.dumps(told).encode()).decode().rstrip("=")
+
+
+def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
+    """The place that a ``next`` of ours holds; None for the beginning. Raises HTTPException 422 for another text."""
+    if not after:
+        return None
+    try:
+        place = json.loads(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
+        return tuple(_part(part, kind) for part, kind in zip(place, kinds, strict=True))
+    except (ValueError, TypeError, OverflowError):
+        raise HTTPException(422, "after: expected the `next` of the page before.") from None
+
+
+def _part(part: object, kind: type) -> object:
+    if kind is datetime and isinstance(part, str):
+        return datetime.fromisoformat(part).astimezone(UTC)
+    if type(part) is not kind or (isinstance(part, int) and not 0 <= part < 2**31):
+        raise TypeError(kind)
+    return part
+
+
+def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
+    """The answer with its tag; without its body for whoever has it already."""
+    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    told = {"etag": tag, "cache-control": "private, no-cache", **headers}
+    known = request.headers.get("if-none-match", "")
+    if tag in (part.strip().removeprefix("W/") for part in known.split(",")):
+        return Response(status_code=304, headers=told)
+    return Response(body, media_type=media_type, headers=told)
+
+
+class RepeatableRoute(APIRoute):
+    """A route that answers the same to the same request with the same ``Idempotency-Key``, and does it once."""
+
+    def get_route_handler(self) -> Callable[[Request], Awaitable[Response]]:  # type: ignore[override]
+        """As FastAPI asks for it."""
+        run = super().get_route_handler()
+
+        async def handler(request: Request) -> Response:
+            key = request.headers.get(KEY_HEADER)
+            if key is None or request.method != "POST" or NO_KEY.keys() <= (self.openapi_extra or {}).keys():
+                return await run(request)
+            return await _once(request, key, run)
+
+        return handler
+
+
+def api_router(tag: str) -> APIRouter:
+    """A router for one subject."""
+    return APIRouter(tags=[tag], route_class=RepeatableRoute)
+
+
+async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[Response]]) -> Response:
+    if not 0 < len(key) <= LONGEST_KEY or not key.isascii() or not key.isprintable():
+        raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
+    context: WebContext = request.app.state.context
+    caller = await run_in_threadpool(caller_of, request, context)
+    mine = (context.store, caller.identity.credential_id, key)
+    hashed = _Hashed(request)
+    try:
+        known = await run_in_threadpool(replies.begin, *mine)
+    except InProgress:
+        raise HTTPException(
+            409, "The first request with this Idempotency-Key is not answered yet.", {"retry-after": "5"}
+        ) from None
+    if known is not None:
+        if await hashed.whole() != known.request_sha256:
+            raise HTTPException(422, "Idempotency-Key: another request had this key; expected a new one.")
+        media_type = "application/json" if known.body else None
+        return Response(known.body, known.status, {"idempotent-replay": "true"}, media_type)
+    try:
+        answer = await run(Request(request.scope, hashed.receive))
+    except BaseException:
+        await run_in_threadpool(replies.forget, *mine)
+        raise
+    reply = Reply(await hashed.whole(), answer.status_code, bytes(answer.body))
+    await run_in_threadpool(replies.keep, *mine, reply)
+    return answer
+
+
+class _Hashed:
+    """A request whose body is hashed as it is read; what it asks for is part of the hash."""
+
+    def __init__(self, request: Request) -> None:
+        self._receive: Receive = request.receive
+        self._hash = hashlib.sha256(f"{request.method} {request.url.path}?{request.url.query}\n".encode())
+        self._ended = False
+
+    async def receive(self) -> Message:
+        """As ASGI has it."""
+        message = await self._receive()
+        if message["type"] == "http.request":
+            self._hash.update(message.get("body", b""))
+            self._ended = not message.get("more_body", False)
+        else:
+            self._ended = True
+        return message
+
+    async def whole(self) -> str:
+        """The hash of all of it."""
+        while not self._ended:
+            await self.receive()
+        return self._hash.hexdigest()

@@ -1,0 +1,71 @@
+"""Files that are sent with a request: read only when it is known that whoever sends them may.
+
+What they have to be is said where they are taken in.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+from starlette.datastructures import UploadFile
+from starlette.exceptions import HTTPException
+
+from submissions.raw_files import MAX_FILES, SentFile
+
+_ZIP = "application/zip"
+_ZIPS = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
+#: How the description tells of such a body.
+ZIP_BODY: dict[str, Any] = {
+    "requestBody": {"required": True, "content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}
+}
+
+
+async def _uploaded(request: Request) -> AsyncIterator[Path]:
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind not in _ZIPS:
+        raise HTTPException(415, f"Expected a zip, sent as {_ZIP}; this is {kind[:100] or 'of no type'}.")
+    with tempfile.TemporaryDirectory(prefix="robomark-upload-") as folder:
+        path = Path(folder) / "upload.zip"
+        with path.open("xb") as sink:
+            async for chunk in request.stream():
+                sink.write(chunk)
+        yield path
+
+
+#: A zip, for routes that take one; stands behind who may send it, so that nobody else's is read.
+Uploaded = Annotated[Path, Depends(_uploaded)]
+
+_FORM = "multipart/form-data"
+SENT_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            _FORM: {
+                "schema": {
+                    "type": "object",
+                    "required": ["files"],
+                    "properties": {
+                        "files": {"type": "array", "minItems": 1, "items": {"type": "string", "format": "binary"}}
+                    },
+                }
+            }
+        },
+    }
+}
+
+
+async def _sent(request: Request) -> AsyncIterator[Sequence[SentFile]]:
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != _FORM:
+        raise HTTPException(415, f"Expected files as {_FORM}; this is {kind[:100] or 'of no type'}.")
+    async with request.form(max_files=MAX_FILES, max_fields=10) as form:
+        found = [each for each in form.getlist("files") if isinstance(each, UploadFile)]
+        yield [SentFile(each.filename or "", each.file) for each in found]
+
+
+#: The files of a form, likewise.
+Sent = Annotated[Sequence[SentFile], Depends(_sent)]

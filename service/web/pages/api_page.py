@@ -1,0 +1,22 @@
+"""The routes of the API as a page, from the description that programs read."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from fastapi.responses import Response
+
+from service.web.access import MaybeReader
+from service.web.rendering import page
+
+router = APIRouter()
+
+
+@router.get("/api")
+def api_page(request: Request, reader: MaybeReader) -> Response:
+    """What programs can ask, by subject."""
+    subjects: dict[str, list[tuple[str, str, str]]] = {}
+    for path, operations in request.app.openapi()["paths"].items():
+        for method, operation in operations.items():
+            told = (method.upper(), path, operation["description"])
+            subjects.setdefault(operation["tags"][0], []).append(told)
+    return page(request, reader, "api.html", subjects=subjects)

@@ -1,0 +1,90 @@
+"""Sends what the outbox holds: one thread of each web server, which claims before it sends.
+
+What is told, and how often it is tried, is ``store/outbox.py``'s.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event, Thread
+from typing import Self
+
+import structlog
+
+from service.store import outbox
+from service.store.engine import Store
+from service.store.outbox import ClaimedDelivery
+from service.version import GRADER_VERSION
+from service.web.outside import NotReached, post
+
+_log = structlog.get_logger(__name__)
+_LOOK_SECONDS = 2.0
+_AT_ONCE = 8
+
+
+class WebhookSender:
+    """Sends while it is open. ``inside`` allows addresses that are not public."""
+
+    def __init__(self, store: Store, *, inside: bool) -> None:
+        self._store = store
+        self._inside = inside
+        self._ended = Event()
+        self._thread = Thread(target=self._run, name="webhooks", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # What is being sent is sent again by the next server, should this one not see its end.
+        self._ended.set()
+        self._thread.join(timeout=1.0)
+
+    def _run(self) -> None:
+        while not self._ended.wait(_LOOK_SECONDS):
+            try:
+                while not self._ended.is_set() and send_due(self._store, inside=self._inside):
+                    pass
+            except Exception:
+                _log.exception("webhooks.failed")
+
+
+def send_due(store: Store, *, inside: bool) -> int:
+    """Send some of what is due; how many that were."""
+    claimed = outbox.claim(store, _AT_ONCE)
+    if claimed:
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            list(pool.map(lambda each: _send(store, each, inside=inside), claimed))
+    return len(claimed)
+
+
+def signature(secret: str, at: int, body: bytes) -> str:
+    """What the header ``Robomark-Signature`` says of a body that was sent at this second."""
+    signed = hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
+    return f"t={at},v1={signed}"
+
+
+def _send(store: Store, claimed: ClaimedDelivery, *, inside: bool) -> None:
+    body = json.dumps(
+        {"id": claimed.id, "event": claimed.event, "made_at": claimed.made_at.isoformat(), **claimed.payload}
+    ).encode()
+    headers = {
+        "Content-Type": "application/json",
+        "User-Agent": f"Robomark/{GRADER_VERSION}",
+        "Robomark-Event": claimed.event,
+        "Robomark-Delivery": claimed.id,
+        "Robomark-Signature": signature(claimed.secret, int(time.time()), body),
+    }
+    try:
+        status = post(claimed.url, body, headers, inside=inside)
+    except NotReached as error:
+        outbox.failed(store, claimed, str(error))
+        return
+    if 200 <= status < 300:
+        outbox.delivered(store, claimed)
+    else:
+        outbox.failed(store, claimed, f"answered {status}, expected 200 or another of 2xx")

@@ -1,0 +1,97 @@
+"""A student asks once at a time, of a grade that they can see; an instructor of the course answers once."""
+
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import update
+
+import report_builders
+from builders import grading_request
+from service.store import appeals, audit, jobs, open_assignments, results
+from service.store.appeals import LONGEST_TEXT
+from service.store.engine import Store
+from service.store.intake import accept_batch
+from service.store.models import SubmissionRow
+from service.store.versions import freeze
+from sim.errors import UsageError
+
+
+def _submitted(store: Store) -> None:
+    accept_batch(store, "class", [grading_request("ada")], [], max_attempts=3)
+
+
+def _graded(store: Store) -> None:
+    _submitted(store)
+    _grade(store)
+
+
+def _grade(store: Store) -> None:
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), claim.at)
+
+
+def _ask(store: Store, text: str = "Why?") -> int:
+    with store.transaction() as session:
+        return appeals.ask(session, 1, text)
+
+
+def _answer(store: Store, number: int, text: str = "Because.", course: int = 1) -> None:
+    with store.transaction() as session:
+        appeals.answer(session, course, number, text, "grace")
+
+
+def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
+    _graded(store)
+    first = _ask(store, " Why?\r\nLine 3 prints it. ")
+    with pytest.raises(UsageError, match="you have asked already"):
+        _ask(store, "And why?")
+    with store.reading() as session:
+        (line,) = appeals.in_course(session, 1, answered=False)
+    assert (line.who, line.text, line.answer) == ("ada", "Why?\nLine 3 prints it.", None)
+    _answer(store, first)
+    with pytest.raises(UsageError, match="is answered already"):
+        _answer(store, first, "Really.")
+    second = _ask(store, "And why?")
+    with store.reading() as session:
+        assert [each.id for each in appeals.in_course(session, 1, answered=False)] == [second]
+        (answered,) = appeals.in_course(session, 1, answered=True)
+        assert [each.id for each in appeals.of_submission(session, 1)] == [second, first]
+        assert appeals.in_course(session, 2, answered=False) == []
+        (entry,) = audit.entries(session, "submission", "1")
+    assert (answered.answer, answered.answered_by) == ("Because.", "grace")
+    assert (entry.actor, entry.action, entry.detail) == ("grace", "answer appeal", {"appeal": first})
+
+
+def test_what_cannot_be_asked_or_answered_is_refused(store: Store) -> None:
+    _submitted(store)
+    with pytest.raises(UsageError, match="no grade yet"):
+        _ask(store)
+    _grade(store)
+    for text in ("", " \n ", "x" * (LONGEST_TEXT + 1)):
+        with pytest.raises(UsageError, match=f"expected 1 to {LONGEST_TEXT}"):
+            _ask(store, text)
+    number = _ask(store)
+    with pytest.raises(UsageError, match="the answer has 0 characters"):
+        _answer(store, number, "")
+    for course, which in ((2, number), (1, number + 1)):
+        with pytest.raises(UsageError, match=f"there is no appeal {which} in this course"):
+            _answer(store, which, course=course)
+
+
+def test_a_grade_for_staff_alone_cannot_be_asked_about(store: Store) -> None:
+    _graded(store)
+    with store.transaction() as session:
+        session.execute(update(SubmissionRow).values(staff_only="2 days late, allowed: 0"))
+    with pytest.raises(UsageError, match="no grade yet"):
+        _ask(store)
+
+
+def test_who_asks_is_not_named_while_names_are_hidden(store: Store) -> None:
+    _graded(store)
+    _ask(store)
+    with store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(grading_request("ada").assignment))
+        open_assignments.hide_names(session, 1, "echo-responder", True)
+    with store.reading() as session:
+        assert [each.who for each in appeals.in_course(session, 1, answered=False)] == ["submission 1"]

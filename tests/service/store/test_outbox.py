@@ -1,0 +1,173 @@
+"""What webhooks are told is written with what it tells of, claimed by one, tried again, and given up after a day."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import select, update
+
+import report_builders
+from builders import accept_one, grading_request, opened, settings_in
+from service.store import batch_control, intake, jobs, outbox, regrades, results, webhooks
+from service.store.engine import Store
+from service.store.models import Course
+from service.store.web_tables import Delivery
+from sim.errors import UsageError
+
+EVENTS = ["grade.finished", "batch.finished", "grades.published", "appeal.opened"]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with opened(settings_in(tmp_path)) as store:
+        yield store
+
+
+def hook(store: Store, *events: str) -> str:
+    with store.transaction() as session:
+        if session.get(Course, 1) is None:
+            session.add(Course(id=1, name="default", created_at=datetime.now(UTC)))
+            session.flush()
+        return webhooks.create(session, 1, "https://hooks.example.org/x", events or EVENTS, "grace")[0].id
+
+
+def told(store: Store) -> list[tuple[str, dict[str, Any]]]:
+    with store.reading() as session:
+        rows = session.scalars(select(Delivery).order_by(Delivery.made_at, Delivery.event.desc())).all()
+        return [(row.event, row.payload["data"]) for row in rows]
+
+
+def grade_next(store: Store) -> str:
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    return claim.job_id
+
+
+def submit(store: Store, *students: str) -> str:
+    asked = [grading_request(each) for each in students]
+    return intake.accept_batch(store, "batch", asked, (), course="default", max_attempts=1).id
+
+
+def test_a_batch_is_told_of_job_by_job_and_once_when_it_is_finished(store: Store) -> None:
+    hook(store)
+    batch = submit(store, "ada", "bob")
+    first, second = grade_next(store), grade_next(store)
+    assert [(event, data.get("job")) for event, data in told(store)] == [
+        ("grade.finished", first),
+        ("grade.finished", second),
+        ("batch.finished", None),
+    ]
+    assert told(store)[-1][1] == {"batch": batch, "states": {"done": 2}}
+    regrades.publish(store, batch, actor="grace")
+    assert told(store)[-1] == ("grades.published", {"batch": batch, "published": 2})
+
+
+def test_nobody_is_named(store: Store) -> None:
+    hook(store)
+    submit(store, "ada")
+    grade_next(store)
+    assert "ada" not in str(told(store))
+
+
+def test_what_ends_without_a_grade_ends_its_batch_too(store: Store) -> None:
+    hook(store, "batch.finished")
+    batch = submit(store, "ada")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.give_up(store, claim, "the disk is full")
+    cancelled = submit(store, "bob")
+    batch_control.cancel(store, cancelled)
+    superseded = submit(store, "carol")
+    accept_one(store, "carol")
+    assert [(data["batch"], data["states"]) for _, data in told(store)] == [
+        (batch, {"dead": 1}),
+        (cancelled, {"cancelled": 1}),
+        (superseded, {"cancelled": 1}),
+    ]
+
+
+def test_without_webhooks_nothing_is_written(store: Store) -> None:
+    revoked = hook(store)
+    with store.transaction() as session:
+        assert webhooks.revoke(session, 1, revoked, "grace")
+    submit(store, "ada")
+    grade_next(store)
+    assert told(store) == []
+
+
+def test_only_one_sender_has_a_delivery(store: Store) -> None:
+    hook(store, "grade.finished")
+    submit(store, "ada")
+    grade_next(store)
+    (claimed,) = outbox.claim(store, 8)
+    assert claimed.attempt == 1
+    assert outbox.claim(store, 8) == []
+    outbox.delivered(store, claimed)
+    _past(store, timedelta(hours=1))
+    assert outbox.claim(store, 8) == []
+
+
+def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day(store: Store) -> None:
+    hook(store, "grade.finished")
+    submit(store, "ada")
+    grade_next(store)
+    waits = []
+    for _ in range(40):
+        due = outbox.claim(store, 8)
+        if not due:
+            break
+        before = datetime.now(UTC)
+        outbox.failed(store, due[0], "answered 500")
+        with store.reading() as session:
+            row = session.scalars(select(Delivery)).one()
+        if row.due_at is None:
+            break
+        waits.append(round((row.due_at - before).total_seconds()))
+        _past(store, row.due_at - before + timedelta(seconds=1))
+    assert row.due_at is None
+    assert (row.delivered_at, row.error) == (None, "answered 500")
+    assert waits == sorted(waits)
+    assert waits[0] < 20
+    assert 10 < len(waits) < 30
+
+
+def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:
+    revoked = hook(store, "grade.finished")
+    submit(store, "ada")
+    grade_next(store)
+    with store.transaction() as session:
+        assert not webhooks.revoke(session, 2, revoked, "mallory")
+        assert webhooks.revoke(session, 1, revoked, "grace")
+    assert outbox.claim(store, 8) == []
+
+
+def test_addresses_that_are_none_are_refused(store: Store) -> None:
+    hook(store)
+    urls = (
+        "",
+        "ftp://example.org/",
+        "https://",
+        "https://user:word@example.org/",
+        "https://example.org/ x",
+        "https://example.org/\r\nHost: x",
+        "https://exämple.org/",
+        "https://example.org:99999/",
+        "javascript:alert(1)",
+    )
+    for url in urls:
+        with store.transaction() as session, pytest.raises(UsageError, match=r"^url: "):
+            webhooks.create(session, 1, url, EVENTS, "grace")
+
+
+def _past(store: Store, time: timedelta) -> None:
+    """Let so much time go by for what waits."""
+    with store.transaction() as session:
+        for row in session.scalars(select(Delivery)).all():
+            due_at = None if row.due_at is None else row.due_at - time
+            values = {"made_at": row.made_at - time, "due_at": due_at}
+            session.execute(update(Delivery).where(Delivery.id == row.id).values(**values))

@@ -1,0 +1,177 @@
+"""One student's data: all of it in a zip, or none of it left, and nobody else's touched."""
+
+from __future__ import annotations
+
+import io
+import json
+import sqlite3
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+import report_builders
+from builders import grading_request, opened, settings_in
+from service.store import audit, credentials, intake, jobs, policies, results
+from service.store.engine import Store
+from service.store.models import Enrolment, Job, Person, SubmissionRow
+from service.store.purge import erase_student, purge
+from service.store.states import CredentialKind, Role
+from service.store.students import course_of
+from service.store.web_tables import (
+    METADATA,
+    Appeal,
+    Comment,
+    IdempotentReply,
+    LtiPerson,
+    LtiPlatform,
+    OpenAssignment,
+    Override,
+    Tryout,
+)
+from service.student_export import export_student
+from sim.errors import UsageError
+from submissions.people import Refusal, Student
+
+NOW = datetime.now(UTC)
+#: What a student is known by; none of it may be left.
+KNOWN = ("ada-known-as", "Lovelace", "ada@example.org")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with opened(settings_in(tmp_path)) as store:
+        yield store
+
+
+def submit(store: Store, *students: Student, refused: str = "") -> None:
+    asked = [replace(grading_request(each.id), whose=each, source=f"{each.id}.zip") for each in students]
+    refusals = (Refusal("x.zip", "is empty", Student(refused)),) if refused else ()
+    intake.accept_batch(store, "batch", asked, refusals, course="default", max_attempts=3)
+    while claim := jobs.claim(store, "worker", 60):
+        jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), NOW)
+
+
+def everything(store: Store) -> int:
+    """A student with a row in every table that knows students, and somebody else; the student's enrolment."""
+    ada, bob = Student(KNOWN[0], KNOWN[1], KNOWN[2]), Student("bob")
+    submit(store, ada, bob, refused=KNOWN[0])
+    with store.transaction() as session:
+        enrolment = session.scalars(select(Enrolment).where(Enrolment.student == KNOWN[0])).one()
+        theirs, others = session.scalars(select(Job).order_by(Job.enrolment_id)).all()
+        others.copied_from = theirs.id
+        submission_id, person_id = theirs.submission_id, enrolment.person_id
+        version_id = theirs.assignment_version_id
+        session.add(Override(submission_id=submission_id, criterion="a", marks=Decimal(1), reason=KNOWN[1], actor="g",
+                             made_at=NOW))  # fmt: skip
+        session.add(Comment(submission_id=submission_id, text=KNOWN[1], actor="grace", made_at=NOW))
+        session.add(Appeal(submission_id=submission_id, text=f"I am {KNOWN[1]}", asked_at=NOW))
+        session.add(OpenAssignment(course_id=1, assignment="echo-responder", assignment_version_id=version_id))
+        session.add(Tryout(enrolment_id=enrolment.id, assignment_version_id=version_id, packed=b"", state="done",
+                           queued_at=NOW, words={"said": KNOWN[1]}))  # fmt: skip
+        policies.extend(session, enrolment.id, "", NOW, 1)
+        credentials.issue(session, person_id, CredentialKind.TOKEN, timedelta(days=1), name=KNOWN[1], scopes=["read"])
+        session.flush()
+        token = credentials.tokens(session, person_id)[0].id
+        session.add(IdempotentReply(credential_id=token, key="k", request_sha256="", status=200, body=b"", made_at=NOW))
+        platform = LtiPlatform(name="p", issuer="i", client_id="c", authorization_url="", token_url="", keys_url="",
+                               created_at=NOW)  # fmt: skip
+        session.add(platform)
+        session.flush()
+        session.add(LtiPerson(platform_id=platform.id, subject=KNOWN[0], person_id=person_id))
+        audit.note(session, f"{KNOWN[1]} (person {person_id})", "submit", "submission", str(submission_id))
+        audit.note(session, "grace", "extend", "course", "1", student=KNOWN[0])
+        return enrolment.id
+
+
+def test_nothing_is_left_of_who_is_erased_but_that_it_was_done(store: Store, tmp_path: Path) -> None:
+    enrolment_id = everything(store)
+    before = _dump(tmp_path)
+    assert all(word in before for word in KNOWN)
+    gone = erase_student(store, enrolment_id, "grace")
+    assert (gone.submissions, gone.grades) == (1, 1)
+    left = _dump(tmp_path)
+    assert [word for word in KNOWN if word in left] == []
+    with store.reading() as session:
+        assert audit.entries(session, "enrolment", str(enrolment_id))[0].detail == {"submissions": 1, "grades": 1}
+        assert session.scalars(select(Enrolment.student)).all() == ["bob"]
+        (job,) = session.scalars(select(Job)).all()
+        assert results.load(session, job.id).marks == report_builders.faulty_grade().marks
+        assert job.copied_from is None
+
+
+def test_every_table_that_knows_students_is_thought_of(store: Store) -> None:
+    everything(store)
+    knows = {"enrolment", "person", "submission", "job", "credential"}
+    pointing = {
+        table for table in METADATA.sorted_tables for key in table.foreign_keys if key.column.table.name in knows
+    }
+    with store.reading() as session:
+        empty = {table.name for table in pointing if session.execute(select(table).limit(1)).first() is None}
+    assert empty == set()
+
+
+def test_who_is_in_another_course_stays_there(store: Store) -> None:
+    enrolment_id = everything(store)
+    with store.transaction() as session:
+        _in_another_course(session, session.get_one(Enrolment, enrolment_id).person_id)
+    erase_student(store, enrolment_id, "grace")
+    with store.reading() as session:
+        assert KNOWN[1] in session.scalars(select(Person.name)).all()
+        assert session.scalars(select(SubmissionRow.id)).all() == [2]
+
+
+def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
+    intake.accept(store, grading_request("ada"), max_attempts=1)
+    assert jobs.claim(store, "worker", 60)
+    with pytest.raises(UsageError, match="is being graded"):
+        erase_student(store, 1, "grace")
+    with store.transaction() as session:
+        session.get_one(Enrolment, 1).role = Role.INSTRUCTOR
+    with pytest.raises(UsageError, match="is no student"):
+        erase_student(store, 1, "grace")
+
+
+def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
+    everything(store)
+    gone = purge(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=2)
+    assert gone.submissions == 0
+    gone = purge(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=1)
+    assert (gone.submissions, gone.students) == (2, 2)
+    with store.reading() as session:
+        assert session.scalars(select(Appeal.id)).all() == []
+        # What is open to students stays open.
+        assert session.scalars(select(OpenAssignment.assignment)).all() == ["echo-responder"]
+
+
+def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
+    enrolment_id = everything(store)
+    with zipfile.ZipFile(io.BytesIO(export_student(store, enrolment_id))) as archive:
+        names = set(archive.namelist())
+        document = json.loads(archive.read("student.json"))
+        grade = json.loads(archive.read("submissions/echo-responder-1/grade.json"))
+    folder = "submissions/echo-responder-1"
+    assert names == {"student.json", *(f"{folder}/{name}" for name in ("submission.zip", "grade.json", "report.html"))}
+    assert (document["id"], document["name"], document["email"]) == KNOWN
+    assert document["submissions"][0]["appeals"][0]["text"] == f"I am {KNOWN[1]}"
+    assert document["extensions"][0]["more_attempts"] == 1
+    assert "secret" not in json.dumps(document)
+    shown = {each.id for each in report_builders.faulty_grade().criteria if each.visibility == "visible"}
+    assert {each["id"] for each in grade["criteria"]} == shown
+
+
+def _in_another_course(session: Session, person_id: int) -> None:
+    course_id = course_of(session, "another", NOW)
+    session.add(Enrolment(course_id=course_id, person_id=person_id, student="x", written="x", role=Role.STUDENT))
+
+
+def _dump(folder: Path) -> str:
+    """All that the database holds, but what is compressed."""
+    with sqlite3.connect(folder / "robomark.db") as connection:
+        return "\n".join(connection.iterdump())

@@ -1,0 +1,73 @@
+"""The API against its own description: nothing that fits it or does not is answered by a fault of ours, or otherwise.
+
+Slow; what single routes do is tried in ``test_api.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, Phase, given, settings
+from schemathesis.generation import GenerationMode
+from schemathesis.specs.openapi import checks
+
+from builders import echo
+from service.store import open_assignments
+from service.store.versions import freeze
+from web import Web, web_in
+from web_world import make_world
+
+pytestmark = pytest.mark.long
+#: What there is for every name in a path, and who asks, is ours to say; what the store refuses fits the description.
+_NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
+_EXAMPLES = settings(
+    max_examples=25,
+    deadline=None,
+    database=None,
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+
+
+@schemathesis.serializer("application/zip")
+def _as_it_is(_context: Any, value: Any) -> bytes:
+    return value if isinstance(value, bytes) else str(value).encode("utf-8", "replace")
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[str, Any], dict[str, str]]]:
+    """The application, the header of each kind of reader, and what paths name."""
+    with web_in(tmp_path_factory.mktemp("home"), api_calls_per_minute=1_000_000) as web:
+        world = make_world(web)
+        with web.store.transaction() as session:
+            open_assignments.prepare(session, 1, freeze(echo()))
+            open_assignments.open_for_students(session, 1, "echo-responder")
+        members = {"instructor": world.grace, "student": world.ada, "operator": web.operator()}
+        tokens = {who: web.token(member, "read", "submit", "mark", "manage") for who, member in members.items()}
+        yield web, tokens, world.values
+
+
+@pytest.mark.parametrize("who", ["instructor", "student", "operator"])
+@pytest.mark.parametrize("mode", list(GenerationMode))
+def test_every_answer_is_as_it_is_described(asked: tuple[Web, Any, Any], who: str, mode: GenerationMode) -> None:
+    web, tokens, values = asked
+    schema = schemathesis.openapi.from_dict(web.app.openapi())
+    schema.app = web.app
+    for found in schema.get_all_operations():
+        _try(found.ok(), mode, tokens[who], values)
+
+
+def _try(operation: Any, mode: GenerationMode, token: dict[str, str], values: dict[str, str]) -> None:
+    @_EXAMPLES
+    @given(case=operation.as_strategy(generation_mode=mode))
+    def answers(case: Any) -> None:
+        for name in case.path_parameters or {}:
+            case.path_parameters[name] = values.get(name, case.path_parameters[name])
+        answer = case.call(base_url="http://localhost", headers=token)
+        case.validate_response(answer, excluded_checks=_NOT_TOLD)
+
+    answers()

@@ -1,0 +1,112 @@
+"""An instructor sets marks, excuses, comments and answers on the web; a student sees what came of it and asks again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from starlette.testclient import TestClient
+
+import report_builders
+from service.store import audit, batches, results
+from web import Web, submit, web_in
+from web_world import World, make_world
+
+CRITERION = report_builders.faulty_grade().criteria[0]
+HOSTILE = report_builders.HOSTILE.replace("\ud800", "")  # no browser can send it
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """A world with Grace's and Ada's browsers."""
+
+    web: Web
+    world: World
+    grace: TestClient
+    ada: TestClient
+
+    @property
+    def marking(self) -> str:
+        return f"/courses/1/grades/{self.world.values['job_id']}/marking"
+
+    def marks(self) -> tuple[float, float]:
+        with self.web.store.reading() as session:
+            line = batches.job_line(session, self.world.values["job_id"])
+        assert line.marks is not None
+        return float(line.marks), float(line.max_marks)
+
+
+@pytest.fixture(scope="module")
+def marked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marked]:
+    with web_in(tmp_path_factory.mktemp("home")) as web:
+        world = make_world(web)
+        yield Marked(web, world, web.browser(world.grace), web.browser(world.ada))
+
+
+def test_marks_are_set_excused_and_withdrawn_and_all_is_told(marked: Marked) -> None:
+    before = marked.marks()
+    about = {"criterion": CRITERION.id, "reason": f"seen {HOSTILE}"[:400]}
+    most = CRITERION.max_marks
+    answer = submit(marked.grace, f"{marked.marking}/set", {**about, "marks": f"{most}"})
+    assert (answer.status_code, answer.headers["location"]) == (303, marked.marking)
+    assert marked.marks() == (before[0] + float(most - CRITERION.marks), before[1])
+    shown = marked.grace.get(marked.marking).text
+    assert "set by hand" in shown
+    assert "<script>alert" not in shown
+    with marked.web.store.reading() as session:
+        entry = audit.entries(session, "submission", "1")[-1]
+    assert entry.actor.startswith("Grace (person")
+    submit(marked.grace, f"{marked.marking}/excuse", about)
+    assert marked.marks() == (before[0] - float(CRITERION.marks), before[1] - float(most))
+    submit(marked.grace, f"{marked.marking}/withdraw", {"criterion": CRITERION.id})
+    assert marked.marks() == before
+
+
+@pytest.mark.parametrize(
+    ("path", "data", "sentence"),
+    [
+        ("set", {"criterion": CRITERION.id, "marks": "many", "reason": "x"}, "expected a number such as 2.5"),
+        ("set", {"criterion": CRITERION.id, "marks": "1000", "reason": "x"}, "expected 0 to"),
+        ("set", {"criterion": CRITERION.id, "marks": "1", "reason": ""}, "the reason has 0 characters"),
+        ("excuse", {"criterion": "other", "reason": "x"}, "has no criterion"),
+        ("withdraw", {"criterion": CRITERION.id}, "nothing is set by hand"),
+        ("comment", {"text": ""}, "the comment has 0 characters"),
+        ("uncomment", {"comment_id": "7"}, "has no comment 7"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_sentence(marked: Marked, path: str, data: dict[str, str], sentence: str) -> None:
+    answer = submit(marked.grace, f"{marked.marking}/{path}", data)
+    assert answer.status_code == 422
+    assert sentence in answer.text.casefold()
+
+
+def test_a_comment_is_shown_and_withdrawn(marked: Marked) -> None:
+    submit(marked.grace, f"{marked.marking}/comment", {"text": f"Look at {HOSTILE}"})
+    submit(marked.grace, f"{marked.marking}/comment", {"text": "And here.", "criterion": CRITERION.id})
+    shown = marked.grace.get(marked.marking).text
+    assert "Look at &lt;script&gt;" in shown
+    with marked.web.store.reading() as session:
+        said = results.load(session, marked.world.values["job_id"]).comments
+    assert [each.criterion for each in said] == ["", CRITERION.id]
+    submit(marked.grace, f"{marked.marking}/uncomment", {"comment_id": "2"})
+    left = marked.grace.get(marked.marking).text
+    assert 'name="comment_id" value="1"' in left
+    assert 'name="comment_id" value="2"' not in left
+
+
+def test_a_student_asks_and_an_instructor_answers(marked: Marked) -> None:
+    path = "/courses/1/mine/submissions/1/appeal"
+    assert "waits for an answer" in marked.ada.get(path).text
+    assert "<textarea" not in marked.ada.get(path).text
+    assert submit(marked.ada, path, {"text": "again"}).status_code == 422
+    assert "Please look again." in marked.grace.get("/courses/1/appeals").text
+    number = marked.world.values["appeal_id"]
+    answer = submit(marked.grace, f"/courses/1/appeals/{number}/answer", {"text": f"Line 3 {HOSTILE}"})
+    assert answer.headers["location"] == "/courses/1/appeals"
+    assert "Nobody waits for an answer." in marked.grace.get("/courses/1/appeals").text
+    shown = marked.ada.get(path).text
+    assert "Line 3 &lt;script&gt;" in shown
+    assert "person" not in shown
+    assert submit(marked.ada, path, {"text": "And now?"}).headers["location"] == path
+    assert "And now?" in marked.grace.get("/courses/1/appeals").text
