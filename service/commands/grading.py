@@ -85,7 +85,7 @@ def grade_all(
                 worst = worst if worst is not None and not isinstance(worst, UsageError) else error
                 continue
             if together is None:
-                _print(chosen, graded)
+                _print(chosen, graded, submission)
             missing = missing_words(graded.missing)
             rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
             if report is not None:
@@ -122,11 +122,11 @@ def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
     return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
 
 
-def _print(form: Format, graded: Grade) -> None:
+def _print(form: Format, graded: Grade, submission: Submission) -> None:
     if form.on_terminal is not None and sys.stdout.isatty():
-        show(form.on_terminal(graded))
+        show(form.on_terminal(graded, submission))
     elif form.document is not None:
-        sys.stdout.write(form.document(graded))
+        sys.stdout.write(form.document(graded, submission))
 
 
 def _like_others(paths: Sequence[Path]) -> dict[Path, str]:

@@ -62,12 +62,13 @@ def show(
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
-        from service.store import results
+        from service.store import intake, results
 
         with store.reading() as session:
             graded = results.load(session, line.id)
-        document(job=line, grade=json_document(staff_view(graded)))
-        tell(plain_text(staff_view(graded)).rstrip("\n"))
+            submission = intake.load_submission(session, line.id)
+        document(job=line, grade=json_document(staff_view(graded), submission))
+        tell(plain_text(staff_view(graded), submission).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if replay is None and film is None and output is None:

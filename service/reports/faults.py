@@ -6,7 +6,7 @@ Faults are told, never judged; marks do not depend on anything here.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -18,6 +18,7 @@ from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
 from submissions.assignment.second_robot import second_program_of
+from submissions.bundle import PART_FILES
 from submissions.source_text import decode_source
 from submissions.submission import Submission
 
@@ -54,6 +55,13 @@ class FaultGroup:
     excerpt: tuple[SourceLine, ...] = ()
 
 
+def faults_beside(cause: str, grade: Grade, submission: Submission | None = None) -> Iterator[tuple[str, FaultGroup]]:
+    """Each fault with what is to be told of it where the cause has been told: of the cause's own, only where."""
+    for group in fault_groups(grade, submission, limit=10):
+        told = group.message.rstrip(".") in cause
+        yield (group.where if told else f"{group.where}: {group.message}"), group
+
+
 def fault_groups(grade: Grade, submission: Submission | None = None, limit: int = 12) -> tuple[FaultGroup, ...]:
     """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
     found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
@@ -78,7 +86,7 @@ def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission
     often = (
         first if len(places) == 1 else f"{len(places)} times in {trials} of {len(grade.trials)} trials, first {first}"
     )
-    excerpt = () if source is None or fault.line is None else _excerpt(source, fault.line)
+    excerpt = () if source is None or fault.line is None else excerpt_around(source, fault.line)
     return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), often, excerpt)
 
 
@@ -98,6 +106,15 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
     return parts.get(fault.who)
 
 
+def source_called(name: str, submission: Submission) -> Code | None:
+    """What a hint calls by this name: ``cell 3``, a part, or a file beside it."""
+    if name.startswith("cell ") and submission.notebook is not None:
+        cells = {f"cell {cell.number}": cell.source for cell in submission.notebook.cells}
+        return Code(name, cells[name]) if name in cells else None
+    parts = {PART_FILES["program"]: submission.program, PART_FILES["responder"]: submission.responder}
+    return parts.get(name) or _beside(name, submission)
+
+
 def _beside(file: str, submission: Submission) -> Code | None:
     """A process has named the file, so it may be any, or none."""
     data = submission.files.get(file)
@@ -106,11 +123,14 @@ def _beside(file: str, submission: Submission) -> Code | None:
     return None
 
 
-def _excerpt(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+def excerpt_around(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+    """The line with those around it; nothing where the source has no such line."""
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()
     first, last = max(1, line - around), min(len(lines), line + around)
+    while first < line and not lines[first - 1].strip():
+        first += 1
     return tuple(
         SourceLine(number, readable(lines[number - 1].rstrip("\r"), 200), number == line)
         for number in range(first, last + 1)

@@ -24,6 +24,7 @@ from markupsafe import Markup, escape
 from service.grading.grade import Grade
 from service.grading.ranks import RankTable
 from service.reports.page import page_of
+from service.reports.plots.style import DPI
 from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
 from service.reports.rows import TableRow
@@ -34,6 +35,7 @@ from submissions.submission import Submission
 
 #: What is expected of a submission where a refusal does not say.
 _USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
+_SHOWN = 106 / DPI
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -57,6 +59,15 @@ class PrintedFloor:
     name: str
     image: bytes
     labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ShownImage:
+    """A plot in a report and its size in CSS pixels, at which the smallest of its type can be read."""
+
+    uri: Markup
+    width: int
+    height: int
 
 
 def gallery(floors: Sequence[PrintedFloor]) -> str:
@@ -94,7 +105,7 @@ def report_parts(
     ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
     built in, by name; ``others`` lie over the trials in the replay.
     """
-    images = {name: _data_uri(data) for name, data in plots.items()}
+    images = {name: ShownImage(_data_uri(data), *_shown_size(data)) for name, data in plots.items()}
     replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
     played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
     body = _environment().get_template("report_body.html")
@@ -224,6 +235,12 @@ def _shown(value: object) -> object:
 
 def _data_uri(data: bytes) -> Markup:
     return Markup("data:image/png;base64,") + Markup(base64.b64encode(data).decode("ascii"))
+
+
+def _shown_size(image: bytes) -> tuple[int, int]:
+    """Of a PNG, as its header has it: 106 CSS pixels an inch, at which type of 7.5 points is 11 pixels high."""
+    across, down = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
+    return round(across * _SHOWN), round(down * _SHOWN)
 
 
 def _breakable(name: str) -> Markup:

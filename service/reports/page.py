@@ -8,15 +8,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.reports.cause import Diagnosis, diagnose, ended, found
 from service.reports.crossing import befell_in_full
 from service.reports.faults import FaultGroup, fault_groups
-from service.reports.plots.drawn import plots_of
+from service.reports.plots.drawn import plots_of, same_answers
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
+from service.reports.plots.sequence import MOST_CALL_STEPS, Step, inside
+from service.reports.plots.talk import talk_words, talks
 from service.reports.readable import message_words, number, one_line, readable
-from service.reports.recognition_table import RecognitionTable, recognition_tables
+from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
 from service.reports.replay.trial import loss_moment, moment_hash
 from service.reports.robots import messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
@@ -26,11 +30,10 @@ from service.reports.words import (
     comments_of,
     cost_words,
     grade_words,
-    hints_of,
     verdict_words,
 )
 from sim.recorded import stood_still
-from sim.recording import AgentMessage, AgentOutput, Fault, Recording, Verdict
+from sim.recording import Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
 
@@ -43,9 +46,13 @@ PROCESS_LIMITS = "process limits only"
 
 @dataclass(frozen=True, slots=True)
 class CriterionLine:
-    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure."""
+    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure.
+
+    ``told`` says in short what was found; empty where it is told already, or nothing was lost. ``message`` is all.
+    """
 
     title: str
+    told: str
     message: str
     marks: str
     max_marks: str
@@ -69,13 +76,13 @@ class TimelineEntry:
 
 @dataclass(frozen=True, slots=True)
 class MessageLine:
-    """One row of the messages table."""
+    """One row of the messages table; ``kind`` is ``wrong``, or ``inner`` for what a responder asked of others."""
 
     t: str
     sender: str
     text: str
     arrived: str
-    wrong: bool
+    kind: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,19 +101,34 @@ class TrialLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
-    """A closer look at one trial of a scenario: the one that lost most."""
+class Seen:
+    """What was seen and answered, once for all criteria that judge the same answers."""
 
-    scenario: str
-    which: str
-    words: VerdictWords
+    title: str
+    tables: tuple[RecognitionTable, ...]
+    classes: tuple[ClassLine, ...]
+    plots: tuple[Plot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TextOutput:
+    """What a process printed or logged, under what it is called."""
+
+    title: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A closer look at one trial of a scenario: the one that lost most. ``where`` says which, if there are several."""
+
+    where: str
     plots: tuple[Plot, ...]
     timeline: tuple[TimelineEntry, ...]
     messages: tuple[MessageLine, ...]
     more_messages: int
-    responder_output: str
-    responder_log: str
-    agents: tuple[AgentOutput, ...]
+    talk: str
+    outputs: tuple[TextOutput, ...]
     notes: tuple[str, ...]
 
 
@@ -118,14 +140,17 @@ class Page:
     marks: str
     max_marks: str
     share: float
+    state: str  # as of a criterion: the colour of the bar
     words: VerdictWords
-    hints: tuple[str, ...]
+    ended: str
+    diagnosis: Diagnosis
     comments: tuple[str, ...]
     criteria: tuple[CriterionLine, ...]
+    lost: tuple[CriterionLine, ...]  # by the cause, which has told of them already
+    others: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     faults_title: str
-    classification: tuple[Plot, ...]
-    recognition: tuple[RecognitionTable, ...]
+    recognition: tuple[Seen, ...]
     scenes: tuple[Scene, ...]
     diagrams: tuple[OwnDiagram, ...]
     trials: tuple[TrialLine, ...]
@@ -144,20 +169,28 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
     plots = plots_of(grade)
     lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
     faults = fault_groups(grade, submission)
+    diagnosis = diagnose(grade, submission)
+    criteria = tuple(
+        _criterion_line(grade, result, played, told=index in diagnosis.lost)
+        for index, result in enumerate(grade.criteria)
+    )
     time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=number(grade.marks),
         max_marks=number(grade.max_marks),
         share=_share(float(grade.marks), float(grade.max_marks)),
+        state=_state(grade.marks, grade.max_marks),
         words=grade_words(grade),
-        hints=hints_of(grade),
+        ended=ended(grade, diagnosis),
+        diagnosis=diagnosis,
         comments=comments_of(grade),
-        criteria=tuple(_criterion_line(grade, result, played) for result in grade.criteria),
+        criteria=criteria,
+        lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
+        others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
         faults_title="How it ended" if time_alone else "What went wrong",
-        classification=tuple(plot for plot in plots if not plot.scenario),
-        recognition=recognition_tables(grade),
+        recognition=tuple(_seen(grade, alike, plots) for alike in same_answers(grade)),
         scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
         diagrams=own_diagrams(grade, diagrams_in(submission.notebook).cells) if submission is not None else (),
         trials=lines,
@@ -194,7 +227,7 @@ def _kind(fault: Fault) -> str:
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
-def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int]) -> CriterionLine:
+def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int], *, told: bool) -> CriterionLine:
     full = result.marks >= result.max_marks
     missed = [item for item in result.evidence if not item.passed]
     failed = next(iter(missed), None)
@@ -202,17 +235,22 @@ def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int
     seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
+        told="" if told or (full and result.set_by_hand is None) else found(grade, result),
         message=readable(result.message, 1000, lines=12),
         marks=number(result.marks),
         max_marks=number(result.max_marks),
         share=_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
-        state="full" if full else ("part" if result.marks > 0 else "none"),
+        state=_state(result.marks, result.max_marks),
         visibility=result.visibility,
         where="" if full or failed is None else _where(grade, failed),
         moment="" if watched is None else moment_hash(watched.trial + 1, seconds),
         watch=f"Watch it at {seconds:.2f} s",
         for_staff=readable(result.for_staff, 1000, lines=4),
     )
+
+
+def _state(marks: Decimal, max_marks: Decimal) -> str:
+    return "full" if marks >= max_marks else ("part" if marks > 0 else "none")
 
 
 def _where(grade: Grade, evidence: Evidence) -> str:
@@ -226,25 +264,16 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
-    messages = messages_of(recording)
-    of = sum(other.scenario == scenario for other in grade.trials)
-    which = "the only trial" if of == 1 else f"trial {trial.index + 1} of {of}, the one that lost most"
-    if of > 1 and all(item.passed for result in grade.criteria for item in result.evidence):
-        which = f"trial {trial.index + 1} of {of}"
+    lines = tuple(_message_lines(recording))
+    several = len(grade.trials) > 1
     return Scene(
-        scenario=one_line(scenario, 80),
-        which=which,
-        words=verdict_words(trial.verdict),
+        where=f": {one_line(scenario, 80)}, trial {trial.index + 1}" if several else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=timeline(recording),
-        messages=tuple(itertools.islice(_message_lines(recording), _MOST_MESSAGES)),
-        more_messages=max(0, len(messages) + len(recording.agent_messages) - _MOST_MESSAGES),
-        responder_output=readable(recording.responder_output, 4000),
-        responder_log=readable(recording.responder_log, 4000),
-        agents=tuple(
-            AgentOutput(each.agent, readable(each.printed, 4000), readable(each.log, 4000))
-            for each in recording.agent_outputs
-        ),
+        messages=lines[:_MOST_MESSAGES],
+        more_messages=max(0, len(lines) - _MOST_MESSAGES),
+        talk=talk_words(talks(recording)),
+        outputs=tuple(each for each in _outputs(recording) if each.text),
         notes=(
             *((_STOOD_STILL,) if stood_still(recording) else ()),
             *(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
@@ -252,29 +281,46 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
     )
 
 
+def _outputs(recording: Recording) -> Iterator[TextOutput]:
+    yield TextOutput("What your responder printed", readable(recording.responder_output, 4000))
+    yield TextOutput("What your responder wrote to logger.txt", readable(recording.responder_log, 4000))
+    for each in recording.agent_outputs:
+        yield TextOutput(f"What the agent {each.agent} printed", readable(each.printed, 4000))
+        yield TextOutput(f"What the agent {each.agent} wrote to logger.txt", readable(each.log, 4000))
+
+
+def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...]) -> Seen:
+    results = [grade.criteria[index] for index in alike]
+    tables = tuple(recognition_table(result) for result in results if result.accuracy is not None)
+    return Seen(
+        " and ".join(f"“{one_line(result.title, 80)}”" for result in results),
+        tables,
+        tables[0].classes if tables else (),
+        tuple(plot for plot in plots if not plot.scenario and plot.subject in alike),
+    )
+
+
 def _message_lines(recording: Recording) -> Iterator[MessageLine]:
-    """Each message of the robot's is followed by what the agents said until it was answered.
+    """Each message of the robot's is followed by what was called and what agents said until it was answered.
 
     Two robots have no agents, so the index of a message among those told is its index in the recording.
     """
-    inner: dict[int, list[AgentMessage]] = {}
-    for each in recording.agent_messages:
-        inner.setdefault(each.message, []).append(each)
-    yield from map(_agent_line, inner.get(-1, ()))
+    yield from map(_inner_line, inside(recording, -1))
     for index, (sender, message) in enumerate(messages_of(recording)):
         arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
         happened = befell_in_full(message)
         if happened:
             arrived += f" ({happened})"
-        wrong = message.delivered is None or bool(happened)
-        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, wrong)
-        yield from map(_agent_line, inner.get(index, ()))
+        kind = "wrong" if message.delivered is None or happened else ""
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, kind)
+        if recording.partner is None:
+            yield from map(_inner_line, itertools.islice(inside(recording, index), MOST_CALL_STEPS))
 
 
-def _agent_line(each: AgentMessage) -> MessageLine:
-    arrived = f"({each.note})" if each.note else f"{each.t:.2f} s"
-    sender = f"{each.sender} → {each.receiver}"
-    return MessageLine(f"{each.t:.2f}", sender, message_words(each.text, 240), arrived, bool(each.note))
+def _inner_line(step: Step) -> MessageLine:
+    t = "" if step.t is None else f"{step.t:.2f}"
+    note = f"({step.note})" if step.note else ""
+    return MessageLine(t, f"{step.source} → {step.target}", step.label, note, "wrong" if step.note else "inner")
 
 
 def _trial_line(trial: TrialResult) -> TrialLine:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.grading.grade import CriterionResult, Grade
+from service.grading.grade import CriterionResult
 from service.grading.judging.per_class import class_scores
 from service.reports.readable import one_line
 
@@ -35,12 +35,8 @@ class RecognitionTable:
     classes: tuple[ClassLine, ...]
 
 
-def recognition_tables(grade: Grade) -> tuple[RecognitionTable, ...]:
-    """A table for every criterion that measured an accuracy."""
-    return tuple(_table(result) for result in grade.criteria if result.accuracy is not None)
-
-
-def _table(result: CriterionResult) -> RecognitionTable:
+def recognition_table(result: CriterionResult) -> RecognitionTable:
+    """The figures of a criterion that measured an accuracy."""
     accuracy = result.accuracy
     assert accuracy is not None
     of = accuracy.counts.of if accuracy.counts is not None else "images"

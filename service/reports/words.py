@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
-from service.grading.grade import CriterionResult, Grade
+from service.grading.grade import Accuracy, CriterionResult, Grade
 from service.reports.readable import number, one_line, readable
 from sim.recording import LossReason, Verdict
 
@@ -184,7 +184,7 @@ def grade_words(grade: Grade) -> VerdictWords:
 
 def _next_step(grade: Grade, words: VerdictWords) -> str:
     """The verdict's advice if something went wrong, else what would gain most marks, if any are missing."""
-    if words.tone == "bad" or grade.verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR):
+    if words.tone == "bad" or is_ours(grade.verdict):
         return words.next_step
     lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
     if lost is None:
@@ -226,6 +226,16 @@ def hints_of(grade: Grade) -> tuple[str, ...]:
     return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
 
 
+def is_ours(verdict: Verdict) -> bool:
+    """Whether the student has nothing to mend."""
+    return verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+
+
+def accuracy_counted(accuracy: Accuracy) -> tuple[int, str]:
+    """How many were named rightly, and what is counted."""
+    return round(accuracy.value * accuracy.n), accuracy.counts.of if accuracy.counts else "images"
+
+
 def by_hand_words(result: CriterionResult) -> str:
     """What an instructor set in place of the grader's marks, and why; empty where nobody did."""
     said = result.set_by_hand
@@ -254,7 +264,7 @@ def accuracy_words(grade: Grade) -> str:
         return ""
     return (
         f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
-        f"{accuracy.n} {accuracy.counts.of if accuracy.counts else 'images'})."
+        f"{accuracy.n} {accuracy_counted(accuracy)[1]})."
     )
 
 

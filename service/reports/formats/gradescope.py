@@ -12,20 +12,22 @@ from decimal import Decimal
 from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
-from service.reports.faults import fault_groups
+from service.reports.cause import diagnose, ended, excerpt_lines
+from service.reports.faults import faults_beside
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import comments_of, grade_words, hints_of
+from service.reports.words import comments_of
+from submissions.submission import Submission
 
 
-def gradescope_document(view: GradebookView) -> dict[str, Any]:
+def gradescope_document(view: GradebookView, submission: Submission | None = None) -> dict[str, Any]:
     """The grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
     grade = view.entry
     return {
         "score": json_number(view.marks or Decimal(0)),
-        "output": _output(view),
+        "output": _output(view, submission),
         "output_format": "text",
         "test_output_format": "text",
         "test_name_format": "text",
@@ -43,9 +45,9 @@ def gradescope_document(view: GradebookView) -> dict[str, Any]:
 
 
 @document("gradescope", ".json", gradebook_view)
-def gradescope_text(view: GradebookView) -> str:
+def gradescope_text(view: GradebookView, submission: Submission | None = None) -> str:
     """The document as indented ASCII JSON."""
-    return _text(gradescope_document(view))
+    return _text(gradescope_document(view, submission))
 
 
 @refusal("gradescope")
@@ -87,12 +89,13 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
     }
 
 
-def _output(view: GradebookView) -> str:
+def _output(view: GradebookView, submission: Submission | None) -> str:
     shown = view.shown
-    words = grade_words(shown)
+    diagnosis = diagnose(shown, submission)
     lines = [f"Comment: {comment}" for comment in comments_of(shown)]
-    lines += [*hints_of(shown), words.happened, words.whose, words.next_step]
-    for group in fault_groups(shown, limit=10):
-        lines += [f"{group.where}: {group.message}", *([group.hint] if group.hint else []), f"({group.how_often})"]
+    lines += [diagnosis.cause, *excerpt_lines(diagnosis), f"Next: {diagnosis.next_step}"]
+    lines += [*diagnosis.further, ended(shown, diagnosis)]
+    for told, group in faults_beside(diagnosis.cause, shown):
+        lines += [told, *([group.hint] if group.hint and told != group.where else []), f"({group.how_often})"]
     lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]
     return "\n".join([*lines, f"sandbox: {shown.sandbox}"])

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from typing import Any
 
 from service.grading.grade import Accuracy, Grade, SetByHand
+from service.reports.cause import Excerpt, diagnose
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
 from service.reports.rows import TableRow
@@ -18,19 +19,28 @@ from service.reports.trace import agent_messages, storable
 from service.reports.view import View, staff_view
 from service.reports.words import hints_of
 from sim.recording import Message, Recording
+from submissions.submission import Submission
 
 SCHEMA = 1
 
 
-def json_document(view: View) -> dict[str, Any]:
-    """The grade as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification."""
+def json_document(view: View, submission: Submission | None = None) -> dict[str, Any]:
+    """The grade as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification.
+
+    The lines at fault are in ``excerpt`` only with the ``submission``.
+    """
     grade = view.grade
+    diagnosis = diagnose(grade, submission)
     return {
         "schema": SCHEMA,
         "assignment": grade.assignment,
         "marks": json_number(grade.marks),
         "max_marks": json_number(grade.max_marks),
         "verdict": grade.verdict.value,
+        "cause": storable(diagnosis.cause),
+        "next_step": storable(diagnosis.next_step),
+        **({"excerpt": _excerpt(diagnosis.excerpt)} if diagnosis.excerpt else {}),
+        "lost_by_cause": [grade.criteria[index].id for index in sorted(diagnosis.lost)],
         **({"hints": [storable(hint) for hint in hints_of(grade)]} if grade.hints else {}),
         "criteria": [
             {
@@ -66,9 +76,9 @@ def json_document(view: View) -> dict[str, Any]:
 
 
 @document("json", ".json", staff_view)
-def json_text(view: View) -> str:
+def json_text(view: View, submission: Submission | None = None) -> str:
     """The document as indented ASCII JSON."""
-    return json.dumps(json_document(view), indent=2, allow_nan=False) + "\n"
+    return json.dumps(json_document(view, submission), indent=2, allow_nan=False) + "\n"
 
 
 @refusal("json")
@@ -91,6 +101,11 @@ def _of_several(row: TableRow[View]) -> dict[str, Any]:
         none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
         return {**who, **why, **none}
     return {**who, **why, **json_document(row.grade)}
+
+
+def _excerpt(excerpt: Excerpt) -> dict[str, Any]:
+    lines = [{"number": line.number, "text": storable(line.text), "marked": line.marked} for line in excerpt.lines]
+    return {"of": storable(excerpt.name), "lines": lines}
 
 
 def _by_hand(said: SetByHand) -> dict[str, Any]:

@@ -9,20 +9,22 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from service.grading.grade import CriterionResult, Grade
+from service.reports.cause import diagnose, excerpt_lines
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
 from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
 from service.reports.words import comments_of, hints_of
 from sim.recording import Verdict
+from submissions.submission import Submission
 
 _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
 
 
 @document("junit", ".xml", staff_view)
-def junit_text(view: View) -> str:
+def junit_text(view: View, submission: Submission | None = None) -> str:
     """The grade as a ``testsuites`` document with one suite; times are simulated seconds."""
-    return _document([_suite(view.grade, [("student", view.grade.student)])])
+    return _document([_suite(view.grade, [("student", view.grade.student)], submission)])
 
 
 @refusal("junit")
@@ -61,13 +63,13 @@ def _suite_of(row: TableRow[View]) -> ElementTree.Element:
     return suite
 
 
-def _suite(grade: Grade, who: Sequence[tuple[str, str]]) -> ElementTree.Element:
+def _suite(grade: Grade, who: Sequence[tuple[str, str]], submission: Submission | None = None) -> ElementTree.Element:
     unmarked = grade.verdict in _NOT_MARKED
     missed = sum(result.marks < result.max_marks for result in grade.criteria)
     seconds = sum(trial.recording.end_t for trial in grade.trials)
     failures, errors = (0, missed) if unmarked else (missed, 0)
     suite = _begun(grade.assignment, len(grade.criteria), failures, errors, seconds=seconds)
-    _add_properties(suite, [*who, *_properties(grade)])
+    _add_properties(suite, [*who, *_properties(grade, submission)])
     for result in grade.criteria:
         _add_case(suite, grade, result, "error" if unmarked else "failure")
     return suite
@@ -97,11 +99,15 @@ def _add_case(suite: ElementTree.Element, grade: Grade, result: CriterionResult,
         element.text = readable(result.message)
 
 
-def _properties(grade: Grade) -> list[tuple[str, str]]:
+def _properties(grade: Grade, submission: Submission | None) -> list[tuple[str, str]]:
+    diagnosis = diagnose(grade, submission)
     return [
         ("marks", number(grade.marks)),
         ("max_marks", number(grade.max_marks)),
         ("verdict", grade.verdict.value),
+        ("cause", diagnosis.cause),
+        ("next_step", diagnosis.next_step),
+        *(("excerpt", line) for line in excerpt_lines(diagnosis)),
         *(("comment", comment) for comment in comments_of(grade)),
         *(("hint", hint) for hint in hints_of(grade)),
         ("assignment_version", grade.assignment_version),

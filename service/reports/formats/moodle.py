@@ -14,12 +14,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import BinaryIO
 
+from service.reports.cause import diagnose
 from service.reports.formats.csv_output import csv_text, safe_cell
 from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import comments_of, hints_of
+from service.reports.words import comments_of
 from sim.errors import UsageError
 from submissions.downloads import moodle_number
 
@@ -104,8 +105,11 @@ def _feedback(row: TableRow[GradebookView]) -> str:
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    said = () if row.grade is None else (*comments_of(row.grade.shown), *hints_of(row.grade.shown))
-    return one_line(" ".join([*said, "; ".join(lines)]), _LONGEST)
+    first: list[str] = []
+    if row.grade is not None:
+        diagnosis = diagnose(row.grade.shown)
+        first = [*comments_of(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
+    return one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:

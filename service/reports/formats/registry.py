@@ -7,14 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import BinaryIO, TypeVar
+from typing import Any, BinaryIO, Protocol, TypeVar
 
 from rich.console import RenderableType
 
 from service.grading.grade import Grade
 from service.reports.rows import ReportPage, TableRow
+from submissions.submission import Submission
 
 _V = TypeVar("_V")
+_Writes = TypeVar("_Writes", bound=Callable[..., str])
+_Shows = TypeVar("_Shows", bound=Callable[..., RenderableType])
+_T = TypeVar("_T", covariant=True)
+
+
+class OfOne(Protocol[_T]):
+    """What is made of one grade, with lines of the student's where the submission is given."""
+
+    def __call__(self, grade: Grade, submission: Submission | None = None, /) -> _T:
+        """Without the submission there is no excerpt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +46,10 @@ class Format:
 
     name: str
     suffix: str = ""
-    document: Callable[[Grade], str] | None = None
+    document: OfOne[str] | None = None
     refusal: Callable[[TableRow[Grade]], str] | None = None
     table: Callable[[Sequence[TableRow[Grade]]], str] | None = None
-    on_terminal: Callable[[Grade], RenderableType] | None = None
+    on_terminal: OfOne[RenderableType] | None = None
     filled_in: Callable[[Sequence[TableRow[Grade]], str], FilledIn] | None = None
     packed: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]] | None = None
 
@@ -46,13 +57,14 @@ class Format:
 FORMATS: dict[str, Format] = {}
 
 
-def document(
-    name: str, suffix: str, view: Callable[[Grade], _V]
-) -> Callable[[Callable[[_V], str]], Callable[[_V], str]]:
-    """Registers a function that writes what ``view`` leaves of one grade."""
+def document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[_Writes], _Writes]:
+    """Registers a function that writes what ``view`` leaves of one grade, with the submission where it is given."""
 
-    def register(render: Callable[[_V], str]) -> Callable[[_V], str]:
-        FORMATS[name] = replace(_begun(name), suffix=suffix, document=lambda grade: render(view(grade)))
+    def register(render: _Writes) -> _Writes:
+        def written(grade: Grade, submission: Submission | None = None, /) -> str:
+            return render(view(grade), submission)
+
+        FORMATS[name] = replace(_begun(name), suffix=suffix, document=written)
         return render
 
     return register
@@ -117,13 +129,14 @@ def packed(
     return register
 
 
-def on_terminal(
-    name: str, view: Callable[[Grade], _V]
-) -> Callable[[Callable[[_V], RenderableType]], Callable[[_V], RenderableType]]:
-    """Registers a function that shows on a screen what ``view`` leaves of one grade."""
+def on_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Shows], _Shows]:
+    """Registers a function that shows on a screen what ``view`` leaves of one grade, as ``document`` does."""
 
-    def register(render: Callable[[_V], RenderableType]) -> Callable[[_V], RenderableType]:
-        FORMATS[name] = replace(_begun(name), on_terminal=lambda grade: render(view(grade)))
+    def register(render: _Shows) -> _Shows:
+        def shown(grade: Grade, submission: Submission | None = None, /) -> RenderableType:
+            return render(view(grade), submission)
+
+        FORMATS[name] = replace(_begun(name), on_terminal=shown)
         return render
 
     return register

@@ -74,11 +74,18 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     axes.set_axis_off()
     axes.set_xlim(0, across)
     axes.set_ylim(body / cell, -heads / cell)
-    size = 9.0 if cell > 0.4 else max(5.0, 22 * cell)
-    _draw_names(axes, table, size * 0.82)
+    size = 9.0 if cell > 0.4 else max(7.5 if cell > 0.25 else 5.0, 22 * cell)
+    _draw_names(axes, table, _smaller(size))
     _draw_cells(axes, table, size)
-    write(figure, 0.08, 0.24, "rows: what it was;  columns: what was answered;  framed: right", size=7.2, colour=FAINT)
-    write(figure, 0.08, 0.10, "recall: right of what it was;  precision: right of what was answered", size=7.2,
+    write(
+        figure,
+        0.08,
+        0.24,
+        "rows: what it was;  columns: what was answered;  ✓: right  ✗: wrong",
+        size=7.5,
+        colour=FAINT,
+    )
+    write(figure, 0.08, 0.10, "recall: right of what it was;  precision: right of what was answered", size=7.5,
           colour=FAINT)  # fmt: skip
     return figure
 
@@ -107,18 +114,29 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
             share = count / table.totals[row] if table.totals[row] else 0.0
             right = table.answers[column] == table.truths[row]
             _draw_cell(axes, (column, row), share, right=right)
+            colour = "white" if share > 0.55 else (INK if count else FAINT)
             axes.text(
                 column + 0.5, row + 0.5, str(count) if count else "·", font=font(size, bold=count > 0), ha="center",
-                va="center", color="white" if share > 0.55 else (INK if count else FAINT),
+                va="center", color=colour,
             )  # fmt: skip
+            if count:
+                axes.text(
+                    column + 0.93, row + 0.06, "✓" if right else "✗", font=font(_smaller(size), bold=True), ha="right",
+                    va="top", color=colour,
+                )  # fmt: skip
         _figure_text(axes, len(counts) + 0.65, row, str(table.totals[row]), size)
         right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
-        _figure_text(axes, len(counts) + 1.85, row, _share(right_ones, table.totals[row]), size * 0.82)
+        _figure_text(axes, len(counts) + 1.85, row, _share(right_ones, table.totals[row]), _smaller(size))
     for column, answer in enumerate(table.answers):
         if answer in table.truths:
             answered = sum(counts[column] for counts in table.counts)
             right_ones = table.counts[table.truths.index(answer)][column]
-            _figure_text(axes, column + 0.5, len(table.truths), _share(right_ones, answered), size * 0.82)
+            _figure_text(axes, column + 0.5, len(table.truths), _share(right_ones, answered), _smaller(size))
+
+
+def _smaller(size: float) -> float:
+    """For what stands beside the counts: as small as a phone can show it, unless there are very many classes."""
+    return max(0.82 * size, min(size, 7.5))
 
 
 def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None:
@@ -133,8 +151,9 @@ def _share(part: int, whole: int) -> str:
 
 
 def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, right: bool) -> None:
-    # One hue from white to dark blue, so that the order survives a greyscale print.
-    shade = tuple(1 - share * (1 - channel) for channel in (0.07, 0.27, 0.47))
+    # One hue each, from white to dark, so that the order survives a greyscale print.
+    darkest = (0.07, 0.27, 0.47) if right else (0.64, 0.09, 0.16)
+    shade = tuple(1 - share * (1 - channel) for channel in darkest)
     axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor=RULE, linewidth=0.7))
     if right:
         inner = (corner[0] + 0.05, corner[1] + 0.05)

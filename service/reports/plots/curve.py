@@ -73,7 +73,7 @@ def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "",
               va="center", colour=FAINT)  # fmt: skip
         axes = axes_at(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
         draw_panel(axes, panel)
-    write(figure, 0.08, 0.09, "line: share right;  band: 95 % interval (Wilson)", size=7.2, colour=FAINT)
+    write(figure, 0.08, 0.09, "line: share right;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
     return figure
 
 
@@ -99,7 +99,7 @@ def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
         axes.axhline(panel.level, color=FAULT, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
         axes.text(
             0.995, panel.level - 0.03, f"asked for: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
-            va="top", color=FAULT, font=font(7.2),
+            va="top", color=FAULT, font=font(7.5),
         )  # fmt: skip
     if len(panel.curves) > 1:
         legend = axes.legend(loc="best", prop=font(7.5), frameon=True, framealpha=0.85, borderpad=0.3)

@@ -5,18 +5,14 @@ The drawing is in one module a plot; nothing here is random, timed or kept betwe
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
 from service.grading.grade import AccuracyCurve, CriterionResult, Grade
-from service.reports.plots.blocks import draw_blocks
 from service.reports.plots.confusion import draw_confusion
-from service.reports.plots.conversation import draw_conversation
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.misread import draw_misread, misread
 from service.reports.plots.own_diagrams import draw_own, own_diagrams
 from service.reports.plots.path import Pixels, draw_path
@@ -24,11 +20,9 @@ from service.reports.plots.plot import Plot, hidden_suffix, slug, title_of, tria
 from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
 from service.reports.plots.sensor import draw_sensors
 from service.reports.plots.style import png
-from service.reports.plots.talk import block_diagram, talks
 from service.reports.plots.track import draw_track, tracks, worst_track
 from service.reports.readable import one_line
-from service.reports.robots import SECOND, messages_of
-from service.reports.view import scenarios, staff_view, student_view, tells_of_hidden, worst_trial
+from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.recorded import floor_of, stood_still
 from sim.recording import Recording
 from submissions.diagram_cells import DiagramCell
@@ -38,7 +32,7 @@ _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
 def plots_of(grade: Grade) -> tuple[Plot, ...]:
-    """Path and sensors of every scenario's worst trial, conversations of the first and the worst, classifications.
+    """Path and sensors of every scenario's worst trial, and classifications, once for criteria that share them.
 
     Of a robot that stood still there is neither path nor sensors.
     """
@@ -54,24 +48,15 @@ def draw_all(
     y = 1143 mm; a floor that is in neither is drawn white.
     """
     drawn: dict[str, bytes] = {}
-    made: dict[Hashable, bytes] = {}
     for view in (staff_view(grade), student_view(grade)):
         for plot in plots_of(view.grade):
             if plot.name not in drawn:
-                what = _shown(view.grade, plot)
-                if what not in made:
-                    made[what] = png(_draw(view.grade, plot, images))
-                drawn[plot.name] = made[what]
+                drawn[plot.name] = png(_draw(view.grade, plot, images))
         for own in own_diagrams(view.grade, cells):
             for plot in own.plots:
                 if plot.name not in drawn:
                     drawn[plot.name] = png(draw_own(own, view.grade, plot))
     return drawn
-
-
-def _shown(grade: Grade, plot: Plot) -> Hashable:
-    """Plots of which this is the same are the same: criteria that judge the same answers show the same images."""
-    return (plot.title, grade.criteria[plot.subject].predictions) if plot.kind == "predictions" else plot.name
 
 
 def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
@@ -80,12 +65,6 @@ def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
         return draw_path(trial, plot.title, _floor(trial.recording, images))
     if plot.kind == "sensors":
         return draw_sensors(grade.trials[plot.subject], plot.title)
-    if plot.kind == "conversation":
-        return draw_conversation(grade.trials[plot.subject], plot.title)
-    if plot.kind == "talk":
-        trial = grade.trials[plot.subject]
-        told = block_diagram(talks(trial.recording))
-        return draw_blocks(told, plot.title, f"trial {trial.index + 1}; counts of texts and calls", Highlights())
     result = grade.criteria[plot.subject]
     if plot.kind == "confusion" and result.accuracy is not None:
         return draw_confusion(result, result.accuracy, plot.title)
@@ -122,8 +101,20 @@ def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
     return floor.pixels if floor else None
 
 
-def _classifications(grade: Grade) -> Iterator[Plot]:
+def same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:
+    """The criteria that tell of recognition, those together that judge the same answers to the same images."""
+    alike: dict[Hashable, list[int]] = {}
     for index, result in enumerate(grade.criteria):
+        confusion = result.accuracy.confusion if result.accuracy is not None else ()
+        if result.accuracy is not None or result.predictions:
+            what = (confusion, result.predictions, result.curves, is_for_staff(result.visibility))
+            alike.setdefault(what, []).append(index)
+    return tuple(map(tuple, alike.values()))
+
+
+def _classifications(grade: Grade) -> Iterator[Plot]:
+    for index, *_ in same_answers(grade):
+        result = grade.criteria[index]
         suffix = hidden_suffix(tells_of_hidden(grade, result))
         accuracy = result.accuracy
         if accuracy is not None and accuracy.confusion:
@@ -214,7 +205,6 @@ def _trials(grade: Grade) -> Iterator[Plot]:
             "messages sent, answers received, speech, touches and faults.",
             f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
         )  # fmt: skip
-    yield from _conversations(grade)
 
 
 def _partners_way(partner: Recording | None) -> str:
@@ -224,31 +214,3 @@ def _partners_way(partner: Recording | None) -> str:
         f" The second robot's from ({partner.start.x:.0f}, {partner.start.y:.0f}) mm to "
         f"({partner.end.x:.0f}, {partner.end.y:.0f}) mm."
     )
-
-
-def _conversations(grade: Grade) -> Iterator[Plot]:
-    """Of the first trial in which anything was sent, and of every scenario's worst."""
-    talking = [index for index, trial in enumerate(grade.trials) if messages_of(trial.recording)]
-    worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
-    for index in dict.fromkeys([*talking[:1], *(index for index in worst if index in talking)]):
-        trial = grade.trials[index]
-        messages = messages_of(trial.recording)
-        counts = Counter(sender.partition(" to ")[0] for sender, _ in messages)
-        second = f", {SECOND} {counts[SECOND]}" if trial.recording.partner is not None else ""
-        lost = sum(message.delivered is None for _, message in messages)
-        name = trial_name(trial)
-        yield Plot(
-            f"conversation-{name}", "conversation", index, trial.scenario,
-            f"{title_of(grade, trial.scenario)}: conversation",
-            f"Who told whom what in trial {trial.index + 1}; time goes down.",
-            f"Sequence diagram: the robot sent {counts['robot']} messages{second}, the responder "
-            f"{counts['responder']}; {lost} never arrived.",
-        )  # fmt: skip
-        told = talks(trial.recording)
-        yield Plot(
-            f"talk-{name}", "talk", index, trial.scenario, f"{title_of(grade, trial.scenario)}: who told whom",
-            f"Who told whom how often in trial {trial.index + 1}; an arrow with two heads is a call that gave "
-            "something back.",
-            "Block diagram: "
-            + ", ".join(f"{each.source} to {each.target} {each.count}" for each in told if each.kind != "return") + ".",
-        )  # fmt: skip

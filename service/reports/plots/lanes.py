@@ -1,6 +1,6 @@
 """Draws a sequence diagram that a text describes: one lane an actor, time going down.
 
-The conversation of a trial has a drawing of its own, with times, in ``conversation.py``.
+What is told in it, and in which order, is decided by whoever made the diagram.
 """
 
 from __future__ import annotations

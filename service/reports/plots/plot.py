@@ -13,11 +13,12 @@ from service.grading.grade import Grade, TrialResult
 from service.reports.readable import one_line
 from service.reports.view import is_for_staff
 
+#: Characters of a title for assignment and scenario, beside ``: sensors``.
+_ROOM = 46
+
 Kind = Literal[
     "path",
     "sensors",
-    "conversation",
-    "talk",
     "confusion",
     "curves",
     "track",
@@ -45,8 +46,9 @@ class Plot:
 
 
 def title_of(grade: Grade, what: str) -> str:
-    """A plot's title: of which assignment, and what it shows."""
-    return f"{one_line(grade.assignment_title, 32)}, {one_line(what, 24)}"
+    """A plot's title: of which assignment, as far as there is room, and what it shows."""
+    shown = one_line(what, 24)
+    return f"{one_line(grade.assignment_title, _ROOM - len(shown))}, {shown}"
 
 
 def trial_name(trial: TrialResult) -> str:

@@ -1,6 +1,6 @@
 """The conversation of a trial as steps between parties, the way a sequence diagram tells it.
 
-It decides what is told and what is left out; ``conversation.py`` draws it.
+It decides what is told and what is left out; pages list it, and ``lanes.py`` draws it beside a notebook's diagram.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _told(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
         message = recording.messages[exchange.sent]
         steps: list[Step | Gap] = [_crossing(message, robot)]
         if message.delivered is not None and not message.to_partner:
-            made = list(_inside(recording, exchange.sent))
+            made = list(inside(recording, exchange.sent))
             steps += made[:MOST_CALL_STEPS]
             if len(made) > MOST_CALL_STEPS:
                 steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
@@ -195,10 +195,10 @@ def _crossing(message: Message, robot: str) -> Step:
     return Step("message", source, target, label, message.t if sent else message.delivered, note)
 
 
-def _inside(recording: Recording, message: int) -> Iterator[Step]:
-    """What was called, and what agents were asked, until the robot's message was answered."""
+def inside(recording: Recording, message: int) -> Iterator[Step]:
+    """What was called, and what agents were asked, until the robot's message was answered; before any, for -1."""
     calls = sorted((call for call in recording.calls if call.message == message), key=_before)
-    told, shown_at = 0, recording.messages[message].t
+    told, shown_at = 0, recording.messages[message].t if message >= 0 else 0.0
     for place, each in enumerate(recording.agent_messages):
         if each.message == message:
             until = bisect_right(calls, place, told, key=_before)

@@ -72,6 +72,12 @@ def party_of(name: str) -> str:
     return name if name in _NAMED else "network"
 
 
+def talk_words(told: tuple[Talk, ...]) -> str:
+    """Who told whom how often, in a sentence; empty where nobody told anything."""
+    counts = ", ".join(f"{each.source} to {each.target} {_count(each)}" for each in told if each.kind != "return")
+    return f"How often who told whom: {counts}." if counts else ""
+
+
 def block_diagram(told: tuple[Talk, ...]) -> Diagram:
     """The same as boxes and arrows with counts; a call that gave something back has an arrow at both ends."""
     returned = {(talk.source, talk.target) for talk in told if talk.kind == "return"}

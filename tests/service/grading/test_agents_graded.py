@@ -137,8 +137,8 @@ def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
         "agent → parser",
         "parser → agent",
     ]
-    assert [each.agent for each in scene.agents] == ["agent", "logger", "parser"]
-    assert "Received message: PY::0" in scene.agents[1].log
+    outputs = {each.title: each.text for each in scene.outputs}
+    assert "Received message: PY::0" in outputs["What the agent logger wrote to logger.txt"]
     (trial,) = json_document(staff_view(full))["trials"]
     assert trial["agent_messages"][2]["text"] == "0"
     assert len(plain_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24

@@ -241,7 +241,7 @@ def test_hostile_texts_run_nothing_and_break_nothing(browser: Browser, tmp_path:
             shown = found.page
             for t in (0, 0.1, 0.4, 1.5):
                 shown.evaluate(SEEK, t)
-            shown.locator("section.replay summary").click()
+            shown.locator("section.replay .events summary").click()
             expect(shown.locator(".events tbody tr").nth(3)).to_be_visible()
             assert shown.locator("section.replay img, section.replay iframe").count() == 0
             assert shown.evaluate("document.scripts.length") == 2
@@ -256,7 +256,7 @@ def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, 
     file = tmp_path / "report.html"
     file.write_text(report(student_view(build.astray_grade()), {}, build.faulty_submission()))
     with opened(browser, file, "#trial=2&t=0.5", color_scheme=scheme, **context) as found:
-        found.page.locator("section.replay summary").click()
+        found.page.locator("section.replay .events summary").click()
         found.page.evaluate(axe)
         expect(found.page.locator(".events tbody tr").first).to_be_visible()
         wrong = found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)")
@@ -299,7 +299,7 @@ def test_the_other_robot_is_where_its_recording_has_it(
 def test_the_other_trial_is_switched_off_and_on_by_keyboard(browser: Browser, report_of_two: Path) -> None:
     with opened(browser, report_of_two, "#trial=1&t=11.5", **DESKTOP) as found:
         page = found.page
-        page.locator("section.replay summary").click()
+        page.locator("section.replay .events summary").click()
         rows = page.locator(".events tbody tr.of-over")
         assert (now(page), rows.count()) == (11.5, 3)
         expect(page.locator(".happened .of-over").first).to_contain_text("attempt 1: robot: said")
@@ -343,7 +343,7 @@ def test_hostile_texts_of_the_other_trial_run_nothing(
     file.write_text(replay_page(poisoned(honest, HOSTILE)))
     with opened(browser, file, "#trial=2&t=0.5", **context) as found:
         page = found.page
-        page.locator("section.replay summary").click()
+        page.locator("section.replay .events summary").click()
         expect(page.locator(".events tbody tr.of-over").first).to_be_visible()
         assert page.evaluate("document.scripts.length") == 2
         assert page.locator("section.replay img, section.replay iframe").count() == 0
@@ -358,7 +358,7 @@ def test_axe_finds_nothing_in_two_trials(
 ) -> None:
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     with opened(browser, report_of_two, "#trial=2&t=6", color_scheme=scheme, **context) as found:
-        found.page.locator("section.replay summary").click()
+        found.page.locator("section.replay .events summary").click()
         found.page.evaluate(axe)
         expect(found.page.locator(".events tbody tr.of-over").first).to_be_visible()
         assert found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)") == []

@@ -13,13 +13,15 @@ import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
 from service.reports.page import page_of
 from service.reports.plots.confusion import confusion_table, draw_confusion
-from service.reports.plots.conversation import draw_conversation
+from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.plots.own_diagrams import draw_diagram
 from service.reports.plots.path import draw_path
 from service.reports.plots.predictions import chosen_predictions, focus_image, sensor_image
 from service.reports.plots.sensor import draw_sensors, panels_of, strips_of
 from service.reports.plots.sequence import Gap, Step, conversation
 from service.reports.plots.style import DPI, WIDTH
+from service.reports.plots.talk import sequence_diagram
 from service.reports.view import staff_view
 from sim.recording import Call, Message, Pose, Recording
 
@@ -37,10 +39,6 @@ def test_names_of_all_plots() -> None:
         "confusion-names-the-right-shape",
         "misread-names-the-right-shape",
         "predictions-names-the-right-shape",
-        "conversation-each-shape-1",
-        "conversation-each-shape-5",
-        "talk-each-shape-1",
-        "talk-each-shape-5",
     }
 
 
@@ -56,8 +54,13 @@ def test_criteria_that_judge_the_same_answers_share_their_images() -> None:
     grade = build.shape_grade()
     (judged,) = (result for result in grade.criteria if result.predictions)
     again = replace(judged, id="says-it-too", title="Says it too")
-    drawn = draw_all(replace(grade, criteria=(*grade.criteria, again)))
-    assert drawn["predictions-says-it-too"] is drawn[f"predictions-{judged.id}"]
+    both = replace(grade, criteria=(*grade.criteria, again))
+    assert draw_all(both).keys() == draw_all(grade).keys()
+    (seen,) = page_of(staff_view(both)).recognition
+    assert [table.title for table in seen.tables] == [judged.title, "Says it too"]
+    assert {plot.kind for plot in seen.plots} == {"confusion", "misread", "predictions"}
+    other = replace(again, predictions=again.predictions[1:])
+    assert len(page_of(staff_view(replace(grade, criteria=(*grade.criteria, other)))).recognition) == 2
 
 
 def test_at_most_256_colours_and_white_stays_white() -> None:
@@ -96,7 +99,7 @@ def test_hostile_text_is_drawn_not_interpreted() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_trials_that_hardly_began(count: int) -> None:
     trial = TrialResult("short", 0, 1, 0, 0, "visible", build.line_follower_recording(count))
-    for figure in (draw_path(trial, "t", None), draw_sensors(trial, "t"), draw_conversation(trial, "t")):
+    for figure in (draw_path(trial, "t", None), draw_sensors(trial, "t")):
         figure.draw_without_rendering()
     assert ("no time passed" in _texts(draw_sensors(trial, "t"))) is (count == 0)
 
@@ -147,8 +150,12 @@ def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
         ("call", "responder", "logger"),
         ("message", "responder", "robot"),
     ]
-    shown = _texts(draw_conversation(trial, "t"))
+    shown = _texts(draw_diagram(sequence_diagram(told), "t", "", Highlights()))
     assert all(shown.count(party) == 1 for party in told.parties)
+    inner = [
+        line.sender for line in page_of(staff_view(build.shape_grade())).scenes[0].messages if line.kind == "inner"
+    ]
+    assert inner == [f"{source} → {target}" for kind, source, target in arrows if kind != "message"]
 
 
 def test_the_diagram_says_why_each_was_lost() -> None:
@@ -161,8 +168,6 @@ def test_the_diagram_says_why_each_was_lost() -> None:
         ("message", "duplicated, corrupted to PY::7", "PY::0"),
         ("lost", "facing away", "saw 7 (120° off)"),
     ]
-    shown = _texts(draw_conversation(TrialResult("a", 0, 1, 0, 0, "visible", _talk(*build.ASTRAY)), "t"))
-    assert {"lost by chance", "out of range", "facing away", "blocked"} <= set(shown)
 
 
 def test_of_many_tries_the_one_that_got_through_is_shown() -> None:
@@ -176,7 +181,8 @@ def test_lost_messages_are_told_apart() -> None:
     told = conversation(build.faulty_grade().trials[1].recording)
     kinds = [step.kind for step in told.steps if isinstance(step, Step)]
     assert kinds == ["message", "lost", "message", "silence", "lost"]
-    assert _texts(draw_conversation(build.faulty_grade().trials[1], "t")).count("lost") == 2
+    (talk, *_) = (scene for scene in page_of(staff_view(build.faulty_grade())).scenes if scene.messages)
+    assert [line.arrived for line in talk.messages if line.kind == "wrong"] == ["never (lost)", "never (lost)"]
 
 
 def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
@@ -195,7 +201,8 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
     gaps = [step.count for step in told.steps if isinstance(step, Gap)]
     assert sum(gaps) == 34
     trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
-    assert any("6 of 40 exchanges" in text for text in _texts(draw_conversation(trial, "t")))
+    (scene,) = page_of(staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes
+    assert (len(scene.messages), scene.more_messages) == (40, 40)
 
 
 def test_answers_to_nothing_and_strange_indices_are_shown_too() -> None:

@@ -2,6 +2,7 @@
 
 const RECENT = 7;
 const MOST_ROWS = 1500;
+const WIDE = matchMedia("(min-width: 48rem)"); // as in replay.css: on a phone the numbers are folded
 const NAMES = {
   left_rgb: "Left light", right_rgb: "Right light", ultrasonic: "Ultrasonic", gyro: "Gyro",
   left_position: "Left wheel", right_position: "Right wheel",
@@ -45,8 +46,9 @@ class SensorPanel {
     }
     this.sent = element("p", { className: "sent small" });
     this.readings = element("dl", { className: "readings" });
-    this.root = element("section", { className: "sensors" }, element("h3", {}, "What it senses"), eyes, this.sent,
-      this.readings);
+    const readings = element("details", { className: "all-readings", open: WIDE.matches },
+      element("summary", {}, "Readings"), this.readings);
+    this.root = element("section", { className: "sensors" }, element("h3", {}, "What it senses"), eyes, this.sent, readings);
   }
 
   show(trial) {

@@ -1,0 +1,234 @@
+"""Why a grade has not all its marks, decided once for every format: the one cause, what to do next, and the lines.
+
+It explains and never judges: no mark depends on it, and it sees only what the reader of a view may see.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from service.grading.grade import CriterionResult, Evidence, Grade
+from service.reports.faults import SourceLine, excerpt_around, fault_groups, source_called
+from service.reports.readable import one_line, readable
+from service.reports.words import accuracy_counted, grade_words, hints_of, is_ours, verdict_words
+from sim.recorded import faults_of
+from sim.recording import Fault, Verdict
+from submissions.submission import Submission
+
+FULL_MARKS = "Full marks: everything that was asked for is there."
+_PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
+_QUOTED = re.compile(r'"([^"]{2,})"')
+#: A hint on one text that is nearly what is asked for: found, then expected. Nothing else comes of it.
+_NEARLY = re.compile(r'"; expected "')
+
+
+@dataclass(frozen=True, slots=True)
+class Excerpt:
+    """Lines of the student's own file or cell, with the line that the cause is in."""
+
+    name: str
+    lines: tuple[SourceLine, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What is told first. ``cause`` and ``next_step`` are sentences; ``further`` are causes that come after.
+
+    ``lost`` are the criteria that lost marks by this cause, by their index.
+    """
+
+    cause: str
+    next_step: str
+    further: tuple[str, ...] = ()
+    excerpt: Excerpt | None = None
+    lost: frozenset[int] = frozenset()
+
+
+def excerpt_lines(diagnosis: Diagnosis) -> list[str]:
+    """The excerpt as lines of text, an arrow before the one that the cause is in."""
+    lines = () if diagnosis.excerpt is None else diagnosis.excerpt.lines
+    return [f"{'→' if line.marked else ' '} {line.number:>4}  {line.text}".rstrip() for line in lines]
+
+
+def ended(grade: Grade, diagnosis: Diagnosis) -> str:
+    """How it ended and whose doing that is, without what the cause has said."""
+    words = grade_words(grade)
+    return words.whose if words.happened in diagnosis.cause else f"{words.happened} {words.whose}"
+
+
+def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
+    """The one cause: what a hint names, else a fault that cost marks, else what the dearest criterion did not find.
+
+    Excerpts need the ``submission``.
+    """
+    words = grade_words(grade)
+    # What was set by hand is told in the words of whoever set it.
+    graded = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
+    lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
+    if is_ours(grade.verdict):
+        return Diagnosis(words.happened, words.next_step)
+    if grade.criteria and grade.marks >= grade.max_marks:
+        return Diagnosis(FULL_MARKS, "Nothing is left to do.")
+    hints = hints_of(grade)
+    if hints:
+        return _of_hint(grade, hints, lost, submission)
+    fault = _costly_fault(grade, lost)
+    if fault is not None:
+        return _of_fault(grade, fault, lost, submission)
+    if grade.missing:
+        concerned = (index for index, each in lost.items() if grade.missing in each.message)
+        return Diagnosis(words.happened, words.next_step, lost=frozenset(concerned))
+    return _of_criterion(grade, lost) if lost else Diagnosis(words.happened, words.next_step)
+
+
+def _of_hint(
+    grade: Grade, hints: tuple[str, ...], lost: dict[int, CriterionResult], submission: Submission | None
+) -> Diagnosis:
+    hint = hints[0]
+    fault = next((each for each in _faults(grade) if readable(each.message, 200).rstrip(".") in hint), None)
+    if fault is not None:
+        with_it = _lost_by(grade, fault, lost)
+    elif _NEARLY.search(hint):
+        texts = _QUOTED.findall(hint)
+        with_it = frozenset(index for index, each in lost.items() if any(text in each.message for text in texts))
+    else:
+        with_it = frozenset(index for index, each in lost.items() if not each.marks)
+    place = _PLACE.match(hint)
+    if place is None:
+        words = grade_words(grade)
+        step = words.next_step if words.tone == "bad" else "Mend that first, and submit it again."
+        return Diagnosis(hint, step, hints[1:], lost=with_it)
+    line, name = int(place[1]), place[2]
+    step = f"Mend line {line} of {name}, run it once in the simulator, and submit it again."
+    return Diagnosis(hint, step, hints[1:], _excerpt(submission, name, line), lost=with_it)
+
+
+def _of_fault(grade: Grade, fault: Fault, lost: dict[int, CriterionResult], submission: Submission | None) -> Diagnosis:
+    step = grade_words(grade).next_step
+    if fault.verdict is Verdict.TIME_LIMIT:
+        words = verdict_words(fault.verdict)
+        return Diagnosis(words.happened, words.next_step, lost=_lost_by(grade, fault, lost))
+    group = next(each for each in fault_groups(grade, submission) if each.message == readable(fault.message, 600))
+    hint = f" {group.hint}" if group.hint else ""
+    cause = f"{group.where}: {group.message.rstrip('.')}.{hint}"
+    excerpt = Excerpt(group.where, group.excerpt) if group.excerpt else None
+    return Diagnosis(cause, step, excerpt=excerpt, lost=_lost_by(grade, fault, lost))
+
+
+def _of_criterion(grade: Grade, lost: dict[int, CriterionResult]) -> Diagnosis:
+    main = max(lost, key=lambda index: lost[index].max_marks - lost[index].marks)
+    result = lost[main]
+    with_it = {index for index, each in lost.items() if _alike(grade, result, each)}
+    step = grade_words(grade).next_step
+    return Diagnosis(found(grade, result) + _practised(grade, result), step, lost=frozenset({main, *with_it}))
+
+
+def _practised(grade: Grade, result: CriterionResult) -> str:
+    """What is to be seen in practice, where nothing may be told of what is marked."""
+    if _failed(result):
+        return ""
+    seen = (each for each in grade.criteria if not each.max_marks and _failed(each))
+    return next((f" In practice: {found(grade, each)}" for each in seen), "")
+
+
+def _failed(result: CriterionResult) -> list[Evidence]:
+    return [each for each in result.evidence if not each.passed]
+
+
+def found(grade: Grade, result: CriterionResult) -> str:
+    """What a criterion found instead of what it asked for, in a sentence or two."""
+    if result.set_by_hand is not None:
+        return readable(result.message, 1000, lines=12)
+    accuracy = result.accuracy
+    wrong = _confused(result)
+    if accuracy is not None and wrong:
+        right, of = accuracy_counted(accuracy)
+        taken = [f"“{one_line(truth, 60)}” was taken for “{one_line(answer, 60)}”" for truth, answer in wrong[:2]]
+        others = ", among others" if len(wrong) > len(taken) else ""
+        return f"{right} of {accuracy.n} {of} were named rightly: {' and '.join(taken)}{others}."
+    failed = next((each for each in _failed(result) if each.message), None)
+    if failed is None:
+        return readable(result.message, 600, lines=6)
+    told = readable(failed.message, 600, lines=6)
+    return told if failed.t is None else f"{told.rstrip('.')}, at {failed.t:.2f} s.{_where(grade, failed)}"
+
+
+def _where(grade: Grade, evidence: Evidence) -> str:
+    if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
+        return ""
+    trial = grade.trials[evidence.trial]
+    several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
+    return f" That was in {one_line(trial.scenario, 60)}{f', trial {trial.index + 1}' if several else ''}."
+
+
+def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:
+    """The first fault; time that was up only where a criterion names it, for by itself it costs nothing."""
+    told = [each.message for result in lost.values() for each in _failed(result)]
+    return next(
+        (
+            fault
+            for fault in _faults(grade)
+            if fault.verdict is not Verdict.TIME_LIMIT or any(fault.message in message for message in told)
+        ),
+        None,
+    )
+
+
+def _faults(grade: Grade) -> Iterator[Fault]:
+    return (fault for trial in grade.trials for fault in faults_of(trial.recording))
+
+
+def _lost_by(grade: Grade, fault: Fault, lost: dict[int, CriterionResult]) -> frozenset[int]:
+    """Those that failed only in trials which had this fault, and nowhere before it."""
+    when = {
+        index: min(each.t for each in same)
+        for index, trial in enumerate(grade.trials)
+        if (same := [each for each in faults_of(trial.recording) if each.message == fault.message])
+    }
+    return frozenset(
+        index
+        for index, result in lost.items()
+        if (failed := _failed(result))
+        and all(each.trial in when and _after(each, when[each.trial], fault) for each in failed)
+    )
+
+
+def _after(evidence: Evidence, t: float, fault: Fault) -> bool:
+    return evidence.t is None or evidence.t >= t - 0.05 or fault.message in evidence.message
+
+
+def _alike(grade: Grade, one: CriterionResult, other: CriterionResult) -> bool:
+    """Whether two lost marks by the same mistake: the same confusions, or the same moment on the way."""
+    confused = _confused(one)
+    if confused or _confused(other):
+        return set(confused) == set(_confused(other))
+    return bool(set(_moments(grade, one)) & set(_moments(grade, other)))
+
+
+def _moments(grade: Grade, result: CriterionResult) -> Iterator[tuple[int, float]]:
+    """Where on its way it failed in each trial: at the end much comes together that has nothing to do with it."""
+    for each in _failed(result):
+        if each.t is None or not 0 <= each.trial < len(grade.trials):
+            continue
+        if 0 < each.t < grade.trials[each.trial].recording.end_t - 0.05:
+            yield each.trial, round(each.t, 2)
+
+
+def _confused(result: CriterionResult) -> list[tuple[str, str]]:
+    """What was taken for what, the most often first."""
+    if result.accuracy is None:
+        return []
+    counts: Counter[tuple[str, str]] = Counter()
+    for truth, answer, count in result.accuracy.confusion:
+        if answer is not None and answer != truth:
+            counts[truth, answer] += count
+    return [pair for pair, _ in counts.most_common()]
+
+
+def _excerpt(submission: Submission | None, name: str, line: int) -> Excerpt | None:
+    source = None if submission is None else source_called(name, submission)
+    lines = () if source is None else excerpt_around(source, line)
+    return Excerpt(one_line(name, 60), lines) if lines else None

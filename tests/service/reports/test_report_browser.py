@@ -1,0 +1,78 @@
+"""The report in Chromium: how far it is to the details, what axe finds when all are open, how large type is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser
+
+import report_builders as build
+from browsing import DESKTOP, PHONE, chromium, opened
+from service.reports.html import report
+from service.reports.plots.drawn import draw_all
+from service.reports.plots.style import DPI
+from service.reports.view import student_view
+
+pytestmark = pytest.mark.long
+
+#: Of type, points: smaller is none in a plot but of very many classes.
+_SMALLEST = 7.5
+OPEN_ALL = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as started:
+        yield started
+
+
+def written(name: str, folder: Path) -> Path:
+    grade = getattr(build, f"{name}_grade")()
+    file = folder / f"{name}.html"
+    file.write_text(report(student_view(grade), draw_all(grade), build.faulty_submission()))
+    return file
+
+
+@pytest.mark.parametrize("name", ["shape", "faulty", "line_follower", "astray"])
+def test_a_phone_shows_the_cause_at_once_and_the_details_after_three_screens(
+    browser: Browser, tmp_path: Path, name: str
+) -> None:
+    file = written(name, tmp_path)
+    with opened(browser, file, **PHONE) as found:
+        top = "(name) => document.querySelector(name).getBoundingClientRect().bottom"
+        assert found.page.evaluate(top, ".verdict") < 844
+        assert found.page.evaluate("document.querySelector('.details').getBoundingClientRect().top") <= 3 * 844
+        assert found.page.evaluate("document.documentElement.scrollWidth") == 390
+        assert not found.complaints
+        assert found.asked == [file.as_uri()]
+
+
+@pytest.mark.parametrize("name", ["shape", "line_follower"])
+def test_type_in_pictures_is_at_least_eleven_pixels_high_on_a_phone(
+    browser: Browser, tmp_path: Path, name: str
+) -> None:
+    with opened(browser, written(name, tmp_path), **PHONE) as found:
+        found.page.evaluate(OPEN_ALL)
+        shown = found.page.evaluate("[...document.images].map((each) => each.clientWidth / each.naturalWidth)")
+        assert shown
+        assert all(share * DPI / 72 * _SMALLEST >= 11 for share in shown)
+
+
+@pytest.mark.parametrize("context", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["shape", "faulty"])
+def test_axe_finds_nothing_when_all_is_open(
+    browser: Browser, tmp_path: Path, name: str, context: dict[str, Any], scheme: str
+) -> None:
+    axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    with opened(browser, written(name, tmp_path), color_scheme=scheme, **context) as found:
+        found.page.evaluate(OPEN_ALL)
+        found.page.evaluate(axe)
+        wrong = found.page.evaluate(
+            "async () => (await axe.run()).violations.flatMap((each) => each.nodes.map((node) => [each.id, node.html]))"
+        )
+        assert wrong == []
