@@ -117,7 +117,8 @@ def _class(server: PostgresqlServer) -> list[Measurement]:
             open_assignments.open_for_students(session, 1, ASSIGNMENT)
         browsers = [_Browser(port, _session(store, person_id)) for person_id in members]
         begun = time.monotonic()
-        moments = sorted(random.Random(1).uniform(0, _WITHIN_SECONDS) for _ in names)
+        chance = random.Random(1)
+        moments = sorted(chance.uniform(0, _WITHIN_SECONDS) for _ in names)
 
         def upload(number: int) -> tuple[int, float]:
             time.sleep(max(0.0, begun + moments[number] - time.monotonic()))

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
-
-from sqlalchemy import CursorResult
 from sqlalchemy.orm import Session
 
 from service.store import models
@@ -17,5 +14,5 @@ def insert_if_new(session: Session, table: type[models.Base], **values: object) 
         from sqlalchemy.dialects.postgresql import insert
     else:
         from sqlalchemy.dialects.sqlite import insert  # type: ignore[assignment]
-    done = session.execute(insert(table).values(**values).on_conflict_do_nothing())
-    return cast("CursorResult[Any]", done).rowcount > 0
+    made = insert(table).values(**values).on_conflict_do_nothing().returning(*table.__mapper__.primary_key)
+    return session.execute(made).first() is not None

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy import select, update
 
 import report_builders
-from builders import accept_one, grading_request, opened, settings_in
-from service.store import batch_control, intake, jobs, outbox, regrades, results, webhooks
+from builders import accept_one, grading_request
+from service.store import batch_control, credentials, intake, jobs, outbox, people, regrades, replies, results, webhooks
 from service.store.engine import Store
 from service.store.models import Course
+from service.store.states import CredentialKind
 from service.store.web_tables import Delivery
 from sim.errors import UsageError
+from submissions.people import Student
 
 EVENTS = ["grade.finished", "batch.finished", "grades.published", "appeal.opened"]
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with opened(settings_in(tmp_path)) as store:
-        yield store
 
 
 def hook(store: Store, *events: str) -> str:
@@ -134,6 +129,35 @@ def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day
     assert waits == sorted(waits)
     assert waits[0] < 20
     assert 10 < len(waits) < 30
+
+
+def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> None:
+    hook(store, "batch.finished")
+    for _ in range(5):
+        batch = submit(store, "ada", "bob")
+        claims = [jobs.claim(store, "worker", 60) for _ in range(2)]
+        with ThreadPoolExecutor(2) as pool:
+            list(pool.map(lambda claim: jobs.give_up(store, claim, "the disk is full"), claims))
+        assert told(store)[-1] == ("batch.finished", {"batch": batch, "states": {"dead": 2}})
+    assert len(told(store)) == 5
+
+
+def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
+    with store.transaction() as session:
+        person_id = people.make_instructor(session, "default", Student("grace")).person_id
+        credentials.issue(session, person_id, CredentialKind.TOKEN, timedelta(hours=1), name="t", scopes=["read"])
+        (token,) = credentials.tokens(session, person_id)
+
+    def begin(_: int) -> str:
+        try:
+            return "holds it" if replies.begin(store, token.id, "k") is None else "answered"
+        except replies.InProgress:
+            return "waits"
+
+    with ThreadPoolExecutor(4) as pool:
+        assert sorted(pool.map(begin, range(4))) == ["holds it", "waits", "waits", "waits"]
+    replies.keep(store, token.id, "k", replies.Reply("a" * 64, 201, b"{}"))
+    assert replies.begin(store, token.id, "k") == replies.Reply("a" * 64, 201, b"{}")
 
 
 def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:

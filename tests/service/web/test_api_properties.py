@@ -24,7 +24,7 @@ pytestmark = pytest.mark.long
 #: What there is for every name in a path, and who asks, is ours to say; what the store refuses fits the description.
 _NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
 _EXAMPLES = settings(
-    max_examples=25,
+    max_examples=10,
     deadline=None,
     database=None,
     derandomize=True,

@@ -9,12 +9,10 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
 from threading import Event, Thread
 
 import pytest
 
-from builders import opened, settings_in
 from service.store import outbox, webhooks
 from service.store.engine import Store, now
 from service.store.models import Course
@@ -54,12 +52,6 @@ def endpoint() -> Iterator[Endpoint]:
         Thread(target=server.serve_forever, daemon=True).start()
         yield answering
         server.shutdown()
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with opened(settings_in(tmp_path)) as store:
-        yield store
 
 
 def hooked(store: Store, url: str) -> str:
