@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 #: What in the home is Robomark's; another's files beside it are left as they are, and out of reach all the same.
-_OURS = ("robomark.db*", "run", "log", "broker*")
+_OURS = ("robomark.db*", "run", "log", "broker*", "uploads")
 _OF_OTHERS = 0o077
 #: Root, and the number that root has in a name space of users which does not know it.
 _POWERFUL = (0, 65534)

@@ -5,16 +5,12 @@ Every bad row is named and stops no other. Nothing is stored here.
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
@@ -28,11 +24,11 @@ from submissions.people import People, Refusal, Student
 from submissions.raw_files import read_listed, shown
 from submissions.roster import RosterRow, file_inside, read_roster
 from submissions.submission import Submission
+from submissions.unzipping import unzip
 
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _MOST_ENTRIES = 50_000
 _MOST_BYTES = 4_000_000_000
-_CHUNK = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +230,7 @@ def _opened(path: Path) -> Iterator[Path]:
             # The name of the zip stands for the folder, so that sentences and assignments speak of it.
             folder = Path(name) / (path.stem or "batch")
             folder.mkdir()
-            _unzip(path, folder)
+            unzip(path, folder, _MOST_ENTRIES, _MOST_BYTES)
             yield _stepped_into(folder)
     elif not path.exists():
         raise UsageError(f"{path}: does not exist, expected a folder or a .zip of submissions, or a .csv roster.")
@@ -251,36 +247,3 @@ def _stepped_into(folder: Path) -> Path:
         return folder
     files = {entry.name.lower() for entry in inside[0].iterdir()}
     return folder if files & _PARTS or is_one_students(inside[0]) else inside[0]
-
-
-def _unzip(path: Path, folder: Path) -> None:
-    left = _MOST_BYTES
-    try:
-        with zipfile.ZipFile(path) as archive:
-            infos = [info for info in archive.infolist() if not info.is_dir()]
-            if len(infos) > _MOST_ENTRIES:
-                raise UsageError(f"{path.name}: holds {len(infos)} files, expected at most {_MOST_ENTRIES}.")
-            for info in infos:
-                target = _target(folder, info.filename, path.name)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with archive.open(info) as source, target.open("xb") as sink:
-                    while chunk := source.read(_CHUNK):
-                        left -= len(chunk)
-                        if left < 0:
-                            raise UsageError(f"{path.name}: unpacks to more than {_MOST_BYTES // 10**9} GB.")
-                        sink.write(chunk)
-    except FileExistsError as error:
-        double = shown(str(Path(error.filename).relative_to(folder)))
-        raise UsageError(f"{path.name}: holds two files of the same name, {double}.") from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, ValueError) as error:
-        raise UsageError(f"{path.name}: cannot be unpacked: {error}.") from None
-    except OSError as error:
-        free = shutil.disk_usage(folder).free
-        raise UsageError(f"{path.name}: cannot be unpacked: {error.strerror} ({free >> 20} MB free).") from None
-
-
-def _target(folder: Path, name: str, archive: str) -> Path:
-    parts = PurePosixPath(name.replace("\\", "/")).parts
-    if not parts or parts[0] == "/" or ".." in parts or any(os.fsencode(part)[-1:] == b":" for part in parts):
-        raise UsageError(f"{archive}: holds a file that would lie outside it: {shown(name)}.")
-    return folder.joinpath(*parts)

@@ -5,17 +5,20 @@ What follows for a submission stands in ``store/policies.py``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from sqlalchemy.orm import Session
 
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
-from service.store import audit, policies
+from service.store import audit, open_assignments, policies
 from service.store.engine import Store, now, open_store
+from service.store.open_assignments import CourseAssignment
 from service.store.policies import PolicyLimits
 from service.store.students import DEFAULT_COURSE, Students, course_of
 from service.store.versions import check_assignment
@@ -28,6 +31,8 @@ Assignment = Annotated[
     str,
     typer.Option("-a", "--assignment", help="For this one only; else for all that have none of their own."),
 ]
+Own = Annotated[str, typer.Argument(help="The assignment's id in the course.")]
+InCourse = Annotated[str, typer.Option("--course", help="The course.")]
 Due = Annotated[str | None, typer.Option(help="A date (its end), or a date and time: 2026-11-30T17:00.")]
 
 
@@ -39,17 +44,18 @@ def policy(
         int | None, typer.Option(min=1, max=1000, help="Different submissions that are marked.")
     ] = None,
     cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two submissions.")] = 0.0,
+    course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Set what holds from now on, in place of what held; without options show what holds."""
     allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
     with open_store(load_settings()) as store:
         if allowed != PolicyLimits():
             with store.transaction() as session:
-                course_id = course_of(session, DEFAULT_COURSE, now(session))
+                course_id = course_of(session, course, now(session))
                 check_assignment(session, assignment)
                 policies.set_policy(session, course_id, assignment, allowed)
                 audit.note(session, audit.this_user(), "policy", "course", str(course_id), **_told(assignment, allowed))
-        _show(store)
+        _show(store, course)
 
 
 def extend(
@@ -57,6 +63,7 @@ def extend(
     assignment: Assignment = "",
     due: Due = None,
     more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
+    course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Allow one student more time or attempts, in place of what they were allowed before.
 
@@ -68,7 +75,7 @@ def extend(
     student = shown_name(student)
     with open_store(load_settings()) as store, store.transaction() as session:
         at = now(session)
-        course_id = course_of(session, DEFAULT_COURSE, at)
+        course_id = course_of(session, course, at)
         check_assignment(session, assignment)
         enrolment_id = Students(session, course_id).find(student)
         policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
@@ -82,18 +89,70 @@ def extend(
 
 def enrol(
     people: Annotated[Path, typer.Argument(help="A .csv with id, name, email; Moodle's grading worksheet is one.")],
+    course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Enrol students before they submit, or give those who have an id alone their names and addresses."""
     listed = students_of(read_people(people))
     with open_store(load_settings()) as store, store.transaction() as session:
         at = now(session)
-        course_id = course_of(session, DEFAULT_COURSE, at)
+        course_id = course_of(session, course, at)
         students = Students(session, course_id)
         for student in listed:
             students.enrol(student, at)
         audit.note(session, audit.this_user(), "enrol", "course", str(course_id), students=len(listed))
     document(students=len(listed))
     tell(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
+
+
+def prepare(
+    assignment: Annotated[str, typer.Argument(help="An id of the catalogue, or a folder.")],
+    course: InCourse = DEFAULT_COURSE,
+) -> None:
+    """Put an assignment into a course, not yet open; again, to mark by what it says now."""
+    # With all kinds of criteria, which whoever opens or closes need not wait for.
+    from service.store.versions import freeze
+    from submissions.assignment.reader import find_assignment
+
+    frozen = freeze(find_assignment(assignment))
+    with open_store(load_settings()) as store, store.transaction() as session:
+        course_id = course_of(session, course, now(session))
+        made = open_assignments.prepare(session, course_id, frozen)
+        detail = {"assignment": made.assignment, "version": made.version}
+        audit.note(session, audit.this_user(), "prepare", "course", str(course_id), **detail)
+    _tell_state(made)
+
+
+def open_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+    """Let students see a prepared assignment and submit to it on the web."""
+    _tell_state(_changed(course, assignment, "open", open_assignments.open_for_students))
+
+
+def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+    """Let nobody submit to an assignment on the web any more; what was submitted stays."""
+    _tell_state(_changed(course, assignment, "close", open_assignments.close))
+
+
+def _changed(
+    course: str, assignment: str, action: str, change: Callable[[Session, int, str], None]
+) -> CourseAssignment:
+    with open_store(load_settings()) as store, store.transaction() as session:
+        course_id = course_of(session, course, now(session))
+        change(session, course_id, assignment)
+        audit.note(session, audit.this_user(), action, "course", str(course_id), assignment=assignment)
+        return open_assignments.find(session, course_id, assignment)
+
+
+def _tell_state(line: CourseAssignment) -> None:
+    document(
+        assignment=line.assignment,
+        title=line.title,
+        open=line.open,
+        opened_at=line.opened_at,
+        closed_at=line.closed_at,
+        version=line.version,
+    )
+    state = "is open" if line.open else "is closed" if line.closed_at else "is prepared, and not open yet"
+    tell(f"{line.assignment} {state}")
 
 
 def _due(text: str | None) -> datetime | None:
@@ -110,9 +169,9 @@ def _told(assignment: str, allowed: PolicyLimits) -> dict[str, object]:
     return {"assignment": assignment, "due": due_at, "late_days": allowed.late_days, "attempts": allowed.attempts}
 
 
-def _show(store: Store) -> None:
+def _show(store: Store, course: str) -> None:
     with store.transaction() as session:
-        found = policies.policies(session, course_of(session, DEFAULT_COURSE, now(session)))
+        found = policies.policies(session, course_of(session, course, now(session)))
     document(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
     if not found:
         tell("no policy: everything that is submitted is marked, whenever it comes")

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from service.grading.grade import Grade
 
 _FINISHED = "finished"
+_BINS, _MOST_BINS = 10, 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +42,14 @@ class MarkedSubmission:
 
 @dataclass(frozen=True, slots=True)
 class CriterionStatistics:
-    """``mean_share`` is the mean of what ``n`` submissions got of its marks, 0 to 1."""
+    """``mean_share`` is the mean of what ``n`` submissions got of its marks, 0 to 1; ``full`` of them got all."""
 
     id: str
     title: str
     n: int
     mean_share: float
+    full: int
+    lost: Decimal  # marks, by all of them together
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,28 @@ class AssignmentStatistics:
     highest: Decimal
     criteria: tuple[CriterionStatistics, ...]
     causes: tuple[Cause, ...]  # the commonest first
+
+
+@dataclass(frozen=True, slots=True)
+class MarksBin:
+    """How many got from ``low`` to below ``high``; the last bin has those with all marks."""
+
+    low: Decimal
+    high: Decimal
+    count: int
+
+
+def distribution(marks: Iterable[Decimal], max_marks: Decimal) -> tuple[MarksBin, ...]:
+    """A bin a mark where there are few, else ten, and one more for all marks; none where nothing is to be got."""
+    if max_marks <= 0:
+        return ()
+    is_few = max_marks == int(max_marks) and max_marks <= _MOST_BINS
+    steps = int(max_marks) if is_few else _BINS
+    counts = [0] * (steps + 1)
+    for each in marks:
+        counts[min(steps, int(each * steps / max_marks))] += 1
+    edges = [max_marks * step / steps for step in range(steps + 1)]
+    return tuple(MarksBin(*pair) for pair in zip(edges, [*edges[1:], max_marks], counts, strict=True))
 
 
 def marked_of(grade: Grade) -> MarkedSubmission:
@@ -110,14 +135,24 @@ def _of_one(assignment: str, found: Sequence[MarkedSubmission]) -> AssignmentSta
 
 def _criteria(found: Sequence[MarkedSubmission]) -> tuple[CriterionStatistics, ...]:
     """In the order in which submissions have them; one that is worth nothing has no share."""
-    shares: dict[str, list[float]] = {}
-    titles: dict[str, str] = {}
+    of_each: dict[str, list[MarkedCriterion]] = {}
     for submission in found:
         for criterion in submission.criteria:
             if criterion.max_marks:
-                titles.setdefault(criterion.id, criterion.title)
-                shares.setdefault(criterion.id, []).append(float(criterion.marks / criterion.max_marks))
-    return tuple(CriterionStatistics(key, titles[key], len(own), sum(own) / len(own)) for key, own in shares.items())
+                of_each.setdefault(criterion.id, []).append(criterion)
+    return tuple(_criterion(own) for own in of_each.values())
+
+
+def _criterion(own: Sequence[MarkedCriterion]) -> CriterionStatistics:
+    shares = [float(each.marks / each.max_marks) for each in own]
+    return CriterionStatistics(
+        own[0].id,
+        own[0].title,
+        len(own),
+        sum(shares) / len(own),
+        sum(each.marks >= each.max_marks for each in own),
+        sum((each.max_marks - each.marks for each in own), Decimal(0)),
+    )
 
 
 def _causes(found: Sequence[MarkedSubmission]) -> tuple[Cause, ...]:

@@ -91,6 +91,11 @@ class BatchLine:
     states: dict[JobState, int]
     regrade_of: str | None  # the batch whose submissions these are
 
+    @property
+    def unfinished(self) -> int:
+        """How many of its jobs have not ended."""
+        return sum(self.states.get(state, 0) for state in UNFINISHED)
+
 
 @dataclass(frozen=True, slots=True)
 class BatchProgress:
@@ -164,18 +169,20 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     return _batch_lines(session, [row])[0]
 
 
+def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
+    """What holds of the job that stands for a submission of the batch; of a batch of regrades, of its own jobs."""
+    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+        return (Job.batch_id == batch_id, Job.suspect.is_(None))
+    ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
+    return (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+
+
 def job_lines(session: Session, batch_id: str, limit: int | None = None, after: str | None = None) -> list[JobLine]:
     """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs.
 
     Where only some are wanted, those that follow on the job of this id.
     """
-    which: tuple[ColumnElement[bool], ...]
-    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
-        which = (Job.batch_id == batch_id, Job.suspect.is_(None))
-    else:
-        ids = select(SubmissionRow.id).where(SubmissionRow.batch_id == batch_id)
-        which = (Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
-    query = _job_lines().where(*which).order_by(Enrolment.student, Job.id).limit(limit)
+    query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id).limit(limit)
     if after is not None:
         own = select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == after)
         query = query.where(tuple_(Enrolment.student, Job.id) > tuple_(own.scalar_subquery(), after))

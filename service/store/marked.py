@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from decimal import Decimal
+from typing import Protocol
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.grading.statistics import MarkedCriterion, MarkedSubmission
 from service.store import overrides
-from service.store.batches import JobLine
 from service.store.models import CriterionResultRow
 from service.store.states import JobState
 
@@ -17,9 +18,30 @@ from service.store.states import JobState
 _AT_ONCE = 1000
 
 
-def marked(session: Session, lines: Sequence[JobLine]) -> list[MarkedSubmission]:
+class MarkedLine(Protocol):
+    """What is looked at of a job: whose it is, for what, and whether its marks count."""
+
+    @property
+    def id(self) -> str: ...  # noqa: D102
+    @property
+    def student(self) -> str: ...  # noqa: D102
+    @property
+    def assignment(self) -> str: ...  # noqa: D102
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def verdict(self) -> str | None: ...  # noqa: D102
+    @property
+    def marks(self) -> Decimal | None: ...  # noqa: D102
+    @property
+    def max_marks(self) -> Decimal: ...  # noqa: D102
+    @property
+    def staff_only(self) -> str | None: ...  # noqa: D102
+
+
+def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
     """Those of the jobs that are graded and not for staff alone."""
-    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
+    graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
     for begin in range(0, len(graded), _AT_ONCE):
         some = [line.id for line in graded[begin : begin + _AT_ONCE]]

@@ -132,6 +132,31 @@ def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetim
     row.due_at, row.more_attempts = due_at, more_attempts
 
 
+@dataclass(frozen=True, slots=True)
+class ExtensionLine:
+    """What one student is allowed beyond the policy; an empty ``assignment`` is every one."""
+
+    enrolment_id: int
+    student: str
+    assignment: str
+    due_at: datetime | None
+    more_attempts: int
+
+
+def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
+    """All of a course, by student."""
+    query = (
+        select(Extension, Enrolment.student)
+        .join(Enrolment, Extension.enrolment_id == Enrolment.id)
+        .where(Enrolment.course_id == course_id)
+        .order_by(Enrolment.student, Extension.assignment)
+    )
+    return [
+        ExtensionLine(row.enrolment_id, student, row.assignment, row.due_at, row.more_attempts)
+        for row, student in session.execute(query)
+    ]
+
+
 def _policy(session: Session, course_id: int | None, assignment: str) -> PolicyLimits:
     """The policy of the assignment itself, else the course's."""
     query = select(Policy).where(Policy.course_id == course_id, Policy.assignment.in_(("", assignment)))

@@ -6,11 +6,12 @@ The old grades stay and stand until somebody publishes the new ones. Nothing is 
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
-from sqlalchemy import select
+from sqlalchemy import Select, case, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.store import audit, outbox, overrides
@@ -23,6 +24,8 @@ from sim.errors import UsageError
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
+
+_CHANGES_A_PAGE = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,30 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class Grading:
+    """One of the times that a submission was graded."""
+
+    id: str
+    state: JobState
+    standing: Standing
+    marks: Decimal | None
+    max_marks: Decimal | None
+    queued_at: datetime
+    published_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class ChangesPage:
+    """Some of the changes of a batch, of how many, and how many differ in marks or have none yet."""
+
+    changes: tuple[Change, ...]
+    found: int
+    differing: int
+    page: int
+    pages: int
+
+
+@dataclass(frozen=True, slots=True)
 class Published:
     """How many grades are published now that were not, how many took another's place, and what was left out."""
 
@@ -107,9 +134,55 @@ def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_a
         session.add(batch)
         session.flush()
         for job in wanted:
-            enqueue(session, _proposal(job, version_id, batch.id, max_attempts), at)
+            enqueue(session, _proposal(job, version_id, batch.id, Lane.BATCH, max_attempts), at)
         audit.note(session, actor, "regrade", "batch", batch_id, as_batch=batch.id, grades=len(wanted))
         return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+
+
+def regrade_one(store: Store, job_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> str:
+    """Queue the submission of one grade to be graded again, at once; the id of the job that may take its place.
+
+    ``assignment`` as ``regrade`` has it. Raises UsageError where there is no grade yet, or for another assignment.
+    """
+    frozen = None if assignment is None else freeze(assignment)
+    with store.transaction() as session:
+        at = now(session)
+        asked = session.get(Job, job_id)
+        if asked is None:
+            raise UsageError(f"there is no grade {job_id}")
+        of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
+        standing = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id)).all()
+        ended = [job for job in standing if job.state in (JobState.DONE, JobState.DEAD)]
+        if not ended:
+            raise UsageError("this submission is not graded yet")
+        name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
+        if frozen is not None and frozen.assignment.id != name:
+            raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
+        version_id = None if frozen is None else keep(session, frozen, at)
+        proposal = _proposal(ended[-1], version_id, None, Lane.INTERACTIVE, max_attempts)
+        enqueue(session, proposal, at)
+        session.flush()
+        audit.note(session, actor, "regrade", "job", ended[-1].id, as_job=proposal.id)
+        return proposal.id
+
+
+def change(session: Session, job_id: str) -> Change | None:
+    """What one regrade changes; None for a grade that is none."""
+    after = session.get(Job, job_id)
+    if after is None or after.regrade_of is None:
+        return None
+    student = session.get_one(Enrolment, after.enrolment_id).student
+    return _change(session, after, session.get_one(Job, after.regrade_of), student)
+
+
+def gradings(session: Session, submission_id: int) -> list[Grading]:
+    """All that a submission was graded, in order; what a worker in quarantine did is left out."""
+    of_submission = (Job.submission_id == submission_id, Job.suspect.is_(None))
+    rows = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id))
+    return [
+        Grading(row.id, row.state, row.standing, row.marks, row.max_marks, row.queued_at, row.published_at)
+        for row in rows
+    ]
 
 
 def changes(session: Session, batch_id: str) -> list[Change]:
@@ -125,6 +198,29 @@ def changes(session: Session, batch_id: str) -> list[Change]:
     return [_change(session, after, earlier, student) for after, earlier, student in session.execute(query)]
 
 
+def changes_page(session: Session, batch_id: str, page: int) -> ChangesPage:
+    """Some of what a batch of regrades changes: other marks first, then by student."""
+    before = aliased(Job)
+    differ = or_(Job.marks != before.marks, Job.max_marks != before.max_marks, Job.marks.is_(None))
+    of_batch = (Job.batch_id == batch_id, Job.suspect.is_(None))
+    joined = (
+        select(func.count(), func.count(case((differ, 1)))).select_from(Job).join(before, Job.regrade_of == before.id)
+    )
+    found, differing = session.execute(joined.where(*of_batch)).one()
+    page = min(max(page, 1), max(1, -(-found // _CHANGES_A_PAGE)))
+    query = (
+        select(Job, before, Enrolment.student)
+        .join(before, Job.regrade_of == before.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .where(*of_batch)
+        .order_by(case((differ, 0), else_=1), Enrolment.student, Job.id)
+        .limit(_CHANGES_A_PAGE)
+        .offset((page - 1) * _CHANGES_A_PAGE)
+    )
+    shown = tuple(_change(session, after, earlier, student) for after, earlier, student in session.execute(query))
+    return ChangesPage(shown, found, differing, page, max(1, -(-found // _CHANGES_A_PAGE)))
+
+
 def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
     """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
 
@@ -132,40 +228,28 @@ def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) ->
     the last unless ``anyway``. Raises UsageError for an unknown batch.
     """
     with store.transaction() as session:
-        at = now(session)
         if session.get(Batch, batch_id) is None:
             raise UsageError(f"there is no batch {batch_id}")
         ids = select(Job.submission_id).where(Job.batch_id == batch_id)
-        query = select(Job).where(Job.submission_id.in_(ids), Job.standing != Standing.KEPT)
-        of_submission: dict[int, list[Job]] = {}
-        for job in session.scalars(query.order_by(Job.queued_at, Job.id).with_for_update()):
-            of_submission.setdefault(job.submission_id, []).append(job)
-        hidden = set(
-            session.scalars(
-                select(SubmissionRow.id).where(SubmissionRow.id.in_(ids), SubmissionRow.staff_only.is_not(None))
-            )
-        )
-        unjudged = set() if anyway else _unjudged(session, batch_id)
-        published = replaced = 0
-        for submission_id, jobs in of_submission.items():
-            stands, another = _let_stand(jobs, unjudged)
-            replaced += another
-            if stands is not None and stands.published_at is None and submission_id not in hidden:
-                stands.published_at, stands.published_by = at, actor
-                published += 1
-        jobs = [job for listed in of_submission.values() for job in listed if job.standing is not Standing.KEPT]
-        result = Published(
-            published,
-            replaced,
-            sum(job.state in UNFINISHED for job in jobs),
-            sum(job.state is JobState.DEAD for job in jobs),
-            len(hidden),
-            sum(job.id in unjudged and job.published_at is None for job in jobs),
-        )
-        audit.note(session, actor, "publish", "batch", batch_id, published=published, replaced=replaced)
-        if published:
+        result = _publish(session, ids, actor=actor, anyway=anyway)
+        audit.note(session, actor, "publish", "batch", batch_id, **_worth_noting(result))
+        if result.published:
             course_id = session.get_one(Batch, batch_id).course_id
-            outbox.grades_published(session, course_id, batch=batch_id, published=published)
+            outbox.grades_published(session, course_id, batch=batch_id, published=result.published)
+        return result
+
+
+def publish_one(store: Store, job_id: str, *, actor: str, anyway: bool = False) -> Published:
+    """The same for the submission of one job alone. Raises UsageError for an unknown job."""
+    with store.transaction() as session:
+        if session.get(Job, job_id) is None:
+            raise UsageError(f"there is no grade {job_id}")
+        ids = select(Job.submission_id).where(Job.id == job_id)
+        result = _publish(session, ids, actor=actor, anyway=anyway)
+        audit.note(session, actor, "publish", "job", job_id, **_worth_noting(result))
+        if result.published:
+            course_id = session.get_one(Enrolment, session.get_one(Job, job_id).enrolment_id).course_id
+            outbox.grades_published(session, course_id, grade=job_id, published=result.published)
         return result
 
 
@@ -177,9 +261,42 @@ def unpublished_regrades(session: Session, batch_id: str) -> int:
     return len(session.scalars(query).all())
 
 
-def _unjudged(session: Session, batch_id: str) -> set[str]:
-    """The jobs for the submissions of a batch that have a criterion that could not be judged, nor was set by hand."""
-    ids = select(Job.submission_id).where(Job.batch_id == batch_id)
+def _publish(session: Session, ids: Select[int], *, actor: str, anyway: bool) -> Published:
+    at = now(session)
+    query = select(Job).where(Job.submission_id.in_(ids), Job.standing != Standing.KEPT)
+    of_submission: dict[int, list[Job]] = {}
+    for job in session.scalars(query.order_by(Job.queued_at, Job.id).with_for_update()):
+        of_submission.setdefault(job.submission_id, []).append(job)
+    hidden = set(
+        session.scalars(
+            select(SubmissionRow.id).where(SubmissionRow.id.in_(ids), SubmissionRow.staff_only.is_not(None))
+        )
+    )
+    unjudged = set() if anyway else _unjudged(session, ids)
+    published = replaced = 0
+    for submission_id, jobs in of_submission.items():
+        stands, another = _let_stand(jobs, unjudged)
+        replaced += another
+        if stands is not None and stands.published_at is None and submission_id not in hidden:
+            stands.published_at, stands.published_by = at, actor
+            published += 1
+    jobs = [job for listed in of_submission.values() for job in listed if job.standing is not Standing.KEPT]
+    return Published(
+        published,
+        replaced,
+        sum(job.state in UNFINISHED for job in jobs),
+        sum(job.state is JobState.DEAD for job in jobs),
+        len(hidden),
+        sum(job.id in unjudged and job.published_at is None for job in jobs),
+    )
+
+
+def _worth_noting(result: Published) -> dict[str, int]:
+    return {name: count for name, count in asdict(result).items() if count or name in ("published", "replaced")}
+
+
+def _unjudged(session: Session, ids: Select[int]) -> set[str]:
+    """The jobs for these submissions that have a criterion that could not be judged, nor was set by hand."""
     query = (
         select(CriterionResultRow.job_id)
         .join(Job, CriterionResultRow.job_id == Job.id)
@@ -207,13 +324,13 @@ def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfi
     return f"batch {batch_id} has nothing to grade again{waits}"
 
 
-def _proposal(job: Job, version_id: int | None, batch_id: str, max_attempts: int) -> Job:
+def _proposal(job: Job, version_id: int | None, batch_id: str | None, lane: Lane, max_attempts: int) -> Job:
     return Job(
         submission_id=job.submission_id,
         assignment_version_id=version_id or job.assignment_version_id,
         enrolment_id=job.enrolment_id,
         batch_id=batch_id,
-        lane=Lane.BATCH,
+        lane=lane,
         max_attempts=max_attempts,
         forced=True,
         regrade_of=job.id,

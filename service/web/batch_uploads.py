@@ -17,8 +17,8 @@ from service.web.context import WebContext
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_in_catalogue
-from submissions.batch_folder import read_batch_for
-from submissions.people import Refusal
+from submissions.batch_folder import BatchContents, read_batch_for
+from submissions.people import People, Refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,24 @@ def upload_batch(
 
     Without ``assignment`` each submission names its own. Raises UsageError where nothing can be taken in.
     """
+    return take_in(context, course_id, name, read_upload(context, course_id, path, assignment), again=again)
+
+
+def read_upload(
+    context: WebContext, course_id: int, path: Path, assignment: str, people: People | None = None
+) -> BatchContents:
+    """What of a zip or folder would be taken in, and what not. Raises UsageError where it cannot be read at all."""
     with context.store.reading() as session:
-        course = session.get_one(Course, course_id).name
         asked = assignment_of(session, course_id, assignment) if assignment else None
-    checked = read_batch_for(path, asked)
+    return read_batch_for(path, asked, people)
+
+
+def take_in(context: WebContext, course_id: int, name: str, checked: BatchContents, *, again: bool) -> UploadedBatch:
+    """Make a batch of what was read, and tell the workers. Raises UsageError where nothing can be taken in."""
     if not checked.grading_requests:
         raise UsageError(f"none of {len(checked.refusals)} submissions can be taken in; {_first(checked.refusals)}")
+    with context.store.reading() as session:
+        course = session.get_one(Course, course_id).name
     batch = (name, checked.grading_requests, checked.refusals)
     most = context.settings.max_attempts
     if again:

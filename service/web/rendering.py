@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from decimal import Decimal
 from functools import lru_cache
 from importlib.resources import files
@@ -93,6 +93,7 @@ def _environment(code: str) -> Environment:
     environment.filters["marks"] = _marks
     environment.filters["moment"] = _moment
     environment.filters["share"] = _share
+    environment.filters["duration"] = _duration
     environment.filters["typed"] = _typed
     return environment
 
@@ -124,3 +125,12 @@ def _typed(text: str) -> Markup:
 def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:
     """So much of a hundred."""
     return 0.0 if not marks or not max_marks else round(100 * float(marks / max_marks), 1)
+
+
+def _duration(value: timedelta) -> str:
+    """Hours, minutes and seconds, as a clock shows them; of less than a minute the seconds."""
+    minutes, seconds = divmod(max(0, round(value.total_seconds())), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours}:{minutes:02}:{seconds:02} h"
+    return f"{minutes}:{seconds:02} min" if minutes else f"{seconds} s"

@@ -56,12 +56,13 @@ class Guarded:
             return
         headers = Headers(scope=scope)
         if not scope["path"].startswith(_FOR_ANY_NAME) and _host(headers.get("host", "")) not in self._names:
-            sentence = "This is not a name of this server; ROBOMARK_PUBLIC_URL says which is.\n"
-            await PlainTextResponse(sentence, status_code=400)(scope, receive, send)
+            sentence = "This is not a name of this server; ROBOMARK_PUBLIC_URL says which is."
+            await _refusal(scope["path"], 400, sentence)(scope, receive, send)
             return
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > LARGEST_BODY:
-            await _too_much(scope["path"])(scope, receive, self._headed(send))
+            error = TooMuch()
+            await _refusal(scope["path"], error.status_code, error.detail)(scope, receive, self._headed(send))
             return
         await self._app(scope, _counted(receive), self._headed(send))
 
@@ -94,11 +95,8 @@ def _counted(receive: Receive) -> Receive:
     return counted
 
 
-def _too_much(path: str) -> Response:
-    error = TooMuch()
-    if path.startswith(API):
-        return problem(error.status_code, error.detail)
-    return PlainTextResponse(f"{error.detail}\n", status_code=error.status_code)
+def _refusal(path: str, status: int, sentence: str) -> Response:
+    return problem(status, sentence) if path.startswith(API) else PlainTextResponse(f"{sentence}\n", status)
 
 
 def _host(header: str) -> str:

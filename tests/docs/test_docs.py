@@ -63,7 +63,7 @@ def files_shown(document: Path) -> list[tuple[str, str]]:
 
 
 _SHOWING = [
-    pytest.param(document, marks=[pytest.mark.long] * (document.stem == "instructors"), id=document.stem)
+    pytest.param(document, marks=[pytest.mark.long] * (document.stem in ("instructors", "web")), id=document.stem)
     for document in DOCUMENTS
     if list(commands(document))
 ]

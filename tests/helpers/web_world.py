@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -11,7 +12,9 @@ from builders import echo, grading_request
 from service.store import appeals, credentials, intake, jobs, open_assignments, results, webhooks
 from service.store.people import Member
 from service.store.versions import freeze
+from service.web.kept_uploads import KeptUploads
 from service.web.rendering import statics
+from submissions.raw_files import SentFile
 from web import COURSE, Web
 
 
@@ -50,12 +53,21 @@ def make_world(web: Web) -> World:
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "upload_id": _upload(web, grace),
         "webhook_id": hook.id,
         "criterion": report_builders.faulty_grade().criteria[0].id,
         "comment_id": "1",
         "appeal_id": str(appeal),
     }
     return World(ada, grace, values)
+
+
+def _upload(web: Web, member: Member) -> str:
+    """An upload of which nothing can be taken in."""
+    kept_uploads = KeptUploads(web.settings.home)
+    begun = kept_uploads.begin(member.person_id, 1, "echo-responder")
+    kept_uploads.lay(begun, [SentFile("ada.zip", io.BytesIO(b""))], "batch")
+    return begun.id
 
 
 def filled(path: str, values: dict[str, str]) -> str:

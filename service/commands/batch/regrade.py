@@ -15,7 +15,7 @@ from service.commands.shown import document, note, show, tell
 from service.settings import load_settings
 from service.store import audit, batches, regrades
 from service.store.engine import Store, open_store
-from service.store.regrades import Regraded
+from service.store.regrades import Published, Regraded
 from service.store.states import JobState, Lane
 from sim.errors import HostError
 
@@ -69,6 +69,26 @@ def publish(
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
         done = regrades.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
+    document(batch=batch_id, published=done)
+    _tell_published(f"batch {batch_id}", done)
+
+
+def publish_one(
+    grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
+    ] = False,
+) -> None:
+    """Let the newest grade of one submission stand, and release it to its student."""
+    with open_store(load_settings()) as store:
+        with store.reading() as session:
+            job_id = batches.find_job(session, grade)
+        done = regrades.publish_one(store, job_id, actor=audit.this_user(), anyway=anyway)
+    document(grade=job_id, published=done)
+    _tell_published(f"grade {job_id}", done)
+
+
+def _tell_published(of_what: str, done: Published) -> None:
     left = [
         f"{count} {what}"
         for count, what in (
@@ -80,8 +100,7 @@ def publish(
         if count
     ]
     replaced = f", {done.replaced} of them regrades" if done.replaced else ""
-    document(batch=batch_id, published=done)
-    tell(f"batch {batch_id}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
+    tell(f"{of_what}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
 
 
 def _left_out(made: Regraded) -> str:

@@ -46,6 +46,9 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
     folder = tmp_path_factory.mktemp("batch") / "class"
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
+    with (folder / "reference" / "robot.py").open("a") as program:
+        # Of a robot that stands still nothing is drawn.
+        program.write("tank_drive.on_for_seconds(SpeedPercent(20), SpeedPercent(20), 0.5)\n")
     (folder / "[red]odd.txt").write_text("x")
     home = tmp_path_factory.mktemp("home")
     reports = folder.parent / "reports"

@@ -19,11 +19,12 @@ from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
-from service.store import appeals, comments, jobs, overrides, results
+from service.store import appeals, comments, jobs, open_assignments, overrides, results
 from service.store.engine import now, open_store
 from service.store.installation import secret_of
 from service.store.intake import accept_batch
 from service.store.models import Job
+from service.store.versions import freeze
 from submissions.assignment.examples import examples
 from submissions.people import Refusal, Student
 
@@ -49,6 +50,8 @@ SHOWING = {
     "batch retry --all": "batch queued outdated",
     "batch regrade BATCH": "batch regraded",
     "batch publish BATCH": "batch published",
+    "batch publish-one GRADE": "grade published",
+    "batch overview BATCH": "batch classes refusals",
     "assignments list": "assignments",
     "assignments show echo-responder": (
         "id title section description version marks background robot program responder given criteria scenarios"
@@ -70,6 +73,9 @@ SHOWING = {
     "course policy": "policies",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
+    "course prepare echo-responder": "assignment title open opened_at closed_at version",
+    "course open echo-responder": "assignment title open opened_at closed_at version",
+    "course close echo-responder": "assignment title open opened_at closed_at version",
     "course export-student ada -o ada-all.zip": "student output bytes",
     "course delete-student cyd --for-good": "submissions grades",
     "course purge --older-than 9000": "removed archive submissions grades students",
@@ -127,6 +133,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     with open_store(Settings(home=folder)) as store:
         requests = [grading_request(student, assignment=echo()) for student in ("ada", "bob", "cyd")]
         batch = accept_batch(store, "class", requests, refused, max_attempts=2)
+        with store.transaction() as session:
+            open_assignments.prepare(session, 1, freeze(echo()))
         grades = []
         for grade in (shape_grade(wrong=2), faulty_grade()):
             claim = jobs.claim(store, "worker", 60)

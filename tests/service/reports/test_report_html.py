@@ -121,6 +121,16 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     assert "@media print" in reader.style
 
 
+def test_plots_of_conversations_that_earlier_versions_kept_are_not_shown_and_break_nothing() -> None:
+    grade = build.shape_grade()
+    drawn = draw_all(grade)
+    (first, *_) = drawn.values()
+    kept = drawn | {"conversation-each-shape-5": first, "talk-each-shape-5": first}
+    assert report(student_view(grade), kept) == report(student_view(grade), drawn)
+    assert not any(plot.kind in ("conversation", "talk") for plot in plots_of(grade))
+    assert "IMG_DATA::{left, right}" in Reader(report(student_view(grade), {})).text
+
+
 def test_the_parts_of_a_report_are_its_body_and_two_files_that_are_the_same_for_all() -> None:
     shapes, line = (report_parts(student_view(made()), {}) for made in (build.shape_grade, build.line_follower_grade))
     assert shapes.body != line.body

@@ -1,0 +1,46 @@
+"""What one person of a course got, newest first; who may know whose it is, is for the caller to say. Only reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.models import Job, SubmissionRow
+from service.store.states import JobState, Standing
+
+_MOST = 50
+
+
+@dataclass(frozen=True, slots=True)
+class OwnGrading:
+    """The grade that stands of one submission."""
+
+    job_id: str
+    assignment: str
+    attempt: int
+    state: JobState
+    marks: Decimal | None
+    max_marks: Decimal | None
+    queued_at: datetime
+    published_at: datetime | None
+
+
+def newest(session: Session, enrolment_id: int, assignment: str = "") -> list[OwnGrading]:
+    """Of one person, for one assignment or for all."""
+    query = (
+        select(Job, SubmissionRow.assignment, SubmissionRow.attempt)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .where(Job.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+        .order_by(Job.queued_at.desc(), Job.id)
+        .limit(_MOST)
+    )
+    if assignment:
+        query = query.where(SubmissionRow.assignment == assignment)
+    return [
+        OwnGrading(job.id, name, attempt, job.state, job.marks, job.max_marks, job.queued_at, job.published_at)
+        for job, name, attempt in session.execute(query)
+    ]

@@ -1,0 +1,171 @@
+"""The batches of a course for its instructors, and the way to a new one: an upload, what would come of it, and yes.
+
+What is done with one batch is ``batch.py``'s; what an upload may hold is ``submissions.batch_folder``'s to say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Query, Request, UploadFile
+from fastapi.responses import RedirectResponse, Response
+
+from service.store import audit, batches, open_assignments
+from service.store.models import Batch
+from service.web.access import InCourse, Instructing, nothing_here
+from service.web.batch_uploads import read_upload, take_in
+from service.web.context import Context, WebContext
+from service.web.kept_uploads import ExpectedSubmission, KeptUpload, KeptUploads
+from service.web.rendering import page
+from sim.errors import UsageError
+from submissions.assignment.folder import catalogue
+from submissions.batch_folder import BatchContents
+from submissions.people import read_people
+from submissions.raw_files import SentFile, shown
+
+router = APIRouter(prefix="/courses/{course_id}/batches")
+_A_PAGE = 30
+_ARCHIVES = (".zip",)
+#: What a student's submission may be where each is a file of its own; what is in it is looked at later.
+_SINGLE = (".zip", ".py", ".ipynb")
+UploadId = str
+
+
+@router.get("")
+def list_batches(
+    request: Request, here: Instructing, context: Context, after: Annotated[str, Query(max_length=32)] = ""
+) -> Response:
+    """The batches of the course, the newest first, and a form for another."""
+    return _list(request, here, context, after=after)
+
+
+@router.post("/uploads")
+def upload(
+    request: Request,
+    here: Instructing,
+    context: Context,
+    files: Annotated[list[UploadFile], File()],
+    people: Annotated[UploadFile | None, File()] = None,
+    assignment: Annotated[str, Form(max_length=100)] = "",
+) -> Response:
+    """Keep what was sent and look what would be taken in of it."""
+    kept_uploads = KeptUploads(context.settings.home)
+    begun = kept_uploads.begin(here.reader.identity.person_id, here.course_id, assignment)
+    try:
+        laid = _laid(kept_uploads, begun, _sent(files), _sent([people] if people is not None else []))
+        checked = _read(context, laid)
+    except UsageError as error:
+        kept_uploads.remove(begun)
+        return _list(request, here, context, refused=str(error), status_code=422)
+    expected = tuple(
+        ExpectedSubmission(
+            each.submission.student,
+            each.student.name if each.student.name != each.student.id else "",
+            each.assignment.title,
+            each.source,
+        )
+        for each in checked.grading_requests
+    )
+    kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
+    return RedirectResponse(f"/courses/{here.course_id}/batches/uploads/{laid.id}", 303)
+
+
+@router.get("/uploads/{upload_id}")
+def preflight(request: Request, here: Instructing, context: Context, upload_id: UploadId) -> Response:
+    """What of an upload would be taken in, and what not and why."""
+    found = _find(context, here, upload_id)
+    return page(request, here.reader, "upload.html", here=here, upload=found, known=None)
+
+
+@router.post("/uploads/{upload_id}/confirm")
+def confirm(
+    request: Request,
+    here: Instructing,
+    context: Context,
+    upload_id: UploadId,
+    again: Annotated[bool, Form()] = False,
+) -> Response:
+    """Make a batch of an upload."""
+    found = _find(context, here, upload_id)
+    taken = take_in(context, here.course_id, found.name, _read(context, found), again=again)
+    KeptUploads(context.settings.home).remove(found)
+    batch = taken.accepted.batch
+    if batch is None:
+        return page(request, here.reader, "upload.html", here=here, upload=found, known=taken.accepted.known)
+    with context.store.transaction() as session:
+        done = {"submissions": len(batch.jobs), "refused": len(taken.refusals), "known": len(taken.accepted.known)}
+        audit.note(session, here.actor, "submit", "batch", batch.id, **done)
+    return RedirectResponse(f"/courses/{here.course_id}/batches/{batch.id}?done=submit", 303)
+
+
+@router.post("/uploads/{upload_id}/discard")
+def discard(here: Instructing, context: Context, upload_id: UploadId) -> Response:
+    """Take nothing in of an upload."""
+    KeptUploads(context.settings.home).remove(_find(context, here, upload_id))
+    return RedirectResponse(f"/courses/{here.course_id}/batches", 303)
+
+
+def _list(
+    request: Request, here: InCourse, context: WebContext, *, after: str = "", refused: str = "", status_code: int = 200
+) -> Response:
+    with context.store.reading() as session:
+        last = session.get(Batch, after) if after else None
+        place = None if last is None or last.course_id != here.course_id else (last.created_at, last.id)
+        listed = batches.batches_of(session, here.course_id, _A_PAGE + 1, place)
+        prepared = open_assignments.of_course(session, here.course_id)
+    own = {each.assignment for each in prepared}
+    return page(
+        request,
+        here.reader,
+        "batches.html",
+        status_code=status_code,
+        here=here,
+        batches=listed[:_A_PAGE],
+        older=listed[_A_PAGE - 1].id if len(listed) > _A_PAGE else "",
+        unfinished=any(line.unfinished for line in listed[:_A_PAGE]),
+        prepared=prepared,
+        catalogue=[each for each in catalogue() if each not in own],
+        refused=refused,
+    )
+
+
+def _sent(files: list[UploadFile]) -> list[SentFile]:
+    """The files of a field; an empty field sends one without a name."""
+    return [SentFile(file.filename, file.file) for file in files if file.filename]
+
+
+def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], people: list[SentFile]) -> KeptUpload:
+    """The upload with its files where they are read from."""
+    if not files:
+        raise UsageError("nothing was sent, expected a .zip, or a file for each student")
+    suffixes = {Path(file.flat_name).suffix.lower() for file in files}
+    if not suffixes <= set(_SINGLE):
+        wrong = min(suffixes - set(_SINGLE))
+        raise UsageError(
+            f"a file that ends in {shown(wrong) or 'nothing'} was sent, expected a .zip, or a .py, .ipynb or .zip each"
+        )
+    names = kept_uploads.lay(begun, files, "batch")
+    one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVES)
+    table = kept_uploads.lay(begun, people, "people") if people else [""]
+    if one_archive:
+        called = Path(names[0]).stem
+    else:
+        called = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    return replace(begun, name=shown(called), file=names[0] if one_archive else "", people=table[0])
+
+
+def _read(context: WebContext, upload: KeptUpload) -> BatchContents:
+    kept_uploads = KeptUploads(context.settings.home)
+    table = kept_uploads.people(upload)
+    people = None if table is None else read_people(table)
+    return read_upload(context, upload.course_id, kept_uploads.submissions(upload), upload.assignment, people)
+
+
+def _find(context: WebContext, here: InCourse, upload_id: str) -> KeptUpload:
+    kept_uploads = KeptUploads(context.settings.home)
+    found = kept_uploads.find(upload_id, here.reader.identity.person_id, here.course_id)
+    if found is None:
+        raise nothing_here()
+    return found

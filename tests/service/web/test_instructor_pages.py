@@ -1,0 +1,428 @@
+"""What instructors do on their pages: batches from upload to publication, assignments, people, and hidden names."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+from html import unescape
+from pathlib import Path
+
+import pytest
+from sqlalchemy import event, func, select
+from starlette.testclient import TestClient
+
+import report_builders
+from builders import echo, grading_request
+from report_builders import HOSTILE
+from service.reports.formats import FORMATS
+from service.store import audit, intake, jobs, open_assignments, people, policies, results
+from service.store.models import Batch, Enrolment, Job, SubmissionRow
+from service.store.states import BatchState, JobState, Role, Standing
+from service.store.versions import freeze
+from submissions.assignment.folder import assignment_folder
+from submissions.people import Refusal, Student
+from web import COURSE, Web, submit, web_in
+
+HOME = "/courses/1"
+ECHO = {"robot.py": "print('hello')\n", "responder.py": "def responder(msg):\n    return msg\n"}
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[Web]:
+    with web_in(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def grace(web: Web) -> TestClient:
+    return web.browser(web.instructor())
+
+
+def zipped(files: Mapping[str, str]) -> bytes:
+    """A zip of texts."""
+    sink = io.BytesIO()
+    with zipfile.ZipFile(sink, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+    return sink.getvalue()
+
+
+def a_class(*students: str) -> bytes:
+    """A zip with a folder for each student."""
+    return zipped({f"{who}/{name}": text + f"# {who}\n" for who in students for name, text in ECHO.items()})
+
+
+def sent(grace: TestClient, data: bytes, name: str = "week one.zip", **fields: str) -> str:
+    """Upload a batch; where its preflight is."""
+    files = {"files": (name, data, "application/zip")}
+    answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": "echo-responder", **fields}, files=files)
+    assert answer.status_code == 303, words(answer.text)
+    return answer.headers["location"]
+
+
+def words(html: str) -> str:
+    """What a page says."""
+    body = html[html.find("<main") :]
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", body)).split())
+
+
+def grade_all(web: Web) -> None:
+    """What waits is graded at once, by hand."""
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+
+
+def a_batch(web: Web, *students: str, refusals: tuple[Refusal, ...] = ()) -> intake.AcceptedBatch:
+    """A graded batch."""
+    requests = [grading_request(who, f"print({who!r})\n") for who in students]
+    made = intake.accept_batch(web.store, "week one", requests, refusals, course=COURSE, max_attempts=3)
+    grade_all(web)
+    return made
+
+
+def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient) -> None:
+    bad = {"eve/notes.txt": "nothing", "</td><script>alert(1)</script>/robot.txt": "x"}
+    with zipfile.ZipFile(sink := io.BytesIO(a_class("ada", "bob")), "a") as archive:
+        for name, text in bad.items():
+            archive.writestr(name, text)
+    place = sent(grace, sink.getvalue())
+    shown = grace.get(place).text
+    assert "2 submissions can be taken in. 2 are refused." in words(shown)
+    assert "eve" in shown
+    assert "<script>alert" not in shown
+    with web.store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(Job)) == 0
+    answer = submit(grace, f"{place}/confirm")
+    assert answer.status_code == 303
+    batch = answer.headers["location"].partition("?")[0]
+    told = words(grace.get(batch).text)
+    for each in ("week one", "2 waits", "2 refused", "ada", "bob", "eve"):
+        assert each in told
+    with web.store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.QUEUED)) == 2
+        (entry,) = audit.entries(session, "batch", batch.rpartition("/")[2])
+        assert (entry.action, entry.actor) == ("submit", "Grace (person 1)")
+        assert entry.detail["refused"] == 2
+    assert grace.get(place).status_code == 404
+    again = submit(grace, f"{sent(grace, sink.getvalue())}/confirm")
+    assert "Nothing of it is new" in words(again.text)
+
+
+def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -> None:
+    parts = [("files", (f"{who}.zip", zipped(ECHO | {"note.txt": who}))) for who in ("ada", "bob")]
+    people = ("people", ("class.csv", b"id,name\nada,Ada Lovelace\n"))
+    data = {"assignment": "echo-responder"}
+    answer = submit(grace, f"{HOME}/batches/uploads", data, files=[*parts, people])
+    shown = words(grace.get(answer.headers["location"]).text)
+    assert "1 submission can be taken in. 1 is refused." in shown
+    assert "Ada Lovelace" in shown
+    assert "bob is not in class.csv" in shown
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("week.zip", b"no zip at all", "cannot be unpacked"),
+        ("week.zip", zipped({"../../evil/robot.py": "x"}), "outside"),
+        ("week.zip", zipped(ECHO), "one submission"),
+        ("week.tar.gz", b"x", "a file that ends in .gz"),
+        ("week.csv", b"student,file\nada,/etc/passwd\n", "a file that ends in .csv"),
+    ],
+)
+def test_what_is_no_batch_is_refused_in_a_sentence_and_not_kept(
+    web: Web, grace: TestClient, name: str, data: bytes, says: str
+) -> None:
+    files = {"files": (name, data, "application/zip")}
+    answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": "echo-responder"}, files=files)
+    assert answer.status_code == 422
+    assert says in words(answer.text)
+    assert list((web.settings.home / "uploads").iterdir()) == []
+
+
+def test_an_upload_is_its_senders_alone_and_few_are_kept(web: Web, grace: TestClient) -> None:
+    places = [sent(grace, a_class(f"s{number}")) for number in range(5)]
+    assert [grace.get(place).status_code for place in places] == [404, 404, 200, 200, 200]
+    other = web.browser(web.instructor("mallory"))
+    assert other.get(places[4]).status_code == 404
+    assert submit(other, f"{places[4]}/confirm").status_code == 404
+    for folder in (web.settings.home / "uploads").iterdir():
+        assert folder.stat().st_mode & 0o077 == 0
+    assert submit(grace, f"{places[4]}/discard").status_code == 303
+    assert grace.get(places[4]).status_code == 404
+    assert len(list((web.settings.home / "uploads").iterdir())) == 2
+
+
+def test_the_assignment_is_the_courses_own_where_it_has_one_and_never_a_folder(web: Web, grace: TestClient) -> None:
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(replace(echo(), title="Echo, changed")))
+    assert "Echo, changed" in grace.get(sent(grace, a_class("ada"))).text
+    files = {"files": ("w.zip", a_class("ada"), "application/zip")}
+    folder = str(assignment_folder("echo-responder"))
+    answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": folder}, files=files)
+    assert answer.status_code == 422
+
+
+def test_the_table_is_sorted_filtered_searched_and_cut(web: Web, grace: TestClient) -> None:
+    refusals = (Refusal("late.zip", "is empty, expected files.", Student("late")),)
+    requests = [grading_request(f"s{number:03}") for number in range(120)]
+    made = intake.accept_batch(web.store, "week", requests, refusals, course=COURSE, max_attempts=3)
+    with web.store.transaction() as session:
+        for place, job in enumerate(made.jobs):
+            row = session.get_one(Job, job.job_id)
+            row.state, row.verdict, row.marks, row.max_marks = JobState.DONE, "finished", Decimal(place), Decimal(200)
+        dead = session.get_one(Job, made.jobs[7].job_id)
+        dead.state, dead.marks, dead.error = JobState.DEAD, None, HOSTILE
+    path = f"{HOME}/batches/{made.id}"
+
+    def rows(query: str) -> list[str]:
+        page = grace.get(f"{path}?{query}").text
+        return re.findall(r'<th scope="row">(?:<a [^>]*>)?([^<]*)', page[page.find("<tbody") :])
+
+    assert rows("") == ["late", *(f"s{number:03}" for number in range(99))]
+    assert rows("page=2") == [f"s{number:03}" for number in range(99, 120)]
+    assert rows("page=2&sort=-student")[-1] == "late"
+    assert rows("state=refused") == ["late"]
+    assert rows("state=dead") == ["s007"]
+    assert rows("q=S11") == [f"s{number}" for number in range(110, 120)]
+    assert rows("q=nobody") == []
+    assert rows("sort=-marks")[:2] == ["s119", "s118"]
+    assert rows("sort=marks")[2:4] == ["s000", "s001"]
+    page = grace.get(f"{path}?state=nonsense&sort=;drop&q=%3Cscript%3E").text
+    assert "<script>alert" not in page
+    assert 'value="&lt;script&gt;"' in page
+
+
+def test_the_pages_of_a_batch_ask_the_database_no_more_of_many_than_of_few(web: Web, grace: TestClient) -> None:
+    few, many = a_batch(web, "ada"), a_batch(web, *(f"s{number}" for number in range(12)))
+    asked: list[str] = []
+    event.listen(web.store.engine, "before_cursor_execute", lambda *said: asked.append(said[2]))
+
+    def counted(path: str) -> int:
+        asked.clear()
+        assert grace.get(path).status_code == 200
+        return len(asked)
+
+    for part in ("", "/overview", "/progress"):
+        counts = [counted(f"{HOME}/batches/{made.id}{part}") for made in (few, many)]
+        assert counts[0] == counts[1], part
+    assert counted(f"{HOME}/batches") < 15
+
+
+def test_progress_tells_how_far_it_is_and_asks_for_the_page_at_the_end(web: Web, grace: TestClient) -> None:
+    requests = [grading_request(who) for who in ("ada", "bob")]
+    made = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
+    path = f"{HOME}/batches/{made.id}"
+    first = grace.get(f"{path}/progress", headers={"hx-request": "true"})
+    assert 'hx-trigger="every 2s"' in first.text
+    assert "hx-refresh" not in first.headers
+    assert '<meta http-equiv="refresh"' in grace.get(path).text
+    grade_all(web)
+    last = grace.get(f"{path}/progress", headers={"hx-request": "true"})
+    assert last.headers["hx-refresh"] == "true"
+    assert "hx-trigger" not in last.text
+    assert '<meta http-equiv="refresh"' not in grace.get(path).text
+
+
+def test_a_batch_is_paused_let_go_on_cancelled_and_retried(web: Web, grace: TestClient) -> None:
+    made = intake.accept_batch(web.store, "week", [grading_request("ada")], (), course=COURSE, max_attempts=3)
+    path = f"{HOME}/batches/{made.id}"
+
+    def state() -> BatchState:
+        with web.store.reading() as session:
+            return session.get_one(Batch, made.id).state
+
+    for action, then in (("pause", BatchState.PAUSED), ("resume", BatchState.OPEN)):
+        answer = submit(grace, f"{path}/{action}")
+        assert (answer.status_code, state()) == (303, then)
+        assert "Grace (person 1)" in grace.get(answer.headers["location"]).text
+    with web.store.transaction() as session:
+        job = session.get_one(Job, made.jobs[0].job_id)
+        job.state, job.error = JobState.DEAD, "the worker ended"
+    assert "the worker ended" in grace.get(path).text
+    submit(grace, f"{path}/retry")
+    with web.store.reading() as session:
+        assert session.get_one(Job, made.jobs[0].job_id).state is JobState.QUEUED
+    submit(grace, f"{path}/cancel")
+    assert state() is BatchState.CANCELLED
+    assert submit(grace, f"{path}/pause").status_code == 422
+
+
+def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, grace: TestClient) -> None:
+    web.student("zoe")
+    made = a_batch(web, "ada", "bob", refusals=(Refusal("x.zip", "is broken, expected a zip."),))
+    told = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
+    for each in ("Graded 2", "Commonest causes", "Not submitted Zoe", "x.zip is broken", "robomark batch similar"):
+        assert each in told, told
+    assert "Grace" not in told.partition("Not submitted")[2][:40]
+    everybody = grace.get(f"{HOME}/batches/{made.id}/overview?pass=0").text
+    assert "With 0 per cent or more 2 (100 %)" in words(everybody)
+
+
+def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "ada", "bob")
+    one, other = (job.job_id for job in made.jobs)
+    answer = submit(grace, f"{HOME}/grades/{one}/publish")
+    assert "This grade is published" in grace.get(answer.headers["location"]).text
+    with web.store.reading() as session:
+        assert session.get_one(Job, one).published_by == "Grace (person 1)"
+        assert session.get_one(Job, other).published_at is None
+        assert [entry.action for entry in audit.entries(session, "job", one)] == ["publish"]
+    answer = submit(grace, f"{HOME}/batches/{made.id}/publish")
+    assert "1 grades are published now" in words(grace.get(answer.headers["location"]).text)
+    with web.store.reading() as session:
+        assert session.get_one(Job, other).published_at is not None
+
+
+def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "ada", "bob")
+    answer = submit(grace, f"{HOME}/batches/{made.id}/regrade")
+    changes = answer.headers["location"]
+    assert changes.endswith("/changes")
+    grade_all(web)
+    assert "0 of 2 have other marks" in words(grace.get(changes).text)
+    first = made.jobs[0].job_id
+    answer = submit(grace, f"{HOME}/grades/{first}/regrade", {"assignment": "echo-responder"})
+    second = answer.headers["location"].rpartition("/")[2]
+    assert "It waits to be graded." in grace.get(answer.headers["location"]).text
+    grade_all(web)
+    shown = words(grace.get(answer.headers["location"]).text)
+    assert "Graded again:" in shown
+    assert "Graded more than once" in shown
+    submit(grace, f"{HOME}/grades/{second}/publish")
+    with web.store.reading() as session:
+        assert session.get_one(Job, second).standing is Standing.STANDS
+        assert session.get_one(Job, first).standing is Standing.KEPT
+    assert submit(grace, f"{HOME}/grades/{second}/regrade", {"assignment": "stay-inside"}).status_code == 422
+
+
+def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "ada", "bob", "cid")
+    ids = {job.student: job.job_id for job in made.jobs}
+    shown = grace.get(f"{HOME}/grades/{ids['bob']}").text
+    assert "staff copy" in shown
+    assert f'href="{HOME}/grades/{ids["ada"]}" rel="prev"' in shown
+    assert f'href="{HOME}/grades/{ids["cid"]}" rel="next"' in shown
+    assert 'rel="prev"' not in grace.get(f"{HOME}/grades/{ids['ada']}").text
+
+
+def test_hidden_names_are_nowhere_on_the_pages_of_who_marks(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "ada-lovelace", "bob-kahn")
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+    submit(grace, f"{HOME}/assignments/echo-responder/names", {"hidden": "true"})
+    path = f"{HOME}/batches/{made.id}"
+    pages = [path, f"{path}/overview", f"{HOME}/grades/{made.jobs[0].job_id}"]
+    regrade = submit(grace, f"{path}/regrade").headers["location"]
+    for each in (*pages, regrade):
+        text = grace.get(each).text
+        assert "lovelace" not in text, each
+        assert "kahn" not in text, each
+    assert len(set(re.findall(r"Participant \w{6}", grace.get(path).text))) == 2
+    assert "0 rows" in words(grace.get(f"{path}?q=ada-lovelace").text)
+    with web.store.reading() as session:
+        enrolment = session.scalar(select(Enrolment.id).where(Enrolment.student == "ada-lovelace"))
+    assert "/grades/" not in grace.get(f"{HOME}/people/{enrolment}").text
+    submit(grace, f"{HOME}/assignments/echo-responder/names", {"hidden": "false"})
+    assert "ada-lovelace" in grace.get(path).text
+
+
+def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "=cmd()", "bob")
+    path = f"{HOME}/batches/{made.id}"
+    answer = grace.get(f"{path}/export?format=csv")
+    assert answer.headers["content-disposition"].startswith(f'attachment; filename="{made.id}-csv.csv"')
+    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert [row["student"] for row in rows] == ["'=cmd()", "bob"]
+    assert rows[0]["marks"]
+    published = list(csv.DictReader(io.StringIO(grace.get(f"{path}/export?format=csv&published=true").text)))
+    assert {row["marks"] for row in published} == {""}
+    for name, each in FORMATS.items():
+        if each.filled_in is None and each.packed is None:
+            answer = grace.get(f"{path}/export?format={name}")
+            assert answer.status_code == 200, name
+            assert answer.headers["content-disposition"].startswith("attachment"), name
+    assert grace.get(f"{path}/export?format=../../etc").status_code == 422
+
+
+def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/assignments"
+    assert submit(grace, path, {"assignment": "echo-responder"}).headers["location"] == f"{path}/echo-responder"
+    for action, is_open in (("open", True), ("close", False), ("open", True)):
+        submit(grace, f"{path}/echo-responder/{action}")
+        with web.store.reading() as session:
+            assert open_assignments.find(session, 1, "echo-responder").open is is_open
+    policy = {"assignment": "echo-responder", "due": "2026-11-30T17:00", "late_days": "2", "attempts": "3"}
+    submit(grace, f"{HOME}/policy", policy)
+    shown = grace.get(f"{path}/echo-responder").text
+    assert 'value="2026-11-30T17:00"' in shown
+    with web.store.reading() as session:
+        allowed = policies.policies(session, 1)["echo-responder"]
+        done = [entry.action for entry in audit.entries(session, "course", "1")]
+    assert (allowed.late_days, allowed.attempts) == (2, 3)
+    assert done == ["prepare", "open", "close", "open", "policy"]
+    assert submit(grace, f"{HOME}/policy", {"due": "soon"}).status_code == 422
+    assert submit(grace, path, {"assignment": "/etc"}).status_code == 422
+
+
+def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: TestClient) -> None:
+    folder = assignment_folder("echo-responder")
+    files = {
+        f"mine/{path.relative_to(folder)}": path.read_text(encoding="utf-8")
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix in (".toml", ".py")
+    }
+    own = {"file": ("mine.zip", zipped(files), "application/zip")}
+    answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
+    assert answer.status_code == 303, words(answer.text)
+    grade_all(web)
+    shown = grace.get(answer.headers["location"]).text
+    preview = re.search(rf'href="({HOME}/grades/\w+)"', shown)
+    assert preview
+    assert grace.get(preview[1]).status_code == 200
+    with web.store.reading() as session:
+        role = select(Enrolment.role).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
+        assert session.scalars(role).all() == [Role.INSTRUCTOR]
+    assert submit(grace, f"{answer.headers['location']}/preview").status_code == 303
+    files["mine/assignment.toml"] += '\n[[criterion]]\ntitle = "No check"\nmarks = 1\n'
+    own = {"file": ("mine.zip", zipped(files), "application/zip")}
+    answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
+    assert answer.status_code == 422
+    assert "mine/assignment.toml:" in words(answer.text)
+
+
+def test_students_are_let_in_get_a_link_and_more_time(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/people"
+    table = {"file": ("class.csv", b"id,name,email\nada,Ada Lovelace,ada@example.org\nbob,Bob,\n")}
+    assert submit(grace, f"{path}/table", files=table).status_code == 303
+    own = submit(grace, path, {"who": "cid", "name": "Cid"}).headers["location"]
+    told = words(grace.get(path).text)
+    for each in ("ada Ada Lovelace ada@example.org student", "bob Bob", "cid Cid", "grace Grace instructor"):
+        assert each in told
+    assert "ada@" not in words(grace.get(f"{path}?q=cid").text)
+    link = re.search(r"/sign-in/(rml_[\w-]+)", submit(grace, f"{own}/link").text)
+    assert link
+    cid = web.browser()
+    assert cid.post("/sign-in", data={"secret": link[1]}).status_code == 303
+    assert "Cid" in cid.get("/account").text
+    assert "rml_" not in grace.get(own).text
+    submit(grace, f"{own}/extensions", {"due": "2030-01-02", "more_attempts": "2"})
+    assert "2 attempts more" in words(grace.get(own).text)
+    with web.store.reading() as session:
+        done = [entry.action for entry in audit.entries(session, "course", "1")]
+    assert done == ["enrol", "enrol", "extend"]
+    assert submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")}).status_code == 422
+
+
+def test_no_instructor_makes_a_link_for_another_or_for_who_is_more(web: Web, grace: TestClient) -> None:
+    other = web.instructor("linus")
+    assert submit(grace, f"{HOME}/people/{other.enrolment_id}/link").status_code == 404
+    ada = web.student()
+    with web.store.transaction() as session:
+        people.make_operator(session, ada.person_id)
+    assert submit(grace, f"{HOME}/people/{ada.enrolment_id}/link").status_code == 422
