@@ -1,22 +1,19 @@
-"""From what a student submitted (a .py file, a notebook, a folder, a .zip) to one ``Submission``, and to bytes kept.
+"""From what a student submitted (a .py file, a notebook, a folder, a .zip) to one ``Submission``.
 
-Reading files safely is ``raw_files.py``; what a submission is marked against is the assignment's business.
+Reading files safely is ``raw_files.py``, what is kept of a submission ``packed.py``; what it is marked against is the
+assignment's business.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-import json
 import os
 import re
-import tomllib
-import zipfile
 from collections.abc import Iterable, Mapping
-from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from responders.code import Code
 from sim.errors import UsageError
@@ -24,36 +21,29 @@ from submissions.agent_files import with_agents
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
 from submissions.marked_cell import LAST, marked_site, sites
+from submissions.meta import META, read_meta, run_of, text_of
 from submissions.names import LONGEST_NAME, shown_name
-from submissions.notebook import is_script, pack_notebook, read_notebook, read_script
-from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown, unzip
+from submissions.notebook import is_script, read_notebook, read_script
+from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown
 from submissions.run_choice import asked_site
 from submissions.source_text import decode_source
-from submissions.submission import Notebook, Submission
+from submissions.submission import PART_FILES, Notebook, Part, Submission
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Parts
 
-Part = Literal["program", "responder"]
-
 _NAMES: Mapping[str, Part] = MappingProxyType(
     {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
 )
-#: What the file of each part is called.
-PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
 _WORDS: Mapping[Part, str] = MappingProxyType({"program": "a robot program", "responder": "a responder"})
-_META = "submission.toml"
 _NOTEBOOK = ".ipynb"
-_PACKED_NOTEBOOK = "notebook.ipynb"
 _LOOKS_LIKE_RESPONDER = re.compile(
     r"^def[ \t]+(?:responder|\w+_responder)[ \t]*\("
     r"|^responder[ \t]*="
     r"|^[ \t]*roboSim\.pyresponder[ \t]*=",
     re.MULTILINE,
 )
-_MAX_META_BYTES = 64 * 1024
 UNNAMED = "unnamed"
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 
 
 def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
@@ -175,69 +165,10 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
     )
 
 
-def pack_submission(submission: Submission) -> bytes:
-    """A zip archive, the same byte for byte for the same submission; it can be submitted again as it is.
-
-    The parts are called robot.py and responder.py; submission.toml keeps who, what for, the notes, and what
-    the parts were called.
-    """
-    meta = [f"student = {_toml_text(submission.student)}"]
-    if submission.assignment is not None:
-        meta.append(f"assignment = {_toml_text(submission.assignment)}")
-    if submission.run is not None:
-        meta.append(f"run = {_toml_text(submission.run)}")
-    meta.append(f"notes = [{', '.join(map(_toml_text, submission.notes))}]")
-    entries = dict(submission.files)
-    for part, source in (("program", submission.program), ("responder", submission.responder)):
-        if source is not None:
-            meta.append(f"{part} = {_toml_text(source.name)}")
-            entries[PART_FILES[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
-    if submission.notebook is not None:
-        meta.append(f"notebook = {_toml_text(submission.notebook.name)}")
-        entries[_PACKED_NOTEBOOK] = pack_notebook(submission.notebook)
-    entries[_META] = "\n".join([*meta, ""]).encode()
-    buffer = BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
-        for name in sorted(entries):
-            info = zipfile.ZipInfo(name, _EPOCH)
-            info.external_attr = 0o100644 << 16
-            info.create_system = 3
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, entries[name])
-    return buffer.getvalue()
-
-
-def unpack_submission(data: bytes) -> Submission:
-    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
-    files = unzip(data, "the kept submission").files
-    meta = _read_meta(files.pop(_META, b""), "the kept submission")
-    sources: dict[Part, Code | None] = {}
-    for part, canonical in PART_FILES.items():
-        name = meta.get(part)
-        text = files.pop(canonical, None) if isinstance(name, str) else None
-        sources[part] = None if text is None else Code(str(name), text.decode("utf-8", "surrogatepass"))
-    notebook = None
-    if isinstance(meta.get("notebook"), str) and _PACKED_NOTEBOOK in files:
-        packed = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
-        notebook = dataclasses.replace(packed, name=str(meta["notebook"]))
-    notes = meta.get("notes", [])
-    assignment = meta.get("assignment")
-    return Submission(
-        student=str(meta.get("student", "unnamed")),
-        program=sources["program"],
-        responder=sources["responder"],
-        files=MappingProxyType(dict(sorted(files.items()))),
-        assignment=assignment if isinstance(assignment, str) else None,
-        notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
-        notebook=notebook,
-        run=_run_of(meta, "the kept submission"),
-    )
-
-
 def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
     files = dict(raw.files)
     notes = list(raw.notes)
-    meta = _read_meta(files.pop(_META, b""), where)
+    meta = read_meta(files.pop(META, b""), where)
     for compiled in [each for each, data in files.items() if is_compiled(each, data)]:
         del files[compiled]
         notes.append(f"{shown(compiled)} was left out: it is compiled code; submit the Python that it was made of.")
@@ -251,14 +182,14 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         sources[part] = Code(file_name, decoded.text)
         if decoded.note:
             notes.append(decoded.note)
-    assignment = _text_of(meta, "assignment", where)
+    assignment = text_of(meta, "assignment", where)
     student = shown_name(name)[:LONGEST_NAME].strip() or UNNAMED
-    named = shown_name(_text_of(meta, "student", where) or student)
+    named = shown_name(text_of(meta, "student", where) or student)
     if named != student:
-        notes.append(f"{_META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
-    run = _run_of(meta, where)
+        notes.append(f"{META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
+    run = run_of(meta, where)
     if run is not None and notebook is None:
-        notes.append(f"{_META} says run = {shown_name(run)}, which is not used: there is no notebook.")
+        notes.append(f"{META} says run = {shown_name(run)}, which is not used: there is no notebook.")
     return Submission(
         student=student,
         program=sources.get("program"),
@@ -354,38 +285,3 @@ def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str:
 def _looks_like(data: bytes, name: str) -> Part:
     text = decode_source(data, shown(name)).text
     return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"
-
-
-def _read_meta(data: bytes, where: str) -> dict[str, object]:
-    if not data:
-        return {}
-    if len(data) > _MAX_META_BYTES:
-        raise UsageError(f"{where}: {_META} is too large, expected a few lines.")
-    try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise UsageError(
-            f'{where}: {_META} cannot be read ({problem[:200]}), expected lines like assignment = "echo-responder".'
-        ) from None
-
-
-def _text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
-    value = meta.get(key)
-    if value is not None and (not isinstance(value, str) or not value.strip()):
-        raise UsageError(f'{where}: {key} in {_META} is not a text, expected {key} = "..." there.')
-    return value
-
-
-def _run_of(meta: Mapping[str, object], where: str) -> str | None:
-    """Which run of a notebook is to be marked: a number, or the tag of a cell."""
-    value = meta.get("run")
-    if isinstance(value, int) and not isinstance(value, bool):
-        return str(value)
-    return _text_of(meta, "run", where)
-
-
-def _toml_text(text: str) -> str:
-    """A TOML basic string; JSON's escapes are TOML's, but for DEL."""
-    printable = text.encode("utf-8", "replace").decode("utf-8")
-    return json.dumps(printable, ensure_ascii=False).replace("\x7f", "\\u007f")

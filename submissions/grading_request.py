@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import TYPE_CHECKING
 
-from submissions.assignment.definition import Assignment
 from submissions.people import NOBODY, Student
 from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,13 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Literal
 
 from responders.code import Code
+
+Part = Literal["program", "responder"]
+#: What the file of each part is called.
+PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,9 +30,8 @@ from sim.recording import BROWSER_TICK, TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
-from submissions.bundle import PART_FILES
 from submissions.seeds import PUBLIC, Secret, child_seed
-from submissions.submission import Submission
+from submissions.submission import PART_FILES, Submission
 
 _MEGABYTE = 1 << 20
 _OBSERVE_SECONDS = 1.0

@@ -14,9 +14,8 @@ from service.grading.run_plan import RunPlan
 from sim.recorded import faults_of
 from sim.recording import Fault, Recording
 from submissions.assignment.second_robot import SECOND_PROGRAM, second_program_of
-from submissions.bundle import PART_FILES, Part
 from submissions.criteria import Criterion
-from submissions.submission import Submission
+from submissions.submission import PART_FILES, Part, Submission
 
 _MOST_LINES, _LONGEST_LINE = 5000, 300
 _MOST_TEXTS, _LONGEST_TEXT = 400, 300

@@ -16,10 +16,11 @@ from service.grading.judging.words import quoted
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.assignment.second_robot import SECOND_PROGRAM
-from submissions.bundle import PART_FILES, meant_as
+from submissions.bundle import meant_as
 from submissions.magics import magic_place
 from submissions.marked_cell import NEARLY_MAGIC
 from submissions.raw_files import shown
+from submissions.submission import PART_FILES
 
 _NOTEBOOK_LINE = re.compile(r"^\s*[%!]")
 _NEARLY_PY = re.compile(r"""\s*["']?(?:p\s*y\s*[:;.]{1,3}|\w{1,6}::)""", re.IGNORECASE)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from service.grading.hint_clues import Clues
 from service.grading.judging.words import quoted
-from submissions.bundle import PART_FILES, Part
 from submissions.criteria import Criterion
 from submissions.criteria.replies import Replies
 from submissions.criteria.texts import Messages, Prints, Says, TextSequence
+from submissions.submission import PART_FILES, Part
 
 _NEAR = 0.72
 _MOST_TEXTS, _LONGEST = 20, 80

@@ -24,7 +24,6 @@ from sim.recording import Recording
 from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
-from submissions.bundle import Part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.helper_modules import modules_of
@@ -33,7 +32,7 @@ from submissions.marked_cell import program_of
 from submissions.plain_cells import python_of
 from submissions.run_choice import RunChoice, choose_run
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
-from submissions.submission import Notebook, Submission
+from submissions.submission import Notebook, Part, Submission
 
 _MEGABYTE = 1 << 20
 _IGNORED = "the program's magic line is ignored"

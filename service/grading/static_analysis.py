@@ -25,8 +25,8 @@ from sim.chance import Stream
 from sim.recorded import seconds_at
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment
-from submissions.bundle import Part
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
+from submissions.submission import Part
 
 _MEGABYTE = 1 << 20
 #: Its limits are much more than the longest text takes: how fast a machine is must make no difference.

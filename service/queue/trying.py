@@ -19,7 +19,7 @@ from service.store.versions import assignment_from_bytes
 from service.trying import run_tryout, tryout_assignment
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recording import Verdict
-from submissions.bundle import unpack_submission
+from submissions.packed import unpack_submission
 
 _log = structlog.get_logger(__name__)
 

@@ -102,7 +102,7 @@ def _of_hint(
         step = words.next_step if words.tone == "bad" else "Mend that first, and submit it again."
         return Diagnosis(hint, step, hints[1:], lost=with_it)
     line, name = int(place[1]), place[2]
-    step = f"Mend line {line} of {name}, run it once in the simulator, and submit it again."
+    step = f"Mend what line {line} of {name} needs, run it once in the simulator, and submit it again."
     return Diagnosis(hint, step, hints[1:], _excerpt(submission, name, line), lost=with_it)
 
 

@@ -18,9 +18,8 @@ from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
 from submissions.assignment.second_robot import second_program_of
-from submissions.bundle import PART_FILES
 from submissions.source_text import decode_source
-from submissions.submission import Submission
+from submissions.submission import PART_FILES, Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {

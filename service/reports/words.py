@@ -192,8 +192,7 @@ def _next_step(grade: Grade, words: VerdictWords) -> str:
     if lost.marks >= lost.max_marks:
         return "Full marks: everything that was asked for is there."
     missing, of = number(lost.max_marks - lost.marks), number(lost.max_marks)
-    verb = "is" if missing == "1" else "are"
-    most = f"Most is to be gained at “{one_line(lost.title, 100)}”, where {missing} of {of} marks {verb} missing."
+    most = f"Most marks are missing at “{one_line(lost.title, 100)}”: {missing} of {of}."
     return f"{most} {words.next_step}"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
@@ -25,11 +25,13 @@ from service.store.students import DEFAULT_COURSE, Students, course_of
 from service.store.versions import Frozen, assignment_from_bytes, freeze, keep
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
-from submissions.assignment.definition import Assignment
-from submissions.bundle import pack_submission, unpack_submission
 from submissions.grading_request import GradingRequest
+from submissions.packed import pack_submission, unpack_submission
 from submissions.people import Refusal
 from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
 
 Read = TypeVar("Read")
 

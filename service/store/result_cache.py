@@ -89,7 +89,7 @@ def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[
 
 def _notes(session: Session, source: Job, job_id: str) -> list[str]:
     """What was noted when this submission was read, then by the grading: another's folder may have their name."""
-    from submissions.bundle import unpack_submission
+    from submissions.packed import unpack_submission
 
     packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     theirs, own = (

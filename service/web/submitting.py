@@ -19,8 +19,9 @@ from service.web.access import enrolment_in, nothing_here
 from service.web.context import WebContext
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.bundle import pack_submission, submission_of
+from submissions.bundle import submission_of
 from submissions.grading_request import GradingRequest
+from submissions.packed import pack_submission
 from submissions.people import Student
 from submissions.raw_files import SentFile, read_sent, shown
 

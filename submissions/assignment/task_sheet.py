@@ -11,7 +11,7 @@ from decimal import Decimal
 
 from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SECOND_PROGRAM
-from submissions.bundle import PART_FILES
+from submissions.submission import PART_FILES
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Assignment, Parts
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment, read_assignment
-from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
+from submissions.bundle import fit_parts, read_submission
+from submissions.packed import pack_submission, unpack_submission
 
 TOML = """
 id = "drive"

@@ -23,7 +23,7 @@ from service.trying import LONGEST_SECONDS, tryout_assignment
 from sim.errors import HostError
 from submissions.assignment.definition import Assignment, Limits, Scenario
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import pack_submission
+from submissions.packed import pack_submission
 from submissions.people import Student
 from submissions.seeds import Secret
 

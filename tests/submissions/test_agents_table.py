@@ -11,7 +11,8 @@ from sim.errors import AssignmentError, UsageError
 from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Parts
 from submissions.assignment.reader import read_assignment
-from submissions.bundle import pack_submission, read_submission, unpack_submission
+from submissions.bundle import read_submission
+from submissions.packed import pack_submission, unpack_submission
 
 HEAD = """
 id = "a"

@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from responders.code import Code
 from sim.errors import UsageError
 from submissions.assignment.definition import Parts
-from submissions.bundle import fit_parts, pack_submission, read_submission, unpack_submission
+from submissions.bundle import fit_parts, read_submission
 from submissions.names import shown_name
+from submissions.packed import pack_submission, unpack_submission
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip
 from submissions.submission import Submission
 

@@ -21,11 +21,12 @@ from sim.errors import UsageError
 from submissions.assignment.examples import Expectation, examples, expected
 from submissions.assignment.folder import REFERENCE, catalogue
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import pack_submission, read_submission, unpack_submission
+from submissions.bundle import read_submission
 from submissions.criteria import Criterion
 from submissions.criteria.common import AmongMany
 from submissions.criteria.logged import Datalog
 from submissions.criteria.texts import TextSequence
+from submissions.packed import pack_submission, unpack_submission
 from submissions.submission import Submission
 
 FOLDER = DATA / "failing_submissions"

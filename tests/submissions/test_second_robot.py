@@ -11,7 +11,8 @@ from sim.errors import AssignmentError, UsageError
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts
 from submissions.assignment.reader import read_assignment
-from submissions.bundle import pack_submission, read_submission, unpack_submission
+from submissions.bundle import read_submission
+from submissions.packed import pack_submission, unpack_submission
 
 HEAD = 'id = "a"\ntitle = "A"\n'
 WORLD = "[world]\nrobots = 2\n"

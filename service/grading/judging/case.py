@@ -12,9 +12,9 @@ from responders.function_calls import Called, Returned
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.source_answers import SourceAnswers
 from submissions.assignment.definition import Assignment
-from submissions.bundle import Part
 from submissions.criteria import Criterion
 from submissions.magics import Flags
+from submissions.submission import Part
 
 #: Trials with their indices in the grade.
 Indexed = Sequence[tuple[int, TrialResult]]

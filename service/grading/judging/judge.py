@@ -16,8 +16,8 @@ from service.grading.judging.outcome import failed
 from sim.errors import HostError
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
-from submissions.bundle import PART_FILES
 from submissions.criteria import SCHEMAS, Criterion
+from submissions.submission import PART_FILES
 
 _NOTHING_FOUND = StaticAnalysis()
 

@@ -19,8 +19,8 @@ from service.web.rendering import page, wants_part
 from service.web.submitting import try_out
 from sim.errors import UsageError
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
-from submissions.bundle import PART_FILES, unpack_submission
-from submissions.submission import Submission
+from submissions.packed import unpack_submission
+from submissions.submission import PART_FILES, Submission
 
 router = APIRouter()
 

@@ -25,7 +25,7 @@ from service.grading.judging.label_patches import CODES, decoded
 from service.grading.judging.per_class import class_scores
 from service.grading.judging.truths import NO_IMAGE
 from service.grading.trial_runner import TrialRunner
-from service.reports.recognition_table import recognition_tables
+from service.reports.recognition_table import recognition_table
 from service.reports.view import student_view
 from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
@@ -198,12 +198,8 @@ def test_the_counts_add_up(driven: list[Recording], keys: dict[str, Any]) -> Non
     assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_IMAGE)
     assert sum(score.shown for score in class_scores(found)) == found.n
     assert 0 <= found.low <= found.value <= found.high <= 1
-    numbers = [int(word) for word in recognition_tables(_grade_of(result))[0].sums.split() if word.isdecimal()]
+    numbers = [int(word) for word in recognition_table(result).sums.split() if word.isdecimal()]
     assert numbers[0] == sum(numbers[1:5])
-
-
-def _grade_of(result: CriterionResult) -> Any:
-    return replace(build.shape_grade(), criteria=(result,), trials=())
 
 
 # Where the truth comes from

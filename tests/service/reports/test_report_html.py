@@ -170,7 +170,7 @@ def test_headline_criteria_and_stamp() -> None:
     reader = Reader(report(student_view(build.shape_grade()), {}))
     assert "7of 8 marks" in reader.text
     assert "5 / 6" in reader.text
-    assert "Most is to be gained at “Names the right shape”" in reader.text
+    assert "Most marks are missing at “Names the right shape”" in reader.text
     assert reader.text.count("sandbox: process limits only") == 1
     assert "First missed in each-shape, trial 5" in reader.text
     assert build.shape_grade().assignment_version in reader.text

@@ -16,7 +16,7 @@ from service.store.tryouts import MOST_AN_HOUR, TryoutLine
 from service.store.versions import assignment_from_bytes, freeze, keep
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
-from submissions.bundle import pack_submission
+from submissions.packed import pack_submission
 from submissions.people import Student
 
 PACKED = pack_submission(grading_request().submission)

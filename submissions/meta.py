@@ -1,0 +1,42 @@
+"""submission.toml: what a submission says of itself, read strictly. What follows from it is ``bundle.py``'s."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+
+from sim.errors import UsageError
+
+META = "submission.toml"
+_MAX_BYTES = 64 * 1024
+
+
+def read_meta(data: bytes, where: str) -> dict[str, object]:
+    """What the file says; nothing where there is none. Raises UsageError, naming ``where``, for what cannot be read."""
+    if not data:
+        return {}
+    if len(data) > _MAX_BYTES:
+        raise UsageError(f"{where}: {META} is too large, expected a few lines.")
+    try:
+        return tomllib.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise UsageError(
+            f'{where}: {META} cannot be read ({problem[:200]}), expected lines like assignment = "echo-responder".'
+        ) from None
+
+
+def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
+    """A text of it, None where it says none. Raises UsageError for anything else."""
+    value = meta.get(key)
+    if value is not None and (not isinstance(value, str) or not value.strip()):
+        raise UsageError(f'{where}: {key} in {META} is not a text, expected {key} = "..." there.')
+    return value
+
+
+def run_of(meta: Mapping[str, object], where: str) -> str | None:
+    """Which run of a notebook is to be marked: a number, or the tag of a cell."""
+    value = meta.get("run")
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    return text_of(meta, "run", where)

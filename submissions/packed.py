@@ -1,0 +1,83 @@
+"""What is kept of a submission: the bytes it is packed into, and the submission again. Reads nothing that was sent."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import zipfile
+from io import BytesIO
+from types import MappingProxyType
+
+from responders.code import Code
+from submissions.meta import META, read_meta, run_of
+from submissions.notebook import pack_notebook, read_notebook
+from submissions.raw_files import unzip
+from submissions.submission import PART_FILES, Part, Submission
+
+_PACKED_NOTEBOOK = "notebook.ipynb"
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
+
+
+def pack_submission(submission: Submission) -> bytes:
+    """A zip archive, the same byte for byte for the same submission; it can be submitted again as it is.
+
+    The parts are called robot.py and responder.py; submission.toml keeps who, what for, the notes, and what
+    the parts were called.
+    """
+    meta = [f"student = {_toml_text(submission.student)}"]
+    if submission.assignment is not None:
+        meta.append(f"assignment = {_toml_text(submission.assignment)}")
+    if submission.run is not None:
+        meta.append(f"run = {_toml_text(submission.run)}")
+    meta.append(f"notes = [{', '.join(map(_toml_text, submission.notes))}]")
+    entries = dict(submission.files)
+    for part, source in (("program", submission.program), ("responder", submission.responder)):
+        if source is not None:
+            meta.append(f"{part} = {_toml_text(source.name)}")
+            entries[PART_FILES[part]] = source.text.encode("utf-8", "surrogatepass")  # type: ignore[index]
+    if submission.notebook is not None:
+        meta.append(f"notebook = {_toml_text(submission.notebook.name)}")
+        entries[_PACKED_NOTEBOOK] = pack_notebook(submission.notebook)
+    entries[META] = "\n".join([*meta, ""]).encode()
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for name in sorted(entries):
+            info = zipfile.ZipInfo(name, _EPOCH)
+            info.external_attr = 0o100644 << 16
+            info.create_system = 3
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, entries[name])
+    return buffer.getvalue()
+
+
+def unpack_submission(data: bytes) -> Submission:
+    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
+    files = unzip(data, "the kept submission").files
+    meta = read_meta(files.pop(META, b""), "the kept submission")
+    sources: dict[Part, Code | None] = {}
+    for part, canonical in PART_FILES.items():
+        name = meta.get(part)
+        text = files.pop(canonical, None) if isinstance(name, str) else None
+        sources[part] = None if text is None else Code(str(name), text.decode("utf-8", "surrogatepass"))
+    notebook = None
+    if isinstance(meta.get("notebook"), str) and _PACKED_NOTEBOOK in files:
+        packed = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
+        notebook = dataclasses.replace(packed, name=str(meta["notebook"]))
+    notes = meta.get("notes", [])
+    assignment = meta.get("assignment")
+    return Submission(
+        student=str(meta.get("student", "unnamed")),
+        program=sources["program"],
+        responder=sources["responder"],
+        files=MappingProxyType(dict(sorted(files.items()))),
+        assignment=assignment if isinstance(assignment, str) else None,
+        notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
+        notebook=notebook,
+        run=run_of(meta, "the kept submission"),
+    )
+
+
+def _toml_text(text: str) -> str:
+    """A TOML basic string; JSON's escapes are TOML's, but for DEL."""
+    printable = text.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(printable, ensure_ascii=False).replace("\x7f", "\\u007f")
