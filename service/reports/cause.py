@@ -60,7 +60,7 @@ def ended(grade: Grade, diagnosis: Diagnosis) -> str:
 
 
 def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
-    """The one cause: what a hint names, else a fault that cost marks, else what the dearest criterion did not find.
+    """The one cause: what a hint names, else a fault that cost marks, a missing part, what the dearest criterion lacks.
 
     Excerpts need the ``submission``.
     """
@@ -76,7 +76,9 @@ def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
     if hints:
         return _of_hint(grade, hints, lost, submission)
     fault = _costly_fault(grade, lost)
-    if fault is not None:
+    # A program that waits for an answer which nobody gives runs until the time is up.
+    waited_in_vain = bool(grade.missing) and fault is not None and fault.verdict is Verdict.TIME_LIMIT
+    if fault is not None and not waited_in_vain:
         return _of_fault(grade, fault, lost, submission)
     if grade.missing:
         concerned = (index for index, each in lost.items() if grade.missing in each.message)

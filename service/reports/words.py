@@ -200,7 +200,7 @@ def _what_happened(grade: Grade) -> VerdictWords:
     if not grade.missing:
         return _ended(grade) if grade.trials else _NO_ROBOT
     words = _WITHOUT[grade.missing]
-    if grade.verdict is Verdict.FINISHED:
+    if grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
         return words
     ended = _ended(grade)
     return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")

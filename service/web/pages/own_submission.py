@@ -12,7 +12,7 @@ from sqlalchemy import select
 from service import own_work
 from service.report_files import report_body
 from service.reports.view import student_view
-from service.store import batches, policies, results
+from service.store import appeals, batches, policies, results
 from service.store.models import SubmissionRow
 from service.store.queue_places import queue_place
 from service.web.access import RowNumber, Studying, enrolment_in, nothing_here
@@ -39,6 +39,7 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
             return page(request, here.reader, "own_progress.html", here=here, found=found, place=place)
         attempts = own_work.own_submissions(session, enrolment_id, found.assignment)
         allowance = own_work.allowance(session, enrolment_id, found.assignment)
+        asked = appeals.of_submission(session, submission_id)
         view = line = None
         if found.shown:
             line = batches.job_line(session, found.job_id)
@@ -53,6 +54,7 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
         attempts=attempts,
         curve=curve(attempts),
         allowance=allowance,
+        appeals=asked,
         report=report_body(context.store, line, view) if line and view else None,
     )
 

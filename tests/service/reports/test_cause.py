@@ -104,6 +104,26 @@ def test_time_that_was_up_is_the_cause_only_where_it_cost_marks() -> None:
     assert diagnose(other).cause == "Expected 65 mm, but it was 72 mm off, at 1.50 s."
 
 
+def test_a_missing_part_comes_before_the_time_that_was_up_for_want_of_it() -> None:
+    words = "The program was still running after 10 seconds"
+    grade = build.shape_grade()
+    recording = replace(grade.trials[0].recording, faults=(Fault(10.0, Verdict.TIME_LIMIT, "program", words),))
+    graded = replace(
+        grade,
+        hints=(),
+        missing="responder.py",
+        trials=(replace(grade.trials[0], recording=recording), *grade.trials[1:]),
+        criteria=(
+            criterion("ends", missed(0, 10.0, words)),
+            criterion("names", missed(0, None), message="There is no responder.py."),
+        ),
+    )
+    told = diagnose(graded)
+    assert told.cause.startswith("There is no responder.py")
+    assert told.next_step.startswith("Submit responder.py")
+    assert told.lost == {1}
+
+
 def test_the_dearest_criterion_is_the_cause_with_those_that_failed_where_it_did() -> None:
     grade = build.line_follower_grade()
     end = grade.trials[0].recording.end_t

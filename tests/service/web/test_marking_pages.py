@@ -108,5 +108,8 @@ def test_a_student_asks_and_an_instructor_answers(marked: Marked) -> None:
     shown = marked.ada.get(path).text
     assert "Line 3 &lt;script&gt;" in shown
     assert "person" not in shown
+    report = marked.ada.get(path.removesuffix("/appeal")).text
+    assert "Line 3 &lt;script&gt;" in report
+    assert report.index("Please look again.") < report.index('class="score"')
     assert submit(marked.ada, path, {"text": "And now?"}).headers["location"] == path
     assert "And now?" in marked.grace.get("/courses/1/appeals").text
