@@ -23,7 +23,7 @@ from service.store.states import CredentialKind
 from service.store.students import DEFAULT_COURSE
 from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
-from sim.errors import HostError, RobomarkError
+from sim.errors import HostError, RobomarkError, UsageError
 from submissions.people import Student
 
 _log = structlog.get_logger(__name__)
@@ -91,7 +91,11 @@ def _first_link(settings: Settings, store: Store, listening_at: str) -> str:
     """A link that signs in, once, whoever brings the service up: an instructor of the first course, and operator."""
     account = audit.this_user().partition("@")[0]
     with store.transaction() as session:
-        member = people.make_instructor(session, DEFAULT_COURSE, Student(account))
+        try:
+            member = people.make_instructor(session, DEFAULT_COURSE, Student(account))
+        except UsageError:
+            # A student is called like the account.
+            member = people.make_instructor(session, DEFAULT_COURSE, Student(f"operator {account}"))
         people.make_operator(session, member.person_id)
         secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
     return f"{settings.public_url or listening_at}/sign-in/{secret}"

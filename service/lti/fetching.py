@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import urllib.error
 import urllib.request
@@ -28,6 +29,16 @@ class Fetched:
     link: str  # the header that names further pages
 
 
+class _NoRedirection(urllib.request.HTTPRedirectHandler):
+    """What is sent has our token in it, which is for nobody else."""
+
+    def redirect_request(self, *_: Any) -> None:
+        return None
+
+
+_OPENER = urllib.request.build_opener(_NoRedirection)
+
+
 def fetch(
     url: str, *, method: str = "GET", body: bytes | None = None, headers: Mapping[str, str] | None = None
 ) -> Fetched:
@@ -35,14 +46,14 @@ def fetch(
     host = urlsplit(url).netloc
     if urlsplit(url).scheme not in {"https", "http"}:
         raise PlatformError(f"The platform at {url!r} cannot be asked: expected https://")
-    request = urllib.request.Request(url, data=body, method=method, headers=dict(headers or {}))
     try:
-        with urllib.request.urlopen(request, timeout=_SECONDS) as answer:
+        request = urllib.request.Request(url, data=body, method=method, headers=dict(headers or {}))
+        with _OPENER.open(request, timeout=_SECONDS) as answer:
             data = answer.read(_MOST_BYTES + 1)
             link = answer.headers.get("link", "")
     except urllib.error.HTTPError as error:
         raise PlatformError(f"The platform at {host} answered {error.code} to a {method}") from None
-    except OSError as error:
+    except (OSError, http.client.HTTPException, ValueError) as error:
         raise PlatformError(f"The platform at {host} does not answer: {error}") from None
     if len(data) > _MOST_BYTES:
         raise PlatformError(f"The platform at {host} answered more than {_MOST_BYTES} bytes")

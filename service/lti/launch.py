@@ -87,8 +87,8 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
         role=role_of(claims.get(f"{CLAIM}roles")),
         context=context_id[:_LONGEST],
         course_title=str(title)[:_LONGEST],
-        members_url=_text(_table(claims, MEMBERS_CLAIM).get("context_memberships_url")),
-        lineitems_url=_text(_table(claims, GRADES_CLAIM).get("lineitems")),
+        members_url=text_of(_table(claims, MEMBERS_CLAIM), "context_memberships_url"),
+        lineitems_url=text_of(_table(claims, GRADES_CLAIM), "lineitems"),
     )
 
 
@@ -129,8 +129,8 @@ def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
 
 
 def _student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:
-    known = _text(_table(claims, f"{CLAIM}lis").get("person_sourcedid"))
-    return student_of(platform, subject, known, _text(claims.get("name")), _text(claims.get("email")))
+    known = text_of(_table(claims, f"{CLAIM}lis"), "person_sourcedid")
+    return student_of(platform, subject, known, text_of(claims, "name"), text_of(claims, "email"))
 
 
 def _table(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -138,5 +138,12 @@ def _table(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _text(value: object) -> str | None:
+def text_of(table: Mapping[str, Any], name: str) -> str | None:
+    """A text of what a platform said; None where it said none, or no text."""
+    value = table.get(name)
     return value if isinstance(value, str) and value else None
+
+
+def tables_in(value: object) -> list[Mapping[str, Any]]:
+    """The tables in a list that a platform sent; what is none is passed over."""
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []

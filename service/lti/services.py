@@ -20,7 +20,7 @@ import jwt
 
 from service.lti.fetching import PlatformError, fetch
 from service.lti.keys import signing_key
-from service.lti.launch import role_of, student_of
+from service.lti.launch import role_of, student_of, tables_in, text_of
 from service.store.engine import Store
 from service.store.lti import CourseLink, Platform
 from service.store.states import Role
@@ -66,12 +66,14 @@ def members(store: Store, link: CourseLink) -> list[PlatformMember]:
     headers = {"accept": _MEMBERS, "authorization": f"Bearer {_token(store, link.platform, _MEMBERS_SCOPE)}"}
     found = []
     for page in _pages(link.members_url, headers):
-        for each in page.get("members", ()) if isinstance(page, dict) else ():
-            subject = each.get("user_id")
-            if not isinstance(subject, str) or each.get("status", "Active") != "Active":
+        for each in tables_in(page.get("members") if isinstance(page, dict) else None):
+            subject = text_of(each, "user_id")
+            if subject is None or each.get("status", "Active") != "Active":
                 continue
-            name = each.get("name") or " ".join(filter(None, (each.get("given_name"), each.get("family_name"))))
-            student = student_of(link.platform, subject, each.get("lis_person_sourcedid"), name, each.get("email"))
+            parts = (text_of(each, "given_name"), text_of(each, "family_name"))
+            name = text_of(each, "name") or " ".join(filter(None, parts))
+            known, email = text_of(each, "lis_person_sourcedid"), text_of(each, "email")
+            student = student_of(link.platform, subject, known, name, email)
             found.append(PlatformMember(subject, student, role_of(_full(each.get("roles")))))
     return found
 
@@ -108,7 +110,7 @@ def _column(lineitems_url: str, token: str, assignment: str, title: str, max_mar
     headers = {"accept": _LINEITEMS, "authorization": f"Bearer {token}"}
     separator = "&" if "?" in lineitems_url else "?"
     for page in _pages(f"{lineitems_url}{separator}{urlencode({'resource_id': assignment})}", headers):
-        for item in page if isinstance(page, list) else ():
+        for item in tables_in(page):
             if item.get("resourceId") == assignment and isinstance(item.get("id"), str):
                 return str(item["id"])
     wanted = {"label": title, "scoreMaximum": float(max_marks), "resourceId": assignment, "tag": "robomark"}

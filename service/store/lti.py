@@ -16,9 +16,11 @@ from sqlalchemy.orm import Session
 
 from service.store.engine import now
 from service.store.models import Course, Enrolment, Person
+from service.store.people import is_more_than
 from service.store.states import Role
 from service.store.students import Students, course_of
 from service.store.web_tables import LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
+from sim.errors import UsageError
 from submissions.people import Student
 
 _LAUNCH_TAKES = timedelta(minutes=10)
@@ -159,7 +161,10 @@ def meet(
 
 
 def enrol(session: Session, platform: Platform, course_id: int, subject: str, student: Student, role: Role) -> int:
-    """The person whom the platform calls so, in the course with this role."""
+    """The person whom the platform calls so, in the course with this role.
+
+    Raises UsageError where their id is that of somebody who cannot be taken for them.
+    """
     of_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
     known = session.scalar(select(LtiPerson).where(*of_subject))
     if known is not None:
@@ -172,6 +177,11 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
             return known.person_id
     enrolment_id = Students(session, course_id).enrol(student, now(session))
     row = session.get_one(Enrolment, enrolment_id)
+    claimed = select(LtiPerson.id).where(LtiPerson.platform_id == platform.id, LtiPerson.person_id == row.person_id)
+    is_another = row.role is not Role.STUDENT or is_more_than(session, row) or session.scalar(claimed) is not None
+    if known is None and is_another:
+        # Else whoever chooses an id on the platform would choose whom they are here.
+        raise UsageError(f"somebody else is called {student.id!r} in this course; ask whoever runs it")
     row.role = role
     if known is None:
         session.add(LtiPerson(platform_id=platform.id, subject=subject, person_id=row.person_id))

@@ -43,11 +43,14 @@ class CourseLine:
 def make_instructor(session: Session, course: str, who: Student) -> Member:
     """Make somebody an instructor of the course, which is made where there is none of that name.
 
-    An instructor of this id in another course is the same person.
+    An instructor of this id in another course is the same person. Raises UsageError where a student of the course has
+    this id: whoever can sign in as that student would be an instructor.
     """
     at = now(session)
     course_id, own = course_of(session, course, at), shown_name(who.id)
-    taken = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.student == own)
+    taken = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == own)
+    if session.scalar(taken) is Role.STUDENT:
+        raise UsageError(f"{own!r} is a student of this course, expected another id for an instructor")
     elsewhere = select(Enrolment.person_id).where(Enrolment.student == own, Enrolment.role == Role.INSTRUCTOR).limit(1)
     person_id = session.scalar(elsewhere)
     if person_id is not None and session.scalar(taken) is None:

@@ -64,10 +64,17 @@ def fetch_members(request: Request, here: Instructing, context: Context) -> Resp
         link = _link(lti.course_link(session, here.course_id))
     found = services.members(context.store, link)
     with context.store.transaction() as session:
+        refused = []
         for each in found:
-            lti.enrol(session, link.platform, here.course_id, each.subject, each.student, each.role)
-        audit.note(session, here.actor, "enrol", "course", str(here.course_id), members=len(found))
-    return _course_page(request, here, context, f"{len(found)} of the platform's members are in the course.")
+            try:
+                with session.begin_nested():
+                    lti.enrol(session, link.platform, here.course_id, each.subject, each.student, each.role)
+            except UsageError as error:
+                refused.append(str(error))
+        count = len(found) - len(refused)
+        audit.note(session, here.actor, "enrol", "course", str(here.course_id), members=count)
+    told = f"{count} of the platform's members are in the course."
+    return _course_page(request, here, context, f"{told} {len(refused)} not: {refused[0]}." if refused else told)
 
 
 @router.post("/courses/{course_id}/platform/marks")

@@ -170,6 +170,39 @@ def test_a_platform_that_nobody_registered_begins_nothing(launched: tuple[Web, L
     assert "registered" in answer.text
 
 
+def test_nobody_becomes_somebody_else_by_an_id_that_a_platform_tells(
+    launched: tuple[Web, LearningPlatform],
+) -> None:
+    web, platform = launched
+    _launch(web, platform, "grace", INSTRUCTOR)
+    web.student("ada", "Robotics")
+    web.instructor("alan", "Robotics")
+    web.student("bob", "Robotics")
+    _, first = _launch(web, platform, "ada", LEARNER)
+    assert first.status_code == 303
+    for subject, taken in (("eve", "ada"), ("eve", "alan"), ("eve", "grace")):
+        browser, refused = _launch(web, platform, subject, LEARNER, **{f"{CLAIM}lis": {"person_sourcedid": taken}})
+        assert refused.status_code == 422, taken
+        assert "Somebody else is called" in refused.text
+        assert browser.get("/account").status_code == 303
+    with web.store.reading() as session:
+        assert {each.id: each.name for each in people.members(session, 1)}["alan"] == "Alan"
+
+
+def test_what_a_platform_lists_wrongly_is_passed_over(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    platform.tool_keys = _browser(web).get("/lti/keys").json()
+    grace, _ = _launch(web, platform, "grace", INSTRUCTOR)
+    platform.members = [
+        {"user_id": 7, "roles": [LEARNER]},
+        {"user_id": "ada", "roles": "x", "name": ["Ada"], "lis_person_sourcedid": 12, "email": {}},
+        {"user_id": "eve", "roles": [LEARNER], "lis_person_sourcedid": "grace"},
+    ]
+    answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: csrf(grace.get("/account"))})
+    assert answer.status_code == 200, answer.text
+    assert "1 of the platform&#39;s members are in the course. 1 not:" in answer.text
+
+
 def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, LearningPlatform]) -> None:
     web, platform = launched
     platform.tool_keys = _browser(web).get("/lti/keys").json()

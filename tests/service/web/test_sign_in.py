@@ -14,6 +14,7 @@ from service.store import credentials, people
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE
+from sim.errors import UsageError
 from submissions.people import Student
 from web import Web, csrf, submit, web_in
 
@@ -119,6 +120,12 @@ def test_an_instructor_of_two_courses_is_one_person(web: Web) -> None:
     shown = web.browser(first).get("/").text
     assert 'href="/courses/1/batches">one</a>' in shown
     assert 'href="/courses/2/batches">two</a>' in shown
+
+
+def test_a_student_does_not_become_an_instructor_under_their_own_sessions(web: Web) -> None:
+    web.student("ada")
+    with pytest.raises(UsageError, match="'ada' is a student of this course"):
+        web.instructor("ada")
 
 
 def test_the_commands_make_people_links_and_tokens(tmp_path: Path) -> None:
