@@ -3,6 +3,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && { echo "$$p"; break; }; done)
 
+# What is imported is compiled once and kept, also for who has that switched off: tests start thousands of processes.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick pictures lock wheel image clean
 
 setup: $(VENV)/.ready

@@ -28,8 +28,10 @@ from service.plotting import draw
 from service.reports.html import report
 from service.reports.view import student_view
 from service.settings import load_settings
-from service.store import intake, jobs, results
+from service.store.batches import intake
 from service.store.engine import Store, open_store
+from service.store.grades import results
+from service.store.queue import jobs
 from submissions.grading_request import GradingRequest
 
 _ROOT = Path(__file__).parents[1]

@@ -7,8 +7,10 @@ from datetime import UTC, datetime
 
 from responders.code import Code
 from service.grading.grader import grade
-from service.store import intake, jobs, results
+from service.store.batches import intake
 from service.store.engine import Store
+from service.store.grades import results
+from service.store.queue import jobs
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission

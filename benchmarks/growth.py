@@ -17,7 +17,7 @@ from benchmarks.simulator import FOLLOWER, spec, through_processes
 from responders.trial_spec import TrialSpec
 from service.grading.trial_runner import TrialRunner
 from service.settings import load_settings
-from service.store import intake
+from service.store.batches import intake
 from service.store.engine import open_store
 
 #: What a step may cost a piece, more than the step before it.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -70,8 +71,8 @@ def measure(times: int) -> list[Measurement]:
         return [
             _beside(
                 name,
-                lambda program=program, noise=noise: _theirs(canvas, program, noise),
-                lambda program=program, noise=noise: _ours(arena, camera, program, noise),
+                partial(_theirs, canvas, program, noise),
+                partial(_ours, arena, camera, program, noise),
                 noise,
                 times,
             )
@@ -87,7 +88,7 @@ def _beside(
 ) -> Measurement:
     if noise.light == 0:
         _compare(name, theirs(), ours())
-    port, own = (median_of(min(times, 3), lambda run=run: cpu_seconds(run)) for run in (theirs, ours))
+    port, own = (median_of(min(times, 3), partial(cpu_seconds, run)) for run in (theirs, ours))
     seconds = _TICKS / 30
     return Measurement(
         f"the original's loop in plain Python against ours, {name}",
@@ -99,8 +100,8 @@ def _beside(
 
 def _compare(name: str, port: OriginalSimulator, own: World) -> None:
     drive = own.drive
-    apart = (port.x - drive.x, port.y - drive.y, math.degrees(port.angle - drive.heading))
-    apart = (*apart, port.ultrasonic - own.ultrasonic, port.left_red - own.left_means[0])
+    place = (port.x - drive.x, port.y - drive.y, math.degrees(port.angle - drive.heading))
+    apart = (*place, port.ultrasonic - own.ultrasonic, port.left_red - own.left_means[0])
     if max(map(abs, apart)) > _NEAR:
         raise RuntimeError(f"the port and ours do not end alike with {name}: {apart}")
 

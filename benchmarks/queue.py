@@ -21,10 +21,11 @@ from service.queue.notifier import Notifier
 from service.queue.supervisor import Supervisor
 from service.report_files import write_report
 from service.settings import load_settings
-from service.store import batches, intake, plots, results
+from service.store.batches import batches, intake
 from service.store.engine import Store, open_store
-from service.store.metrics import quantile
+from service.store.grades import plots, results
 from service.store.models import Job
+from service.store.queue.metrics import quantile
 from service.store.states import JobState, Lane
 
 _BATCH = 200

@@ -18,9 +18,10 @@ from benchmarks.graded_store import graded_batch
 from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
 from benchmarks.measurement import MILLISECONDS, Measurement, median, wall_seconds
 from service.settings import load_settings
-from service.store import batches, jobs
+from service.store.batches import batches
 from service.store.engine import Store, open_store
 from service.store.models import Job
+from service.store.queue import jobs
 
 _PLANS = Path(__file__).parents[1] / "docs" / "query-plans.txt"
 _TIMES = 9

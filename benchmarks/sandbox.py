@@ -5,6 +5,7 @@ Times are real ones, medians and 95th percentiles; on a busy machine they say mo
 
 from __future__ import annotations
 
+import functools
 import mmap
 import os
 import struct
@@ -19,7 +20,7 @@ from responders import wire
 from responders.sandbox.inside import grants, lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.running_child import ChildLimits, ServedChild
 from responders.sandbox.zygote import Role
 from sim.recording import TICK, Verdict
 
@@ -97,7 +98,7 @@ def _many(count: int, sample: Callable[[], float]) -> list[float]:
     return [sample() for _ in range(count)]
 
 
-def _spawn(sandboxes: Sandboxes, role: Role, folder: Path | None = None) -> Child:
+def _spawn(sandboxes: Sandboxes, role: Role, folder: Path | None = None) -> ServedChild:
     return sandboxes.spawn(role, _LIMITS[role], folder)
 
 
@@ -130,7 +131,7 @@ def _turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
         child.close()
 
 
-def _echo(sandboxes: Sandboxes, folder: Path) -> Child:
+def _echo(sandboxes: Sandboxes, folder: Path) -> ServedChild:
     child = _spawn(sandboxes, "responder with libraries", folder)
     _start(child, "responder with libraries", _ECHO)
     while child.receive(wire.RESPONDER)["do"] != "ready":
@@ -138,26 +139,26 @@ def _echo(sandboxes: Sandboxes, folder: Path) -> Child:
     return child
 
 
-def _start(child: Child, role: Role, text: str) -> None:
+def _start(child: ServedChild, role: Role, text: str) -> None:
     own = {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 
-def _turn(child: Child) -> None:
+def _turn(child: ServedChild) -> None:
     child.send({"do": "message", "t": 0, "text": "hello"})
     child.receive(wire.RESPONDER)
 
 
 def _lockdown_alone() -> float:
     """In a fork of this process, with the grants of a robot program."""
-    readable = grants.readable([])
+    rules = _rules()
     reading, writing = os.pipe()
     pid = os.fork()
     if pid == 0:
         start = time.perf_counter()
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
-        lockdown.restrict_files(lockdown.Grants(readable, grants.listable([])))
+        lockdown.restrict_files(rules)
         lockdown.restrict_system_calls()
         os.write(writing, struct.pack("=d", time.perf_counter() - start))
         os._exit(0)
@@ -168,11 +169,17 @@ def _lockdown_alone() -> float:
     return taken
 
 
+@functools.cache
+def _rules() -> tuple[bytes, ...]:
+    """As a zygote makes them ready, once."""
+    return lockdown.reading_rules(lockdown.Grants(grants.readable([]), grants.listable([])))
+
+
 def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
     """Megabytes that are a child's own, and its share of all when it is one of ten; not to be seen by everybody."""
     children = [_echo(sandboxes, folder) for _ in range(10)]
     try:
-        lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()
+        lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()  # type: ignore[attr-defined]
     except PermissionError:
         return float("nan"), float("nan")
     finally:

@@ -12,7 +12,7 @@ from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.settings import load_settings
-from service.store import intake
+from service.store.batches import intake
 from service.store.engine import Store, open_store
 from service.store.models import Job
 from service.store.states import JobState, Lane, PlotState

@@ -24,13 +24,14 @@ from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_databas
 from benchmarks.measurement import COUNT, MILLISECONDS, SECONDS, Measurement, median
 from service.queue.supervisor import Supervisor
 from service.settings import load_settings
-from service.store import credentials, open_assignments, people
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
 from service.store.engine import Store, open_store
-from service.store.metrics import quantile
 from service.store.models import Job
+from service.store.people import credentials, people
+from service.store.people.students import DEFAULT_COURSE
+from service.store.queue.metrics import quantile
 from service.store.states import CredentialKind, JobState
-from service.store.students import DEFAULT_COURSE
-from service.store.versions import freeze
 from service.web.access import CSRF_HEADER, SESSION_COOKIE, csrf_word
 from service.web.listening import listen
 from submissions.assignment.reader import find_assignment

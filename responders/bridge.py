@@ -22,13 +22,11 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, STAND_IN, Fault, Image, Line, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
-#: What a text is answered with where there is no responder.
-_PINGPONG = "pingpong "
 #: How often a program may act without waiting; its own process counts too, and can name the line. What that takes for
 #: one act of a motor may come in two.
 _FREE_ACTS = 200_100
@@ -73,9 +71,8 @@ class Bridge:
         self._said_until = 0
         self._arrived: list[str] = []
         self._free_acts = 0
-        self._values: dict[str, Any] = {}
-        self._encoded: dict[str, bytes] = {}
-        self._told_in = -1
+        self._entries: dict[str, bytes] = {}  # of each sensor that was read since, as it stands in the chain
+        self._told_until = 0  # the child has been told all readings up to then
         self._told_lines = self._told_images = 0
         self._output_left = spec.program.output_bytes
 
@@ -153,14 +150,20 @@ class Bridge:
                     self.notes.append(refusal("program", frame))
 
     def _act(self, acts: Sequence[packed.Act]) -> None:
-        for act in acts:
-            kind = type(act)
-            if kind is packed.Read:
-                self._read(*act)
-            elif kind is packed.Move:
-                self._move(*act)
+        drive = self.world.drive
+        for kind, number in acts:
+            if type(kind) is packed.Move:
+                self._free_act()
+                port, set_point, command = kind
+                wheel = drive.left if port == "outB" else drive.right
+                if set_point:
+                    setattr(wheel, set_point, number)
+                if command is not None:
+                    wheel.run(command, self.world.clock)
+            elif type(kind) is packed.Read:
+                self._read(kind.what, int(number) * _READ)
             else:
-                self._advance(*act)
+                self._advance(int(number))
                 self._reply(None)
 
     def _advance(self, units: int) -> None:
@@ -194,21 +197,22 @@ class Bridge:
         self._child.send({"t": self.now, "v": value}, self._arrived)
         self._arrived = []
 
-    def _read(self, what: str, times: int) -> None:
+    def _read(self, what: str, lasts: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
-        end = self.now + times * _READ
-        known = self._told_in == end // self._spec.tick
+        end = self.now + lasts
+        known = end < self._told_until
         if known:
             self._free_acts = 0
             self.now = end
         else:
-            self._advance(times * _READ)
-            self._values, self._told_in = self.world.readings(), self.world.clock
-            self._encoded = {}
-        encoded = self._encoded.get(what)
-        if encoded is None:
-            encoded = self._encoded[what] = repr(self._values[what]).encode()
-        self.chain.add(what, self.now, encoded)
+            self._advance(lasts)
+            self._values = self.world.readings()
+            self._entries = {}
+            self._told_until = (self.world.clock + 1) * self._spec.tick
+        entry = self._entries.get(what)
+        if entry is None:
+            entry = self._entries[what] = self.chain.timeless(what, worded(self._values[what]))
+        self.chain.add_bytes(entry % end)
         if not known:
             self._reply_readings()
 
@@ -239,14 +243,6 @@ class Bridge:
         }
         self.chain.add(port, self.now, repr(value).encode())
         self._reply(value)
-
-    def _move(self, port: str, set_point: str, value: float, command: str | None) -> None:
-        self._free_act()
-        wheel = self._wheel(port)
-        if set_point:
-            setattr(wheel, set_point, value)
-        if command is not None:
-            wheel.run(command, self.world.clock)
 
     def _until(self, frame: wire.Frame) -> None:
         """Look every 10 ms, first at once; a time-out is over when strictly exceeded."""
@@ -282,8 +278,8 @@ class Bridge:
             if self._responder is not None:
                 answer = self._responder.answer(sent.text, self.now, sent.message, self.collected())
             else:
-                self._meter.keep(len(_PINGPONG) + len(text))
-                answer = Answer(_PINGPONG + sent.text)
+                self._meter.keep(len(STAND_IN) + len(text))
+                answer = Answer(STAND_IN + sent.text)
             self.conversation.answer(sent, copy, answer)
         return sent.message
 
@@ -345,6 +341,15 @@ class Bridge:
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{where}, so the world cannot move"
         raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
+
+
+def worded(reading: float | list[float]) -> str:
+    """Its ``repr``. To word a number takes long, and over a grey floor a light sensor's three are alike."""
+    if isinstance(reading, list):
+        first = reading[0]
+        if first and reading.count(first) == len(reading):  # the two zeros are equal, and are worded otherwise
+            return f"[{', '.join([repr(first)] * len(reading))}]"
+    return repr(reading)
 
 
 def world_of(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:

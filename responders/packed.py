@@ -5,6 +5,8 @@ A packet stands between the lines of the wire and is checked as strictly; every 
 
 from __future__ import annotations
 
+import functools
+import itertools
 import struct
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,65 +19,81 @@ class Read(NamedTuple):
     """A sensor is read, which takes so many reading times."""
 
     what: str
-    times: int
 
 
 class Wait(NamedTuple):
     """So much time is to pass, thirds of a microsecond."""
 
-    units: int
-
 
 class Move(NamedTuple):
-    """A motor's set point changes (unless it is empty), then a command begins (unless it is None)."""
+    """A motor's set point becomes this (unless it is empty), then a command begins (unless it is None)."""
 
     port: str
     set_point: str
-    value: float
     command: str | None
 
 
-Act = Read | Wait | Move
+Kind = Read | Wait | Move
+Act = tuple[Kind, float]
 
 #: What a packet begins with, where a line begins with a brace.
 MARK = 0
 #: The mark, how many entries follow, and the packet's number among all frames.
 _HEADER = struct.Struct("<BxHxxxxQ")
-#: What it is, of which part of the robot, a motor's set point and command, and a value.
-_ACT = struct.Struct("<BBBBd")
+#: Of what kind it is, and a number.
+_ACT = struct.Struct("<Id")
 HEADER_BYTES = _HEADER.size
 _PORTS = ("outB", "outC")
 _SET_POINTS = ("", "speed_sp", "position_sp", "position", "time_sp")
 _COMMANDS = (None, "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct")
 _READ, _WAIT, _MOVE = range(3)
-_READS = {(_READ, part, 0, 0, float(times)): Read(what, times) for part, what in enumerate(SENSORS) for times in (1, 2)}
 
 
-def packet_bytes(header: bytes) -> int:
-    """How long the packet is that begins with ``header``. Raises WireError for one that is empty or too long."""
-    mark, count, _ = _HEADER.unpack_from(header)
+def _code(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
+    return int.from_bytes((what, part, set_point, command), "little")
+
+
+#: Every kind that there is by its code, with the least and the greatest of its numbers, and whether they are whole.
+_KINDS: dict[int, tuple[Kind, float, float, bool]] = {
+    _code(_WAIT): (Wait(), 0, MOST_UNITS, True),
+    **{_code(_READ, part): (Read(what), 1, 2, True) for part, what in enumerate(SENSORS)},
+    **{
+        _code(_MOVE, part, place, number): (Move(port, set_point, command), -LARGEST, LARGEST, False)
+        for (part, port), (place, set_point), (number, command) in itertools.product(
+            enumerate(_PORTS), enumerate(_SET_POINTS), enumerate(_COMMANDS)
+        )
+    },
+}
+
+
+def read_header(header: bytes) -> tuple[int, int]:
+    """How long the packet is that begins so, and its number. Raises WireError for one that is empty or too long."""
+    mark, count, number = _HEADER.unpack_from(header)
     size: int = HEADER_BYTES + count * _ACT.size
     if mark != MARK or count == 0 or size > MOST:
         raise WireError(f"a packet of {count} acts")
-    return size
+    return size, number
 
 
-def unpack(packet: bytes) -> tuple[int, list[Act]]:
-    """The number of a packet, and its acts in order. Raises WireError."""
-    acts = [_READS.get(each) or _act(*each) for each in _ACT.iter_unpack(packet[HEADER_BYTES:])]
-    return _HEADER.unpack_from(packet)[2], acts
-
-
-def _act(kind: int, part: int, set_point: int, command: int, value: float) -> Act:
-    if kind == _MOVE:
-        known = part < len(_PORTS) and set_point < len(_SET_POINTS) and command < len(_COMMANDS)
-        if known and -LARGEST <= value <= LARGEST:
-            return Move(_PORTS[part], _SET_POINTS[set_point], value, _COMMANDS[command])
-    elif kind == _WAIT and (part, set_point, command) == (0, 0, 0) and 0 <= value <= MOST_UNITS and value % 1 == 0:
-        return Wait(int(value))
-    raise WireError("an act that there is not")
+def acts_of(packet: bytes) -> list[Act]:
+    """What a whole packet asks for, in order. Raises WireError."""
+    acts = []
+    for code, number in _ACT.iter_unpack(packet[HEADER_BYTES:]):
+        known = _KINDS.get(code)
+        if known is None:
+            raise WireError("an act that there is not")
+        kind, least, most, whole = known
+        if not least <= number <= most or (whole and number % 1):
+            raise WireError("an act that there is not")
+        acts.append((kind, number))
+    return acts
 
 
 def pack_readings(units: int, values: Sequence[float], number: int) -> bytes:
     """Packet ``number`` for a child: the time, thirds of a microsecond, and what all sensors read."""
-    return _HEADER.pack(MARK, 1 + len(values), number) + struct.pack(f"<q{len(values)}d", units, *values)
+    return _readings(len(values)).pack(MARK, 1 + len(values), number, units, *values)
+
+
+@functools.cache
+def _readings(count: int) -> struct.Struct:
+    return struct.Struct(f"{_HEADER.format}q{count}d")

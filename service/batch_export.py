@@ -17,9 +17,10 @@ from service.report_files import report_pages
 from service.reports.formats import FORMATS, Format
 from service.reports.rows import TableRow
 from service.reports.written import file_stems
-from service.store import batches
+from service.store.batches import batches
 from service.store.engine import Store
 from sim.errors import UsageError
+from submissions.raw_files import shown
 
 _TYPES: Mapping[str, str] = MappingProxyType(
     {
@@ -52,12 +53,13 @@ def export_file(store: Store, batch_id: str, form: str, *, published: bool, give
         raise UsageError(f"expected a format of {', '.join(others)}, or a worksheet that is to be filled in")
     with store.reading() as session:
         lines = batches.job_lines(session, batch_id)
-        refusals = batches.batch(session, batch_id).refusals
+        batch = batches.batch(session, batch_id)
+    refusals = batch.refusals
     suffix = chosen.suffix
     if chosen.packed is not None:
         sink = io.BytesIO()
-        shown = [line for line in lines if not why_not_shown(line, published=published)]
-        chosen.packed(report_pages(store, shown, refusals), sink)
+        released = [line for line in lines if not why_not_shown(line, published=published)]
+        chosen.packed(report_pages(store, released, refusals), sink)
         data = sink.getvalue()
     else:
         rows = rows_of(store, lines, refusals, published=published)
@@ -67,7 +69,7 @@ def export_file(store: Store, batch_id: str, form: str, *, published: bool, give
             data = chosen.table(rows).encode()
         else:
             suffix, data = ".zip", _documents(chosen, rows)
-    return ExportedFile(f"{batch_id}-{form}{suffix}", _TYPES[suffix], data)
+    return ExportedFile(f"{shown(batch.name) or batch_id}-{form}{suffix}", _TYPES[suffix], data)
 
 
 def _documents(chosen: Format, rows: Sequence[TableRow[Grade]]) -> bytes:

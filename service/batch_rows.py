@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 from service.grading.grade import Grade
 from service.reports.rows import TableRow, missing_words
-from service.store import results
-from service.store.batches import JobLine
+from service.store.batches.batches import JobLine
 from service.store.engine import Store
+from service.store.grades import results
 from service.store.states import JobState
 from submissions.people import Refusal, Student
 

@@ -22,14 +22,14 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
 from service.home import open_home
+from service.queue.alive import worker_lives
 from service.queue.broker import broker_answers, broker_client, broker_version, socket_path
-from service.queue.worker import worker_lives
 from service.settings import Settings
-from service.store import workers
 from service.store.engine import Store, now, open_engine
 from service.store.installation import secret_of
-from service.store.metrics import collect
 from service.store.models import Job
+from service.store.queue import workers
+from service.store.queue.metrics import collect
 from service.store.revision import current_revision, newest_revision
 from service.store.states import JobState
 from sim.errors import RobomarkError
@@ -39,6 +39,7 @@ _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
 _APART_SECONDS = 5.0
 _LONG_SECONDS = 60.0
+_STUCK_SECONDS = 180.0
 _READY_SECONDS = 2.0
 
 
@@ -111,7 +112,7 @@ def _sandbox(_settings: Settings) -> tuple[bool, str]:
 
 def _sandbox_of_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
     standing = sorted({worker.sandbox for worker in _lately(store)})
-    return bool(standing), "; ".join(standing) or "no worker says that they stand"
+    return bool(standing), "; ".join(standing) or "no worker has said which layers it has"
 
 
 def _control_groups(settings: Settings) -> tuple[bool, str]:
@@ -269,17 +270,22 @@ def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
 
 def _queue(settings: Settings) -> tuple[bool, str]:
     with _opened(settings) as store:
-        if store is None:
-            return True, "empty"
-        with store.reading() as session:
-            metrics = collect(session)
+        return (True, "empty") if store is None else _queue_of_service(settings, store)
+
+
+def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
+    with store.reading() as session:
+        metrics = collect(session)
     waiting = sum(metrics.claimable.values())
     oldest = max(metrics.oldest_seconds.values(), default=0.0)
-    dead = sum(count for (_, state), count in metrics.jobs.items() if state is JobState.DEAD)
+    by_state = {each: sum(count for (_, state), count in metrics.jobs.items() if state is each) for each in JobState}
+    dead = by_state[JobState.DEAD]
     told = f"{waiting} waiting" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
     told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
     if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was heard of lately"
+    if waiting and oldest > _STUCK_SECONDS and not by_state[JobState.RUNNING]:
+        return False, f"{told}; workers live and none begins it: their logs may say why, and restarting them may help"
     return True, told
 
 
@@ -310,6 +316,6 @@ CHECKS = (
     Check("broker", _broker, _broker_of_service),
     Check("clock", _clock),
     Check("workers", _workers, _workers_of_service),
-    Check("queue", _queue),
+    Check("queue", _queue, _queue_of_service),
     Check("known answer", _known_answer),
 )

@@ -10,14 +10,16 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 
-from sqlalchemy import Select, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy.orm import Session, aliased
 
 from service.reports.view import student_view
-from service.store import open_assignments, policies, results
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import OverLimit, PolicyLimits
 from service.store.engine import now
+from service.store.grades import appeals, results
+from service.store.grades.appeals import AppealLine
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
-from service.store.policies import PolicyLimits
 from service.store.states import UNFINISHED, BatchState, JobState, Standing
 
 #: Of one student and one assignment; a student who submits more often sees the newest.
@@ -37,11 +39,13 @@ class OwnSubmission:
     submitted_at: datetime
     days_late: int
     staff_only: str  # the limit that it is over
+    same_as: int | None  # the student's first attempt with these files, which is the same attempt
     state: JobState
     held_back: bool  # its batch is paused or called off
     progress: float
     suspect: bool
     superseded: bool
+    published: bool  # whether all of the grade is released
     marks: Decimal | None = None
     max_marks: Decimal | None = None
 
@@ -54,6 +58,11 @@ class OwnSubmission:
     def shown(self) -> bool:
         """Whether its student may see its grade."""
         return self.state is JobState.DONE and not self.suspect and not self.staff_only
+
+    @property
+    def over(self) -> OverLimit | None:
+        """Which limit it is over."""
+        return policies.limit_of(self.staff_only)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +84,28 @@ class Allowance:
         """Whole days until the due date, and what is left of the last one."""
         return 0 if self.left is None else max(0, math.ceil(self.left / timedelta(days=1)))
 
+    @property
+    def hours_left(self) -> int | None:
+        """Whole hours until the due date; None where there is none, or it is over."""
+        return None if self.left is None or self.left < timedelta(0) else self.left // timedelta(hours=1)
+
+    @property
+    def date_over(self) -> bool:
+        """Whether a submission would be too late to count."""
+        return self.late_left is not None and self.late_left < timedelta(0)
+
+    @property
+    def used_up(self) -> bool:
+        """Whether nothing that is new counts any more."""
+        return self.attempts_left == 0 or self.date_over
+
+    def hours_late(self, found: OwnSubmission) -> int | None:
+        """Whole hours that it is late; None where it is in time, by a day or more, or its due date has moved since."""
+        if found.days_late != 1 or self.limits.due_at is None or found.submitted_at <= self.limits.due_at:
+            return None
+        late = found.submitted_at - self.limits.due_at
+        return late // timedelta(hours=1) if late < timedelta(days=1) else None
+
 
 @dataclass(frozen=True, slots=True)
 class OwnAssignment:
@@ -85,39 +116,56 @@ class OwnAssignment:
     open: bool
     allowance: Allowance
     newest: OwnSubmission | None
+    counting: OwnSubmission | None  # the newest that is graded and over no limit
+    appeal: AppealLine | None  # what was asked last
 
 
 def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
-    """What is open to a student or was submitted by them: first what is open and due soonest."""
-    newest: dict[str, OwnSubmission] = {}
-    # Only the newest of each assignment is looked at closely.
-    latest = (
-        select(SubmissionRow.assignment, func.max(SubmissionRow.attempt).label("attempt"))
-        .where(SubmissionRow.enrolment_id == enrolment_id)
-        .group_by(SubmissionRow.assignment)
-        .subquery()
-    )
-    query = _submissions(enrolment_id).join(
-        latest, (latest.c.assignment == SubmissionRow.assignment) & (latest.c.attempt == SubmissionRow.attempt)
-    )
-    for row in session.execute(query):
-        found = _submission(session, *row)
-        newest[found.assignment] = found
+    """What is open to a student or was submitted by them: first what is open, of that what is due soonest."""
+    newest = _newest_of_each(session, enrolment_id)
+    counting = _newest_of_each(session, enrolment_id, *_COUNTING)
+    asked = appeals.newest_of(session, enrolment_id)
     prepared = open_assignments.of_course(session, course_id)
     titles = {each.assignment: each.title for each in prepared if each.open}
     is_open = frozenset(titles)
     titles = {name: each.title for name, each in newest.items()} | titles
     lines = [
-        OwnAssignment(name, title, name in is_open, allowance(session, enrolment_id, name), newest.get(name))
+        OwnAssignment(
+            name,
+            title,
+            name in is_open,
+            allowance(session, enrolment_id, name),
+            newest.get(name),
+            counting.get(name),
+            asked.get(name),
+        )
         for name, title in titles.items()
     ]
     return sorted(lines, key=_by_urgency)
+
+
+def counting_submission(session: Session, enrolment_id: int, assignment: str) -> OwnSubmission | None:
+    """The one of a student's submissions whose marks count: the newest that is graded and over no limit."""
+    query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment, *_COUNTING)
+    row = session.execute(query.order_by(SubmissionRow.attempt.desc()).limit(1)).one_or_none()
+    return None if row is None else _submission(session, *row)
 
 
 def own_submissions(session: Session, enrolment_id: int, assignment: str) -> list[OwnSubmission]:
     """A student's submissions to an assignment, the newest first."""
     query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment)
     rows = session.execute(query.order_by(SubmissionRow.attempt.desc()).limit(MOST_SHOWN))
+    return [_submission(session, *row) for row in rows]
+
+
+def own_submissions_before(
+    session: Session, enrolment_id: int, submission_id: int | None, limit: int
+) -> list[OwnSubmission]:
+    """Some of a student's submissions, to whatever assignment, the newest first: those before this one."""
+    query = _submissions(enrolment_id)
+    if submission_id is not None:
+        query = query.where(SubmissionRow.id < submission_id)
+    rows = session.execute(query.order_by(SubmissionRow.id.desc()).limit(limit))
     return [_submission(session, *row) for row in rows]
 
 
@@ -138,9 +186,41 @@ def allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance
     )
 
 
-def _submissions(enrolment_id: int) -> Select[SubmissionRow, Job, str, BatchState | None]:
+#: What holds of a submission that can count; the newest of them does.
+_COUNTING = (SubmissionRow.staff_only.is_(None), Job.state == JobState.DONE, Job.suspect.is_(None))
+_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None]
+
+
+def _newest_of_each(session: Session, enrolment_id: int, *which: ColumnElement[bool]) -> dict[str, OwnSubmission]:
+    """By assignment; only the newest are looked at closely."""
+    latest = (
+        select(SubmissionRow.assignment, func.max(SubmissionRow.attempt).label("attempt"))
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS, *which)
+        .group_by(SubmissionRow.assignment)
+        .subquery()
+    )
+    query = _submissions(enrolment_id).join(
+        latest, (latest.c.assignment == SubmissionRow.assignment) & (latest.c.attempt == SubmissionRow.attempt)
+    )
+    found = (_submission(session, *row) for row in session.execute(query))
+    return {each.assignment: each for each in found}
+
+
+def _submissions(enrolment_id: int) -> _Submissions:
+    earlier = aliased(SubmissionRow)
+    same_as = (
+        select(func.min(earlier.attempt))
+        .where(
+            earlier.enrolment_id == SubmissionRow.enrolment_id,
+            earlier.assignment == SubmissionRow.assignment,
+            earlier.sha256 == SubmissionRow.sha256,
+            earlier.attempt < SubmissionRow.attempt,
+        )
+        .scalar_subquery()
+    )
     return (
-        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state)
+        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state, same_as)
         .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
@@ -148,7 +228,9 @@ def _submissions(enrolment_id: int) -> Select[SubmissionRow, Job, str, BatchStat
     )
 
 
-def _submission(session: Session, row: SubmissionRow, job: Job, title: str, batch: BatchState | None) -> OwnSubmission:
+def _submission(
+    session: Session, row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None
+) -> OwnSubmission:
     found = OwnSubmission(
         id=row.id,
         job_id=job.id,
@@ -159,11 +241,13 @@ def _submission(session: Session, row: SubmissionRow, job: Job, title: str, batc
         submitted_at=row.submitted_at or row.created_at,
         days_late=row.days_late,
         staff_only=row.staff_only or "",
+        same_as=same_as,
         state=job.state,
         held_back=batch not in (None, BatchState.OPEN),
         progress=job.progress,
         suspect=job.suspect is not None,
         superseded=(job.error or "").startswith("superseded by "),
+        published=job.published_at is not None,
     )
     if not found.shown:
         return found
@@ -171,6 +255,6 @@ def _submission(session: Session, row: SubmissionRow, job: Job, title: str, batc
     return replace(found, marks=shown.marks, max_marks=shown.max_marks)
 
 
-def _by_urgency(line: OwnAssignment) -> tuple[bool, bool, timedelta, str]:
-    left = line.allowance.left
-    return not line.open, left is None or left < timedelta(0), left or timedelta(0), line.title
+def _by_urgency(line: OwnAssignment) -> tuple[bool, bool, float, str]:
+    due_at = line.allowance.limits.due_at
+    return not line.open, line.allowance.date_over, math.inf if due_at is None else due_at.timestamp(), line.title

@@ -14,7 +14,7 @@ from submissions.submission import Submission
 
 def draw(grade: Grade, assignment: Assignment, submission: Submission) -> dict[str, bytes]:
     """Every plot of the grade, name -> PNG; floors of the assignment's own, and a notebook's diagrams, as such."""
-    # A worker that only grades need not load the drawing library.
+    # A worker need not load it before its first grade.
     from service.reports.plots.drawn import draw_all
 
     return draw_all(grade, own_floors(assignment), diagrams_in(submission.notebook).cells)

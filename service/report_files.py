@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 
 from service.batch_rows import refused_row, row_of, why_not_shown
 from service.grading.grade import Grade
+from service.language import ENGLISH, Language
 from service.plotting import draw, own_floors
 from service.reports.html import BatchRow, ReportParts, batch_index, refusal_page, report, report_parts
 from service.reports.replay.document import Pixels, replay_of_grade
@@ -28,9 +29,11 @@ from service.reports.view import (
     worst_trial,
 )
 from service.reports.written import file_stems, refused_stems, write_film, write_page, write_replay
-from service.store import intake, plots, policies, rankings, results
-from service.store.batches import JobLine
+from service.store.batches import intake, rankings
+from service.store.batches.batches import JobLine
+from service.store.courses import policies
 from service.store.engine import Store
+from service.store.grades import plots, results
 from service.store.states import JobState, PlotState, Standing
 from sim.errors import UsageError
 from sim.floors import names
@@ -51,17 +54,30 @@ class Written:
 
 
 def write_report(
-    store: Store, line: JobLine, grade: Grade, folder: Path, stem: str, over: JobLine | None = None
+    store: Store,
+    line: JobLine,
+    grade: Grade,
+    folder: Path,
+    stem: str,
+    over: JobLine | None = None,
+    language: Language = ENGLISH,
 ) -> Written:
     """The page of one graded job, called by ``stem``; its replay has the trials of ``over`` over its own.
 
     Raises UsageError when the folder cannot be written to, and where the reader may not see them.
     """
-    html, drawn = _page(store, line, grade, over)
+    html, drawn = _page(store, line, grade, over, language)
     return Written(write_page(folder, f"{stem}.html", html), drawn)
 
 
-def write_grade_replay(store: Store, line: JobLine, grade: Grade, path: Path, over: JobLine | None = None) -> None:
+def write_grade_replay(
+    store: Store,
+    line: JobLine,
+    grade: Grade,
+    path: Path,
+    over: JobLine | None = None,
+    language: Language = ENGLISH,
+) -> None:
     """All trials of one graded job that its report may show, with those of ``over`` over them.
 
     Raises UsageError when the file cannot be written, and where the reader may not see them.
@@ -69,9 +85,9 @@ def write_grade_replay(store: Store, line: JobLine, grade: Grade, path: Path, ov
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         floors = own_floors(intake.load_assignment(session, line.id))
-        view = _view(session, line, grade)
+        view = _view(session, line, grade, language)
         others = _others(session, line, view, over)
-    write_replay(path, replay_of_grade(view, submission, floors, others=others))
+    write_replay(path, replay_of_grade(view, submission, floors, others=others), language)
 
 
 def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, number: int | None) -> None:
@@ -164,11 +180,13 @@ def _kept(store: Store, line: JobLine, view: View) -> tuple[Mapping[str, bytes],
     return drawn, submission, floors
 
 
-def _page(store: Store, line: JobLine, grade: Grade, over: JobLine | None = None) -> tuple[str, Mapping[str, bytes]]:
+def _page(
+    store: Store, line: JobLine, grade: Grade, over: JobLine | None = None, language: Language = ENGLISH
+) -> tuple[str, Mapping[str, bytes]]:
     """The page of one graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
-        view = _view(session, line, grade)
+        view = _view(session, line, grade, language)
         others = _others(session, line, view, over)
         drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
         built_in = {trial.recording.background for trial in grade.trials} <= set(names())
@@ -180,9 +198,11 @@ def _page(store: Store, line: JobLine, grade: Grade, over: JobLine | None = None
     return report(view, found, submission, floors, others), found
 
 
-def _view(session: Session, line: JobLine, grade: Grade) -> View:
+def _view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:
     """What the reader of the job's report may see."""
-    return student_view(grade, policies.released(session, line.id)) if line.staff_only is None else staff_view(grade)
+    if line.staff_only is not None:
+        return staff_view(grade, language)
+    return student_view(grade, policies.released(session, line.id), language)
 
 
 def _others(session: Session, line: JobLine, view: View, over: JobLine | None) -> OtherTrials:

@@ -18,8 +18,10 @@ from sqlalchemy.orm import Session
 from service.report_files import report_alone
 from service.reports.formats.json_output import json_document
 from service.reports.view import student_view
-from service.store import batches, policies, results
+from service.store.batches import batches
+from service.store.courses import policies
 from service.store.engine import Store
+from service.store.grades import results
 from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.states import JobState, Standing
 from service.store.web_tables import Appeal, Credential

@@ -82,9 +82,18 @@ def tryout_assignment(assignment: Assignment) -> Assignment | None:
 
 def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, observe: Observe) -> TryoutResult:
     """Run a submission in the trial of a ``tryout_assignment``; raises as ``grade`` does."""
-    run = replace(grade(submission, once, secret=PUBLIC, runner=runner, observe=observe), criteria=(), hints=())
+    graded = grade(submission, once, secret=PUBLIC, runner=runner, observe=observe)
+    run = replace(graded, criteria=(), hints=(), missing="", notes=_notes(graded))
     replay = replay_of_grade(student_view(run), submission, own_floors(once)) if run.trials else None
     return TryoutResult(run.verdict, _words(run, submission), packed(replay) if replay else None)
+
+
+def _notes(graded: Grade) -> tuple[str, ...]:
+    """What a part that is not there means where nothing is marked."""
+    if not graded.missing:
+        return graded.notes
+    others = tuple(note for note in graded.notes if not note.startswith(f"There is no {graded.missing}"))
+    return (*others, f"There is no {graded.missing}: only the part that is there was run.")
 
 
 def _words(run: Grade, submission: Submission) -> dict[str, Any]:

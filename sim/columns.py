@@ -6,10 +6,11 @@ The columns themselves stand in ``recording.py``; all that writes, sends, keeps 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +51,14 @@ class Column:
     @property
     def dtype(self) -> type[np.generic]:
         """The type of its array: int64 for whole numbers, else float64."""
+        import numpy as np
+
         return np.int64 if self.whole else np.float64
 
     def unknown(self, rows: int) -> NDArray[Any]:
         """What stands in a recording that was made without this column."""
+        import numpy as np
+
         return np.full((rows, self.width) if self.width > 1 else rows, 0 if self.whole else np.nan, self.dtype)
 
 

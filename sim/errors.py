@@ -7,9 +7,18 @@ RobomarkError
 └── Cancelled           somebody asked the grading to stop
 """
 
+from sim.sentences import Sentence
+
 
 class RobomarkError(Exception):
-    """Base of every error Robomark raises on purpose; ``str(error)`` is the sentence for the user."""
+    """Base of every error Robomark raises on purpose; ``str(error)`` is the sentence for the user.
+
+    With values it is the template of one, as ``Sentence`` has it.
+    """
+
+    def __init__(self, sentence: str | Sentence = "", /, **values: object) -> None:
+        self.said = Sentence(sentence, values) if isinstance(sentence, str) else sentence
+        super().__init__(str(self.said))
 
 
 class UsageError(RobomarkError):

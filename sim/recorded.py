@@ -5,9 +5,10 @@ Whatever is drawn or judged of it is the service's.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
-from sim.recording import SECOND, Fault, Pose, Recording, Verdict
+from sim.recording import SECOND, STAND_IN, Fault, Line, Pose, Recording, Verdict
 from sim.robot import ROBOTS, Robot
 
 if TYPE_CHECKING:
@@ -38,6 +39,27 @@ def stood_still(recording: Recording) -> bool:
         for column, first in ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
     )
     return still and (recording.partner is None or stood_still(recording.partner))
+
+
+def printed_alone(recording: Recording) -> list[Line]:
+    """What one robot printed, without what ``say`` printed because it was said."""
+    said = Counter((line.t, line.text) for line in recording.spoken)
+    alone = []
+    for line in recording.printed:
+        if said[line.t, line.text]:
+            said[line.t, line.text] -= 1
+        else:
+            alone.append(line)
+    return alone
+
+
+def without_responder(recording: Recording) -> bool:
+    """Whether the simulator stood in for a responder, by what every answer is: the text itself, after one word."""
+    messages = recording.messages
+    answers = [each for each in messages if each.sender == "responder"]
+    return bool(answers) and all(
+        each.reply_to is not None and each.text == STAND_IN + messages[each.reply_to].received for each in answers
+    )
 
 
 def faults_of(recording: Recording) -> tuple[Fault, ...]:

@@ -1,6 +1,7 @@
 """What happened in one trial, tick by tick and word by word, and how it ended.
 
-A recording is plain data: it knows neither students nor marks, and nothing in it is read back into a simulation.
+A recording is plain data: it knows neither students nor marks, and nothing in it is read back into a simulation. Who
+reads no ticks need not wait for numpy.
 """
 
 from __future__ import annotations
@@ -9,15 +10,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from sim.columns import Panel, column, columns_of
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Floats: TypeAlias = "NDArray[np.float64]"
+Integers: TypeAlias = "NDArray[np.int64]"
 
 #: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
 SECOND = 3_000_000
@@ -124,6 +126,8 @@ class Ticks:
     @property
     def t(self) -> Floats:
         """Seconds, shape (n,)."""
+        import numpy as np
+
         return np.arange(1, len(self.x) + 1) * self.length / SECOND
 
     @property
@@ -156,6 +160,8 @@ class Line:
     text: str
 
 
+#: Where there is no responder the simulator answers each text with itself, after this.
+STAND_IN = "pingpong "
 #: Why the channel lost a text; empty where it did not.
 LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
 

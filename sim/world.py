@@ -26,9 +26,12 @@ from sim.robot import Robot
 from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
 
-_chained = [each for each in COLUMNS if each.in_chain]
-_CHAINED = sum(each.width for each in _chained)
-_ROW = struct.Struct("<q" + "".join(f"{each.width}{'q' if each.whole else 'd'}" for each in _chained))
+#: A row: the time and all columns, of which those of the chain come first.
+_ROW = struct.Struct("<q" + "".join(f"{each.width}{'q' if each.whole else 'd'}" for each in COLUMNS))
+_TABLE = np.dtype(
+    [("time", "<i8"), *((each.name, each.dtype, (each.width,) if each.width > 1 else ()) for each in COLUMNS)]
+)
+_CHAINED = 8 + 8 * sum(each.width for each in COLUMNS if each.in_chain)  # bytes
 _sources = ", ".join(f"*world.{each.source}" if each.width > 1 else f"world.{each.source}" for each in COLUMNS)
 # Written out once, as it is called at every tick: to follow the table there would take a twentieth of the whole tick.
 _row_of: Callable[[World], tuple[float, ...]] = eval(f"lambda world: ({_sources},)")
@@ -53,12 +56,17 @@ class Chain:
 
     def __init__(self) -> None:
         self._digest = hashlib.sha256()
-        #: A tick's row; called for each tick.
-        self.add_row = self._digest.update
+        #: Something as it is: called for each tick with its row, and for each reading.
+        self.add_bytes = self._digest.update
 
     def add(self, kind: str, time: int, data: bytes) -> None:
         """Something that is not a tick: its kind, when (thirds of a microsecond), and its bytes."""
-        self._digest.update(f"{kind}:{time}:{len(data)}:".encode() + data)
+        self.add_bytes(f"{kind}:{time}:{len(data)}:".encode() + data)
+
+    @staticmethod
+    def timeless(kind: str, numbers: str) -> bytes:
+        """What ``add`` would add of numbers, once ``%`` has put the time into it: for what is added time and again."""
+        return f"{kind}:%d:{len(numbers)}:{numbers}".encode()
 
     def hexdigest(self) -> str:
         """The hash of all that was added so far, 64 hexadecimal digits."""
@@ -109,7 +117,7 @@ class World:
         self.touches: list[Touch] = []
         # What the start pose touches already is no touch: several of the course's own overlap a wall.
         self._touching = arena.touching(robot, pose.x, pose.y, self.drive.heading)
-        self._rows: list[tuple[float, ...]] = []
+        self._rows: list[bytes] = []
         self._sense(moved=True, listen=True)
 
     @property
@@ -132,9 +140,9 @@ class World:
     def sense(self, moved: bool) -> None:
         """The second half, once all that shares the floor has moved: the sensors look, and the row is written."""
         self._sense(moved, listen=self.clock % 3 == 0)
-        row = _row_of(self)
+        row = _ROW.pack(self.clock * self._tick, *_row_of(self))
         self._rows.append(row)
-        self._chain.add_row(_ROW.pack(self.clock * self._tick, *row[:_CHAINED]))
+        self._chain.add_bytes(row[:_CHAINED])
 
     def readings(self) -> dict[str, Any]:
         """What each sensor gives a program, as of the last tick."""
@@ -143,12 +151,12 @@ class World:
     @property
     def left_means(self) -> list[float]:
         """Mean R, G, B of the left light sensor."""
-        return [total / self._lights[0].pixels for total in self.left_sums]
+        return _means(self.left_sums, self._lights[0].pixels)
 
     @property
     def right_means(self) -> list[float]:
         """Mean R, G, B of the right light sensor."""
-        return [total / self._lights[1].pixels for total in self.right_sums]
+        return _means(self.right_sums, self._lights[1].pixels)
 
     @property
     def gyro_angle_and_rate(self) -> list[float]:
@@ -169,13 +177,9 @@ class World:
 
     def ticks(self) -> Ticks:
         """All rows so far."""
-        table = np.array(self._rows, dtype=np.float64).reshape(-1, sum(each.width for each in COLUMNS))
-        parts = np.split(table, np.cumsum([each.width for each in COLUMNS])[:-1], axis=1)
+        table = np.frombuffer(b"".join(self._rows), _TABLE)
         return Ticks(
-            **{
-                each.name: (part if each.width > 1 else part[:, 0]).astype(each.dtype)
-                for each, part in zip(COLUMNS, parts, strict=True)
-            },
+            **{each.name: table[each.name].astype(each.dtype) for each in COLUMNS},
             left_pixels=self._lights[0].pixels,
             right_pixels=self._lights[1].pixels,
             length=self._tick,
@@ -203,3 +207,8 @@ class World:
             if what not in self._touching:
                 self.touches.append(Touch(self.clock * self._tick / SECOND, what, self.pose))
         self._touching = touching
+
+
+def _means(sums: tuple[int, int, int], pixels: int) -> list[float]:
+    red, green, blue = sums
+    return [red / pixels, green / pixels, blue / pixels]

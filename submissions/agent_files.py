@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from responders.code import Code
 from sim.errors import UsageError
+from sim.sentences import listed
 from submissions.raw_files import shown
 from submissions.source_text import decode_source
 from submissions.submission import Submission
@@ -43,7 +44,9 @@ def with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
     there = {_agent_of(name, asked.agents) for name in files}
     missing = [f"{name}.py" for name, who in asked.agents.items() if who == "student" and name not in there]
     if missing:
-        raise UsageError(f"{where}: has no {' and '.join(missing)}, expected a file for each agent.")
+        raise UsageError(
+            "%(where)s: has no %(missing)s, expected a file for each agent.", where=where, missing=listed(missing)
+        )
     return dataclasses.replace(
         submission,
         program=program,

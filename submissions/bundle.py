@@ -10,13 +10,14 @@ import dataclasses
 import difflib
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from responders.code import Code
 from sim.errors import UsageError
+from sim.sentences import Sentence, listed
 from submissions.agent_files import with_agents
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
 _NAMES: Mapping[str, Part] = MappingProxyType(
     {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
 )
-_WORDS: Mapping[Part, str] = MappingProxyType({"program": "a robot program", "responder": "a responder"})
+_WORDS: Mapping[Part, Sentence] = MappingProxyType(
+    {"program": Sentence("a robot program"), "responder": Sentence("a responder")}
+)
 _NOTEBOOK = ".ipynb"
 _LOOKS_LIKE_RESPONDER = re.compile(
     r"^def[ \t]+(?:responder|\w+_responder)[ \t]*\("
@@ -58,9 +61,9 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
     where = shown(path.name)
     if path.is_symlink():
-        raise UsageError(f"{where}: is a link, expected the file or folder itself.")
+        raise UsageError("%(where)s: is a link, expected the file or folder itself.", where=where)
     if not path.exists():
-        raise UsageError(f"{where}: does not exist, expected a .py file, a notebook, a folder or a .zip.")
+        raise UsageError("%(where)s: does not exist, expected a .py file, a notebook, a folder or a .zip.", where=where)
     suffix = path.suffix.lower()
     if path.is_dir():
         raw = read_folder(path)
@@ -70,7 +73,8 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
         raw = RawFiles({os.fsencode(path.name).decode("utf-8", "replace"): read_single_file(path)})
     else:
         raise UsageError(
-            f"{where}: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip."
+            "%(where)s: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip.",
+            where=where,
         )
     return submission_of(raw, where, student or named_by(path), path.parent.name, asked)
 
@@ -116,14 +120,19 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
     missing = [part for part in wanted if parts.get(part) is None]
     files = [PART_FILES[part] for part in missing]
-    needed = [f"{PART_FILES[part]} ({_WORDS[part]})" for part in wanted]
+    needed = [_needed(PART_FILES[part], _WORDS[part]) for part in wanted]
     if asked.second_program == "student":
-        needed.append(f"{SECOND_PROGRAM} (the second robot's program)")
+        needed.append(_needed(SECOND_PROGRAM, Sentence("the second robot's program")))
         files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
     # Two robots are not marked by halves.
     if files and (len(missing) == len(wanted) or asked.second_program != "none"):
-        names, expected = " and ".join(files), " and ".join(needed)
-        raise UsageError(f"{where}: has no {names}, expected {expected}{_renamed(missing, submission.files)}.")
+        raise UsageError(
+            "%(where)s: has no %(names)s, expected %(expected)s%(renamed)s.",
+            where=where,
+            names=listed(files),
+            expected=listed(needed),
+            renamed=_renamed(missing, submission.files),
+        )
     for part in missing:
         others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
         beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
@@ -132,9 +141,26 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
         if source is not None and part not in wanted:
             notes.append(f"{shown(source.name)} was left out: {_WORDS[part]} is not asked for.")
             parts[part] = None
-    return dataclasses.replace(
-        submission, program=parts.get("program"), responder=parts.get("responder"), notes=tuple(notes)
-    )
+    fitted = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
+    notes += [f"{name} is empty." for name in empty_parts(fitted)]
+    return dataclasses.replace(fitted, notes=tuple(notes))
+
+
+def empty_parts(submission: Submission) -> Iterator[str]:
+    """The files of its parts that have nothing in them but blanks."""
+    for code in (submission.program, submission.responder):
+        if code is not None and not code.text.strip():
+            yield shown(code.name)
+
+
+def missing_part(submission: Submission, asked: Parts) -> Part | None:
+    """The one part of two that was not submitted; with neither there is nothing to grade."""
+    if (asked.program, asked.responder) == ("student", "student"):
+        if submission.program is None and submission.responder is not None:
+            return "program"
+        if submission.responder is None and submission.program is not None:
+            return "responder"
+    return None
 
 
 def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
@@ -173,7 +199,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
         del files[compiled]
         notes.append(f"{shown(compiled)} was left out: it is compiled code; submit the Python that it was made of.")
     if not files:
-        raise UsageError(f"{where}: has no files in it, expected robot.py and responder.py.")
+        raise UsageError("%(where)s: has no files in it, expected robot.py and responder.py.", where=where)
     notebook = _find_notebook(files, where, notes)
     parts = _find_parts(files, where, notes, alone=notebook is None)
     sources: dict[Part, Code] = {}
@@ -214,18 +240,24 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
     try:
         if len(names) > 1:
             found = ", ".join(map(shown, names[:5]))
-            raise UsageError(f"{where}: has {len(names)} notebooks in it ({found}), expected one.")
+            raise UsageError(
+                "%(where)s: has %(count)s notebooks in it (%(found)s), expected one.",
+                where=where,
+                count=len(names),
+                found=found,
+            )
         if names:
             read = read_notebook(files[names[0]], shown(names[0]))
             del files[names[0]]
             notes.extend(read.notes)
             return read.notebook
     except UsageError as error:
-        sentence = str(error) if str(error).startswith(where) else f"{where}: {error}"
+        named = str(error).startswith(where)
+        sentence = error.said if named else Sentence("%(where)s: %(why)s", {"where": where, "why": error.said})
         if not parts:
             raise UsageError(sentence) from None
         # What the assignment asks for may be in the .py file beside it.
-        notes.append(sentence)
+        notes.append(str(sentence))
         for name in names:
             del files[name]
         return None
@@ -248,7 +280,13 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
         if part is None:
             continue
         if part in parts:
-            raise UsageError(f"{where}: has both {parts[part]} and {name}, expected one {PART_FILES[part]}.")
+            raise UsageError(
+                "%(where)s: has both %(first)s and %(name)s, expected one %(part)s.",
+                where=where,
+                first=parts[part],
+                name=name,
+                part=PART_FILES[part],
+            )
         parts[part] = name
     if parts or not alone:
         return parts
@@ -263,7 +301,12 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
         return found
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
     renamed = _renamed(PART_FILES, files)
-    raise UsageError(f"{where}: has no robot.py or responder.py (found {found_names}), expected one or both{renamed}.")
+    raise UsageError(
+        "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",
+        where=where,
+        found=found_names,
+        renamed=renamed,
+    )
 
 
 def meant_as(part: Part, names: Iterable[str]) -> str:
@@ -275,11 +318,19 @@ def meant_as(part: Part, names: Iterable[str]) -> str:
     return next((name for name, stem in stems.items() if word in stem or stem in near), "")
 
 
-def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str:
+def _needed(file: str, what: Sentence) -> Sentence:
+    return Sentence("%(file)s (%(what)s)", {"file": file, "what": what})
+
+
+def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
     """What is to be called otherwise, of the files that are there."""
     found = {part: meant_as(part, files) for part in missing}
-    renamed = [f"{shown(name)} to {PART_FILES[part]}" for part, name in found.items() if name]
-    return f"; rename {' and '.join(renamed)}" if renamed else ""
+    renamed = [
+        Sentence("%(name)s to %(part)s", {"name": shown(name), "part": PART_FILES[part]})
+        for part, name in found.items()
+        if name
+    ]
+    return Sentence("; rename %(files)s", {"files": listed(renamed)}) if renamed else ""
 
 
 def _looks_like(data: bytes, name: str) -> Part:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
+from sim.sentences import Sentence
 from submissions.magics import is_program_magic, magic_place, parse_flags, parse_magic
 from submissions.raw_files import shown
 from submissions.submission import Cell, Notebook
@@ -54,14 +55,18 @@ def marked_site(notebook: Notebook, which: str) -> Site:
     found = sites(notebook)
     if not found:
         raise UsageError(
-            f"{notebook.name}: has no robot program, expected a cell that begins with %%sim_magic_preloaded"
-            f"{_near_miss(notebook)}."
+            "%(name)s: has no robot program, expected a cell that begins with %%%%sim_magic_preloaded%(near)s.",
+            name=notebook.name,
+            near=_near_miss(notebook),
         )
     if which.isdecimal():
         number, cells = int(which), programs(notebook)
         if number > len(cells):
             raise UsageError(
-                f"{notebook.name}: has {_count(len(cells))}, expected at least {number}: number {number} is marked."
+                "%(name)s: has %(count)s, expected at least %(number)s: number %(number)s is marked.",
+                name=notebook.name,
+                count=_count(len(cells)),
+                number=number,
             )
         return cells[number - 1]
     if which == LAST:
@@ -110,30 +115,38 @@ def _tagged(notebook: Notebook, tag: str) -> Site:
     tagged = [cell for cell in notebook.cells if tag in cell.tags]
     if not tagged:
         raise UsageError(
-            f'{notebook.name}: has no cell with the tag "{tag}", expected it on the cell with the robot program; '
-            "it is lost when a notebook is saved as .py."
+            '%(name)s: has no cell with the tag "%(tag)s", expected it on the cell with the robot program; '
+            "it is lost when a notebook is saved as .py.",
+            name=notebook.name,
+            tag=tag,
         )
     found = [site for cell in tagged for site in _sites(cell)]
     if not found:
         raise UsageError(
-            f'{notebook.name}: cell {tagged[-1].number} has the tag "{tag}" but runs no robot, expected '
-            "%%sim_magic_preloaded as its first line."
+            '%(name)s: cell %(cell)s has the tag "%(tag)s" but runs no robot, expected '
+            "%%%%sim_magic_preloaded as its first line.",
+            name=notebook.name,
+            cell=tagged[-1].number,
+            tag=tag,
         )
     return found[-1]
 
 
-def _near_miss(notebook: Notebook) -> str:
+def _near_miss(notebook: Notebook) -> str | Sentence:
     """A line that is nearly a program's magic, or is one in the wrong place."""
     for cell in notebook.cells:
         for number, line in enumerate(cell.source.split("\n"), 1):
             if NEARLY_MAGIC.match(line[:200]):
-                why = "below other code" if is_program_magic(line) else "another word"
-                return f"; line {number} of cell {cell.number} has {shown(line.split()[0])}, {why}"
+                why = Sentence("below other code") if is_program_magic(line) else Sentence("another word")
+                values = {"line": number, "cell": cell.number, "word": shown(line.split()[0]), "why": why}
+                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
     return ""
 
 
-def _count(number: int) -> str:
-    return f"{number} robot program" if number == 1 else f"{number} robot programs"
+def _count(number: int) -> Sentence:
+    if number == 1:
+        return Sentence("1 robot program")
+    return Sentence("%(count)s robot programs", {"count": number})
 
 
 def _sites(cell: Cell) -> Iterator[Site]:

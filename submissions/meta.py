@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Mapping
 
 from sim.errors import UsageError
+from sim.sentences import Sentence
 
 META = "submission.toml"
 _MAX_BYTES = 64 * 1024
@@ -16,13 +17,16 @@ def read_meta(data: bytes, where: str) -> dict[str, object]:
     if not data:
         return {}
     if len(data) > _MAX_BYTES:
-        raise UsageError(f"{where}: {META} is too large, expected a few lines.")
+        raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=where, file=META)
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = Sentence("it is nested too deeply") if isinstance(error, RecursionError) else str(error)[:200]
         raise UsageError(
-            f'{where}: {META} cannot be read ({problem[:200]}), expected lines like assignment = "echo-responder".'
+            '%(where)s: %(file)s cannot be read (%(problem)s), expected lines like assignment = "echo-responder".',
+            where=where,
+            file=META,
+            problem=problem,
         ) from None
 
 
@@ -30,7 +34,12 @@ def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
     """A text of it, None where it says none. Raises UsageError for anything else."""
     value = meta.get(key)
     if value is not None and (not isinstance(value, str) or not value.strip()):
-        raise UsageError(f'{where}: {key} in {META} is not a text, expected {key} = "..." there.')
+        raise UsageError(
+            '%(where)s: %(key)s in %(file)s is not a text, expected %(key)s = "..." there.',
+            where=where,
+            key=key,
+            file=META,
+        )
     return value
 
 

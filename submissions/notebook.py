@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sim.errors import UsageError
+from sim.sentences import Sentence
 from submissions.source_text import MAX_SOURCE_BYTES
 from submissions.submission import Cell, Notebook
 
@@ -100,7 +101,9 @@ def _decoded(data: bytes, name: str) -> tuple[str, str]:
         try:
             return data.decode("utf-16"), f"{name} was read as UTF-16; Jupyter saves UTF-8."
         except UnicodeDecodeError:
-            raise UsageError(f"{name}: is damaged UTF-16 text, expected a notebook as Jupyter saves it.") from None
+            raise UsageError(
+                "%(name)s: is damaged UTF-16 text, expected a notebook as Jupyter saves it.", name=name
+            ) from None
     try:
         return data.decode("utf-8-sig"), ""
     except UnicodeDecodeError:
@@ -109,22 +112,28 @@ def _decoded(data: bytes, name: str) -> tuple[str, str]:
 
 def _parsed(text: str, name: str) -> Mapping[str, Any]:
     if not text.strip():
-        raise UsageError(f"{name}: is an empty file, expected a notebook.")
+        raise UsageError("%(name)s: is an empty file, expected a notebook.", name=name)
     if text.count(",") + text.count("[") + text.count("{") > _MAX_VALUES:
         raise UsageError(
-            f"{name}: has too much output in it, expected a notebook whose outputs were cleared before it was saved."
+            "%(name)s: has too much output in it, expected a notebook whose outputs were cleared before it was saved.",
+            name=name,
         )
     try:
         document = json.loads(text, strict=False)
     except RecursionError:
-        raise UsageError(f"{name}: is nested too deeply, expected a notebook as Jupyter saves it.") from None
-    except ValueError as error:
-        where = f" (line {error.lineno})" if isinstance(error, json.JSONDecodeError) else ""
         raise UsageError(
-            f"{name}: is not a notebook: its JSON is broken{where}, expected one saved by Jupyter."
+            "%(name)s: is nested too deeply, expected a notebook as Jupyter saves it.", name=name
+        ) from None
+    except ValueError as error:
+        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
+        where = "" if line is None else Sentence(" (line %(line)s)", {"line": line})
+        raise UsageError(
+            "%(name)s: is not a notebook: its JSON is broken%(where)s, expected one saved by Jupyter.",
+            name=name,
+            where=where,
         ) from None
     if not isinstance(document, dict):
-        raise UsageError(f"{name}: is JSON, but not a notebook, expected one saved by Jupyter.")
+        raise UsageError("%(name)s: is JSON, but not a notebook, expected one saved by Jupyter.", name=name)
     return document
 
 
@@ -133,7 +142,11 @@ def _check_language(document: Mapping[str, Any], name: str) -> None:
     for table, key in (("language_info", "name"), ("kernelspec", "language")):
         language = _table(metadata, table).get(key)
         if isinstance(language, str) and language and not language.lower().startswith(("python", "ipython")):
-            raise UsageError(f"{name}: is a notebook for {language[:40]!r}, expected one for Python.")
+            raise UsageError(
+                "%(name)s: is a notebook for %(language)s, expected one for Python.",
+                name=name,
+                language=repr(language[:40]),
+            )
 
 
 def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -148,7 +161,7 @@ def _raw_cells(document: Mapping[str, Any], name: str) -> list[Any]:
     sheets = document.get("worksheets")
     if isinstance(sheets, list):
         return [cell for sheet in sheets if isinstance(sheet, dict) for cell in _list(sheet.get("cells"))]
-    raise UsageError(f"{name}: has no list of cells, expected a notebook as Jupyter saves it.")
+    raise UsageError("%(name)s: has no list of cells, expected a notebook as Jupyter saves it.", name=name)
 
 
 def _list(value: object) -> list[Any]:
@@ -185,15 +198,22 @@ def _tags(raw: Mapping[str, Any]) -> tuple[str, ...]:
 def _checked(notebook: Notebook) -> Notebook:
     name, cells = notebook.name, notebook.cells
     if not cells:
-        raise UsageError(f"{name}: has no code cells, expected a notebook with Python code.")
+        raise UsageError("%(name)s: has no code cells, expected a notebook with Python code.", name=name)
     if len(cells) > MAX_CELLS:
-        raise UsageError(f"{name}: has {len(cells)} code cells, expected at most {MAX_CELLS}.")
+        raise UsageError(
+            "%(name)s: has %(count)s code cells, expected at most %(most)s.",
+            name=name,
+            count=len(cells),
+            most=MAX_CELLS,
+        )
     if sum(len(cell.source) for cell in cells) > MAX_SOURCE_BYTES:
-        raise UsageError(f"{name}: has too much code, expected at most 1 MB.")
+        raise UsageError("%(name)s: has too much code, expected at most 1 MB.", name=name)
     for cell in cells:
         if "\0" in cell.source:
             raise UsageError(
-                f"{name}: has a NUL character in cell {cell.number}, expected Python source as plain text."
+                "%(name)s: has a NUL character in cell %(cell)s, expected Python source as plain text.",
+                name=name,
+                cell=cell.number,
             )
     return notebook
 

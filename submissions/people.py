@@ -140,12 +140,17 @@ def _students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Stude
     ]
     usual = told_apart(zip(names, others, strict=True))
     ids = [row.cells.get("id") or usual[place] or emails[place] for place, row in enumerate(rows)]
-    times = Counter(map(_key, ids))
+    lines: dict[str, list[str]] = {}
+    for row, own in zip(rows, ids, strict=True):
+        lines.setdefault(_key(own), []).append(str(row.line))
     for row, own, name, email in zip(rows, ids, names, emails, strict=True):
         if not own:
             raise UsageError(f"{file}: line {row.line} names nobody, expected an id, a name or an e-mail address.")
-        if times[_key(own)] > 1:
-            raise UsageError(f"{file}: line {row.line}: {shown(own)} is the id of several, expected one for each.")
+        if len(lines[_key(own)]) > 1:
+            raise UsageError(
+                f"{file}: lines {' and '.join(lines[_key(own)][:5])}: {shown(own)} is the id of several, "
+                "expected one for each."
+            )
         yield row, Student(own, name, email)
 
 

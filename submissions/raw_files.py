@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sim.errors import UsageError
+from sim.sentences import Sentence
 
 MEGABYTE = 1024 * 1024
 MAX_TOTAL_BYTES = 32 * MEGABYTE
@@ -30,7 +31,7 @@ _CHUNK = 64 * 1024
 
 #: Leftovers of tools and systems; they are no part of a submission, in whatever folder they lie.
 _IGNORED_NAMES = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini", "Icon\r"}
-_EXPECTED_FLAT = "expected robot.py, responder.py and the files they use side by side"
+_EXPECTED_FLAT = Sentence("expected robot.py, responder.py and the files they use side by side")
 
 #: What ``zipfile`` and its decompressors raise on archives that were made to break them.
 _BROKEN_ARCHIVE = (
@@ -82,7 +83,9 @@ class _Budget:
     def one_more(self) -> None:
         self.count += 1
         if self.count > MAX_FILES:
-            raise UsageError(f"{self.where}: has too many files, expected at most {MAX_FILES}.")
+            raise UsageError(
+                "%(where)s: has too many files, expected at most %(most)s.", where=self.where, most=MAX_FILES
+            )
 
     def read(self, name: str, stream: BinaryIO) -> bytes:
         """All of ``stream``, counted while it comes, whatever size it claims to have."""
@@ -92,17 +95,35 @@ class _Budget:
             size += len(chunk)
             self.total += len(chunk)
             if size > MAX_FILE_BYTES:
-                advice = "; clear its outputs before you save it" if name.lower().endswith(".ipynb") else ""
-                raise UsageError(
-                    f"{self.where}: {shown(name)} is too large, expected at most "
-                    f"{MAX_FILE_BYTES // MEGABYTE} MB a file{advice}."
-                )
+                raise UsageError(self._too_large(name))
             if self.total > MAX_TOTAL_BYTES:
                 raise UsageError(
-                    f"{self.where}: is too large, expected at most {MAX_TOTAL_BYTES // MEGABYTE} MB in all."
+                    "%(where)s: is too large, expected at most %(most)s MB in all.",
+                    where=self.where,
+                    most=MAX_TOTAL_BYTES // MEGABYTE,
                 )
             chunks.append(chunk)
         return b"".join(chunks)
+
+    def _too_large(self, name: str) -> Sentence:
+        notebook = name.lower().endswith(".ipynb")
+        values = {
+            "what": _within(self.where, shown(name)),
+            "most": MAX_FILE_BYTES // MEGABYTE,
+            "advice": Sentence("; clear its outputs before you save it") if notebook else "",
+        }
+        return Sentence("%(what)s is too large, expected at most %(most)s MB a file%(advice)s.", values)
+
+
+def _within(where: str, name: str) -> str:
+    """A file, and what it is in; alone where that is the same."""
+    return f"{where}:" if where == name else f"{where}: {name}"
+
+
+def _twice(where: str, name: str) -> UsageError:
+    if where == name:
+        return UsageError("%(where)s: is there twice, expected every file once.", where=where)
+    return UsageError("%(where)s: has %(name)s twice, expected every file once.", where=where, name=name)
 
 
 def shown(name: str) -> str:
@@ -128,7 +149,9 @@ def read_folder(path: Path) -> RawFiles:
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     except OSError as error:
-        raise UsageError(f"{where}: cannot be opened ({error.strerror}), expected a readable folder.") from None
+        raise UsageError(
+            "%(where)s: cannot be opened (%(reason)s), expected a readable folder.", where=where, reason=error.strerror
+        ) from None
     try:
         names, folders = _list_folder(descriptor, where, notes)
         if not names and len(folders) == 1:
@@ -138,7 +161,12 @@ def read_folder(path: Path) -> RawFiles:
             notes.append(f"The files were read from the folder {shown(folders[0])} in it.")
             names, folders = _list_folder(descriptor, where, notes)
         if folders:
-            raise UsageError(f"{where}: has the folder {shown(folders[0])} in it, {_EXPECTED_FLAT}.")
+            raise UsageError(
+                "%(where)s: has the folder %(name)s in it, %(expected)s.",
+                where=where,
+                name=shown(folders[0]),
+                expected=_EXPECTED_FLAT,
+            )
         budget = _Budget(where)
         files = {}
         for name in names:
@@ -148,7 +176,9 @@ def read_folder(path: Path) -> RawFiles:
                 files[name] = budget.read(name, stream)
         return _with_archive_opened(RawFiles(files, tuple(notes)))
     except OSError as error:
-        raise UsageError(f"{where}: cannot be read ({error.strerror}), expected a readable folder.") from None
+        raise UsageError(
+            "%(where)s: cannot be read (%(reason)s), expected a readable folder.", where=where, reason=error.strerror
+        ) from None
     finally:
         os.close(descriptor)
 
@@ -175,7 +205,7 @@ def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
             continue
         _check_name(where, name)
         if name in files:
-            raise UsageError(f"{where}: has {shown(name)} twice, expected every file once.")
+            raise _twice(where, shown(name))
         budget.one_more()
         files[name] = budget.read(name, each.stream)
     return _with_archive_opened(RawFiles(files))
@@ -204,14 +234,18 @@ def read_zip(path: Path) -> RawFiles:
 def unzip(data: bytes, where: str) -> RawFiles:
     """Like ``read_zip``, from the archive's bytes; ``where`` names it in the sentences."""
     if not data:
-        raise UsageError(f"{where}: is an empty file, expected a zip archive with robot.py and responder.py.")
+        raise UsageError(
+            "%(where)s: is an empty file, expected a zip archive with robot.py and responder.py.", where=where
+        )
     # zipfile builds an object for each entry before anything can be counted.
     if data.count(b"PK\x01\x02") > 8 * MAX_FILES:
-        raise UsageError(f"{where}: has too many files, expected at most {MAX_FILES}.")
+        raise UsageError("%(where)s: has too many files, expected at most %(most)s.", where=where, most=MAX_FILES)
     try:
         archive = zipfile.ZipFile(BytesIO(data))
     except (*_BROKEN_ARCHIVE, NotImplementedError):
-        raise UsageError(f"{where}: is not a zip archive that can be read, expected an ordinary .zip.") from None
+        raise UsageError(
+            "%(where)s: is not a zip archive that can be read, expected an ordinary .zip.", where=where
+        ) from None
     with archive:
         entries = _plain_entries(archive.infolist(), where)
         notes: list[str] = []
@@ -223,9 +257,14 @@ def unzip(data: bytes, where: str) -> RawFiles:
         files: dict[str, bytes] = {}
         for parts, info in entries:
             if len(parts) > 1:
-                raise UsageError(f"{where}: has {shown('/'.join(parts))} in a folder, {_EXPECTED_FLAT}.")
+                raise UsageError(
+                    "%(where)s: has %(name)s in a folder, %(expected)s.",
+                    where=where,
+                    name=shown("/".join(parts)),
+                    expected=_EXPECTED_FLAT,
+                )
             if parts[0] in files:
-                raise UsageError(f"{where}: has {shown(parts[0])} twice, expected every file once.")
+                raise _twice(where, shown(parts[0]))
             budget.one_more()
             files[parts[0]] = _decompress(archive, info, parts[0], where, budget)
     return RawFiles(files, tuple(notes))
@@ -239,7 +278,9 @@ def _decompress(archive: zipfile.ZipFile, info: zipfile.ZipInfo, name: str, wher
         raise
     except (*_BROKEN_ARCHIVE, NotImplementedError):
         raise UsageError(
-            f"{where}: {shown(name)} is damaged in the archive, expected one that unpacks without errors."
+            "%(where)s: %(name)s is damaged in the archive, expected one that unpacks without errors.",
+            where=where,
+            name=shown(name),
         ) from None
 
 
@@ -251,21 +292,37 @@ def _plain_entries(infos: Iterable[zipfile.ZipInfo], where: str) -> list[tuple[t
         parts = tuple(part for part in original.split("/") if part not in ("", "."))
         if original.startswith("/") or ".." in parts or any(len(p) > 1 and p[1] == ":" for p in parts[:1]):
             raise UsageError(
-                f"{where}: has an entry that leads outside ({shown(original)}), expected plain file names."
+                "%(where)s: has an entry that leads outside (%(name)s), expected plain file names.",
+                where=where,
+                name=shown(original),
             )
         kind = stat.S_IFMT(info.external_attr >> 16)
         if kind == stat.S_IFLNK:
-            raise UsageError(f"{where}: has a link in it ({shown(original)}), expected the file itself.")
+            raise UsageError(
+                "%(where)s: has a link in it (%(name)s), expected the file itself.", where=where, name=shown(original)
+            )
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-            raise UsageError(f"{where}: has something in it that is no file ({shown(original)}), expected files.")
+            raise UsageError(
+                "%(where)s: has something in it that is no file (%(name)s), expected files.",
+                where=where,
+                name=shown(original),
+            )
         if info.flag_bits & (0x1 | 0x40 | 0x2000):
-            raise UsageError(f"{where}: is encrypted ({shown(original)}), expected a zip without a password.")
+            raise UsageError(
+                "%(where)s: is encrypted (%(name)s), expected a zip without a password.",
+                where=where,
+                name=shown(original),
+            )
         if original.endswith("/") or kind == stat.S_IFDIR or not parts or _is_ignored(parts):
             continue
         for part in parts:
             _check_name(where, part)
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise UsageError(f"{where}: {shown(original)} is compressed in an unusual way, expected an ordinary .zip.")
+            raise UsageError(
+                "%(where)s: %(name)s is compressed in an unusual way, expected an ordinary .zip.",
+                where=where,
+                name=shown(original),
+            )
         entries.append((parts, info))
     return entries
 
@@ -281,8 +338,11 @@ def _check_name(where: str, name: str) -> None:
         length = 0
     if not 0 < length <= _MAX_NAME_BYTES or any(unicodedata.category(c) == "Cc" for c in name):
         raise UsageError(
-            f"{where}: has a file name that cannot be used ({shown(name)}), expected printable characters, "
-            f"at most {_MAX_NAME_BYTES} bytes."
+            "%(where)s: has a file name that cannot be used (%(name)s), expected printable characters, "
+            "at most %(most)s bytes.",
+            where=where,
+            name=shown(name),
+            most=_MAX_NAME_BYTES,
         )
 
 
@@ -292,7 +352,9 @@ def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[st
     with os.scandir(descriptor) as found:
         for number, entry in enumerate(found):
             if number > 64 * MAX_FILES:
-                raise UsageError(f"{where}: has too many files, expected at most {MAX_FILES}.")
+                raise UsageError(
+                    "%(where)s: has too many files, expected at most %(most)s.", where=where, most=MAX_FILES
+                )
             if _is_ignored([entry.name]):
                 continue
             if entry.is_dir(follow_symlinks=False):
@@ -311,8 +373,12 @@ def _regular_file(where: str, name: str, folder: int | None) -> contextlib.Abstr
     try:
         descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
     except OSError as error:
-        raise UsageError(f"{shown(where)}: cannot be opened ({error.strerror}), expected a readable file.") from None
+        raise UsageError(
+            "%(where)s: cannot be opened (%(reason)s), expected a readable file.",
+            where=shown(where),
+            reason=error.strerror,
+        ) from None
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise UsageError(f"{shown(where)}: is no ordinary file, expected one that can be read.")
+        raise UsageError("%(where)s: is no ordinary file, expected one that can be read.", where=shown(where))
     return os.fdopen(descriptor, "rb")

@@ -73,7 +73,12 @@ def asked_site(notebook: Notebook, asked: str) -> Site:
         return marked_site(notebook, asked if asked.startswith(TAG) else f"{TAG}{asked}")
     found = sites(notebook)
     if not 1 <= int(asked) <= len(found):
-        raise UsageError(f"{notebook.name}: has no run {asked}, expected a number from 1 to {len(found)}, or a tag.")
+        raise UsageError(
+            "%(name)s: has no run %(asked)s, expected a number from 1 to %(most)s, or a tag.",
+            name=notebook.name,
+            asked=asked,
+            most=len(found),
+        )
     return found[int(asked) - 1]
 
 

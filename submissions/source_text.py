@@ -36,12 +36,16 @@ def decode_source(data: bytes, name: str) -> DecodedText:
     Raises UsageError for more than 1 MB and for NUL characters, which no Python file has.
     """
     if len(data) > MAX_SOURCE_BYTES:
-        raise UsageError(f"{name}: is too large for a Python file, expected at most 1 MB.")
+        raise UsageError("%(name)s: is too large for a Python file, expected at most 1 MB.", name=name)
     decoded = _decode(data, name)
     nul = decoded.text.find("\0")
     if nul >= 0:
         line = decoded.text.count("\n", 0, nul) + 1
-        raise UsageError(f"{name}: has a NUL character in line {line}, expected Python source as plain text.")
+        raise UsageError(
+            "%(name)s: has a NUL character in line %(line)s, expected Python source as plain text.",
+            name=name,
+            line=line,
+        )
     return decoded
 
 
@@ -52,7 +56,7 @@ def _decode(data: bytes, name: str) -> DecodedText:
         try:
             return DecodedText(data.decode("utf-16"), f"{name} was read as UTF-16; save it as UTF-8.")
         except UnicodeDecodeError:
-            raise UsageError(f"{name}: is damaged UTF-16 text, expected Python source in UTF-8.") from None
+            raise UsageError("%(name)s: is damaged UTF-16 text, expected Python source in UTF-8.", name=name) from None
     encoding = _cookie(data)
     if encoding and encoding != "utf-8":
         try:

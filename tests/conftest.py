@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,16 @@ from service.store.engine import Store
 # Two cores are shared with whatever else runs: how long an example takes says nothing.
 settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("robomark")
+
+# To find thousands of tests throws little away, and to look through them again and again is a third of what it costs.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Garbage is looked for in what tests make, where much of it is to be had, and no longer among the tests."""
+    gc.freeze()
+    gc.set_threshold(10_000)
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

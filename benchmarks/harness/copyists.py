@@ -97,7 +97,9 @@ class _Changer(ast.NodeTransformer):
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if isinstance(node.value, str):
             return ast.Constant(f"{node.value}, changed")
-        return ast.Constant(2 * node.value + 1) if type(node.value) in (int, float) else node
+        if isinstance(node.value, int | float) and not isinstance(node.value, bool):
+            return ast.Constant(2 * node.value + 1)
+        return node
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
         return node

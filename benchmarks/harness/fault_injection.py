@@ -31,15 +31,14 @@ from benchmarks.harness.process_tree import children, command_line, descendants
 from responders.code import Code
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
+from service.queue.alive import WORKER_VARIABLE, new_worker_name
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.queue.processes import end_processes, start_process
-from service.queue.tasks import WORKER_VARIABLE
-from service.queue.worker import new_worker_name
 from service.settings import Settings
+from service.store.batches.intake import accept_batch, load_grading_request
 from service.store.engine import Store
-from service.store.intake import accept_batch, load_grading_request
 from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
 from service.store.states import UNFINISHED, JobState, Lane
 from sim.errors import HostError

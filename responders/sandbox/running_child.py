@@ -9,8 +9,6 @@ import contextlib
 import os
 import select
 import signal
-import socket
-import struct
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,13 +16,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from responders import packed, wire
-from responders.sandbox import process_state
+from responders.sandbox import child_ends, process_state
 from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
-_POLL_TIME = struct.pack("ll", 0, round(_POLL_SECONDS * 1e6))
 #: What is read of the wire at once, bytes; most of what comes is far shorter.
 _AT_ONCE = 8192
 #: What a child is charged for a frame at least; made by our own code there, one costs it several times this. It keeps
@@ -45,7 +42,6 @@ _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
 _MOST_GIVEN = 10_000
-_NOWHERE: wire.Frame = {"line": None, "file": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +51,6 @@ class ChildLimits:
     cpu_seconds: float
     memory_bytes: int
     without: tuple[str, ...] = ()
-
-
-class KilledFromOutside(HostError):
-    """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
 
 
 class LibrariesNeeded(RobomarkError):
@@ -94,18 +86,22 @@ class Child:
         reap: Callable[[], int],
         pid: int,
         pidfd: int,
-        connection: socket.socket,
+        ends: tuple[int, int],
         limits: ChildLimits,
         folder: Path | None,
     ) -> None:
-        """``reap`` waits for the child's end and gives its wait status."""
+        """``reap`` waits for the child's end and gives its wait status; ``ends`` are of pipes, to read and to write."""
         self.sandbox = ""
         self._reap = reap
         self._folder = folder
         self._given = (0, 0) if folder is None else process_state.folder_content(folder, _MOST_GIVEN)
         self._pid = pid
         self._pidfd = pidfd
-        self._socket = connection
+        # Pipes: a turn costs little more than half of what it costs over a socket.
+        self._reading, self._writing = ends
+        self._answered = select.poll()
+        self._answered.register(self._reading, select.POLLIN)
+        os.set_blocking(self._writing, False)
         self._limits = limits
         self._meter = JobMeter()
         self._blamed = self._has_libraries = False
@@ -119,10 +115,6 @@ class Child:
         self._checked = 0.0
         self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
         self._queued_before = process_state.seconds_queued()
-        # The kernel's own time limits: with Python's there would be a second system call beside each.
-        connection.setblocking(True)
-        for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
-            connection.setsockopt(socket.SOL_SOCKET, limit, _POLL_TIME)
 
     def begin(
         self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
@@ -144,12 +136,23 @@ class Child:
         self._send(packed.pack_readings(units, values, self._sent))
 
     def _send(self, frame: bytes) -> None:
-        data = memoryview(frame)
         self._sent += 1
+        try:
+            frame = frame[os.write(self._writing, frame) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            return
+        if frame:
+            self._send_slowly(frame)
+
+    def _send_slowly(self, frame: bytes) -> None:
+        """The rest of a frame to a child that has not read what came before."""
         began = time.monotonic()
-        while data:
+        while frame:
+            select.select([], [self._writing], [], _POLL_SECONDS)
             try:
-                data = data[self._socket.send(data) :]
+                frame = frame[os.write(self._writing, frame) :]
             except BlockingIOError:
                 self._check_cpu()
                 if time.monotonic() - began > _STALLED_SECONDS:
@@ -178,7 +181,7 @@ class Child:
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
             ) from None
         if frame["do"] == "busy":
-            raise self._too_busy(frame)
+            raise child_ends.too_busy(self._limits.cpu_seconds, frame)
         if frame["do"] == "libraries":
             if self._has_libraries:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "its process asked for libraries that it has")
@@ -193,18 +196,23 @@ class Child:
         """Those of the packet that begins with ``data``. Nothing of them is kept, so nothing is paid."""
         while len(data) < packed.HEADER_BYTES:
             data += self._more()
-        pieces, missing = [data], packed.packet_bytes(data) - len(data)
-        while missing > 0:
-            pieces.append(self._more())
-            missing -= len(pieces[-1])
-        if missing < 0 or len(pieces) > 1:
-            data = b"".join(pieces)
-        end = len(data) + missing
-        self._pending = data[end:]
-        number, acts = packed.unpack(data[:end])
+        size, number = packed.read_header(data)
+        if len(data) < size:
+            data = self._at_least(data, size)
+        self._pending = data[size:]
+        acts = packed.acts_of(data[:size])
         self._count(number)
         self._charged += len(acts)
         return acts
+
+    def _at_least(self, data: bytes, size: int) -> bytes:
+        """So many bytes or more that begin with ``data``."""
+        pieces = [data]
+        size -= len(data)
+        while size > 0:
+            pieces.append(self._more())
+            size -= len(pieces[-1])
+        return b"".join(pieces)
 
     def _count(self, number: int) -> None:
         if number != self._received:
@@ -247,33 +255,28 @@ class Child:
         """What the child sends next, a byte at least."""
         last_cpu, still_since = -1.0, time.monotonic()
         began = still_since
-        while True:
-            try:
-                data = self._socket.recv(_AT_ONCE)
-            except BlockingIOError:
-                now = time.monotonic()
-                self._waited += now - began
-                began = now
-                self._meter.heartbeat()
-                used = self._check_cpu()
-                self._check_sleep()
-                if used != last_cpu or process_state.runnable(self._pid):
-                    last_cpu, still_since = used, now
-                elif now - still_since > _STALLED_SECONDS:
-                    raise self._stalled() from None
-                continue
-            except OSError:
-                data = b""
-            if not data:
-                raise self._gone()
+        while not self._answered.poll(_POLL_SECONDS * 1000):
             now = time.monotonic()
             self._waited += now - began
-            if now - self._checked > _POLL_SECONDS:
-                self._checked = now
-                self._meter.heartbeat()
-                self._check_cpu()
-                self._check_sleep()
-            return data
+            began = now
+            self._meter.heartbeat()
+            used = self._check_cpu()
+            self._check_sleep()
+            if used != last_cpu or process_state.runnable(self._pid):
+                last_cpu, still_since = used, now
+            elif now - still_since > _STALLED_SECONDS:
+                raise self._stalled()
+        now = time.monotonic()
+        self._waited += now - began
+        data = os.read(self._reading, _AT_ONCE)
+        if not data:
+            raise self._gone()
+        if now - self._checked > _POLL_SECONDS:
+            self._checked = now
+            self._meter.heartbeat()
+            self._check_cpu()
+            self._check_sleep()
+        return data
 
     def _check_cpu(self) -> float:
         """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
@@ -281,7 +284,7 @@ class Child:
         used = self.cpu_seconds()
         charged = max(used, self._charged * _FRAME_CPU_SECONDS)
         if charged > self._limits.cpu_seconds:
-            raise self._too_busy(self._last_word())
+            raise child_ends.too_busy(self._limits.cpu_seconds, self._last_word())
         self._meter.check_cpu(charged)
         return used
 
@@ -326,30 +329,12 @@ class Child:
         while len(data) < _UNREAD_BYTES and self.cpu_seconds() < enough:
             if time.monotonic() > deadline and not process_state.runnable(self._pid):
                 break
-            try:
-                more = self._socket.recv(wire.MOST)
-            except BlockingIOError:
-                continue
-            except OSError:
-                break
-            if not more:
-                break
-            data += more
-        for line in reversed(data.split(b"\n")):
-            # Packed acts may stand before it.
-            start = max(line.rfind(wire.BEGINNING), 0)
-            with contextlib.suppress(wire.WireError):
-                frame = wire.parse(wire.unnumbered(line[start:])[1], {"busy": wire.ROBOT["busy"]})
-                return frame
-        return _NOWHERE
-
-    def _too_busy(self, place: wire.Frame) -> ChildStopped:
-        return ChildStopped(
-            Verdict.CPU_LIMIT,
-            f"it computed for more than {self._limits.cpu_seconds:g} seconds of CPU time",
-            place["line"],
-            place["file"],
-        )
+            if self._answered.poll(_POLL_SECONDS * 1000):
+                more = os.read(self._reading, wire.MOST)
+                if not more:
+                    break
+                data += more
+        return child_ends.place_of(data)
 
     def _stalled(self) -> ChildStopped:
         return ChildStopped(
@@ -358,34 +343,18 @@ class Child:
         )
 
     def _gone(self) -> ChildStopped:
-        """What the wait status says of a child that has closed the wire. Raises KilledFromOutside."""
+        """Why a child has closed the wire. Raises KilledFromOutside."""
         used = self.cpu_seconds()
         ended = self._has_ended()
         self._leave()
-        status = self._reap()
-        if not os.WIFSIGNALED(status):
-            return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
-        number = os.WTERMSIG(status)
-        # The kernel's own limit on processor time, a second or two behind ours, ends with SIGKILL too.
-        if number == signal.SIGXCPU or (number == signal.SIGKILL and used > self._limits.cpu_seconds):
-            return self._too_busy(_NOWHERE)
-        if number == signal.SIGSYS:
-            return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
-        if number != signal.SIGKILL:
-            return ChildStopped(Verdict.PROGRAM_ERROR, f"its process crashed ({process_state.signal_name(number)})")
-        if not ended:
-            # It was alive until we ended it ourselves just now: it had only closed the wire.
-            return ChildStopped(Verdict.PROGRAM_ERROR, "its process ended without finishing the program")
-        if self._overran is not None and self._overran():
-            sentence = "the submission's processes took more memory together than they may have"
-            return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
-        if self._blamed:
-            sentence = "its process was killed, again and with nothing else running: it takes more memory than there is"
-            return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
-        raise KilledFromOutside("something on this machine killed a student's process: is there enough memory?")
+        stopped = child_ends.by_itself(self._reap(), used, self._limits.cpu_seconds)
+        if stopped is not None:
+            return stopped
+        overran = ended and self._overran is not None and self._overran()
+        return child_ends.killed(ended, overran, self._blamed)
 
     def _has_ended(self) -> bool:
-        """Whether it is gone already: a process that dies closes its socket a moment before."""
+        """Whether it is gone already: a process that dies closes the wire a moment before."""
         began = time.monotonic()
         ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
         self._waited += time.monotonic() - began
@@ -396,8 +365,8 @@ class Child:
         self._closed = True
         self._meter.child_ended(self.cpu_seconds(), self._slept_seconds())
         self._kill()
-        self._socket.close()
-        os.close(self._pidfd)
+        for fd in (self._reading, self._writing, self._pidfd):
+            os.close(fd)
 
     def _kill(self) -> None:
         with contextlib.suppress(OSError):

@@ -27,10 +27,12 @@ from typing import Any, Literal
 
 from responders import wire
 from responders.sandbox import bubblewrap
+from responders.sandbox.child_ends import KilledFromOutside
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
-from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside
+from responders.sandbox.processor import ALLOWED
+from responders.sandbox.running_child import Child, ChildLimits
 from sim.errors import HostError
 
 Role = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
@@ -197,16 +199,18 @@ class Zygote:
 
     def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: Work, blamed: bool) -> Child:
         self._start()
-        descriptors = []
+        folders = []
         if folder is not None:
             # Opened as the zygote sees it: with name spaces of its own, our path to it leads nowhere there.
-            descriptors = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+            folders = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
+        reading, their_writing = os.pipe()
+        their_reading, writing = os.pipe()
         try:
             data, received = self._ask(
                 {
                     "do": "spawn",
                     "work": work,
+                    "processors": sorted(os.sched_getaffinity(0)),
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "without": limits.without,
@@ -216,23 +220,21 @@ class Zygote:
                     "seccomp": self._sandbox.seccomp,
                     "doorkeeper": self._sandbox.doorkeeper,
                 },
-                [theirs.fileno(), *descriptors],
+                [their_writing, their_reading, *folders],
             )
         except BaseException:
-            ours.close()
+            _close(reading, writing)
             raise
         finally:
-            theirs.close()
-            for fd in descriptors:
-                os.close(fd)
+            _close(their_writing, their_reading, *folders)
         answer = json.loads(data)
         if "missing" in answer:
-            ours.close()
+            _close(reading, writing)
             raise _sandbox_missing(answer["missing"])
         self._living += 1
         inside = answer["pid"]  # what the zygote calls it
         reap = functools.partial(self.reap, inside)
-        child = Child(reap, _pid(received[0]), received[0], ours, limits, folder)
+        child = Child(reap, _pid(received[0]), received[0], (reading, writing), limits, folder)
         try:
             _try_to_signal(received[0])
             self._check_isolation(child)
@@ -294,7 +296,8 @@ class Zygote:
         self.close()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         code = (
-            "import os, sys; os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
+            f"import os, sys; os.sched_setaffinity(0, {sorted(ALLOWED)}); "
+            "os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
             "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5].split(), sys.argv[6:])"
         )
         joining = self._group.joining if self._group is not None else []
@@ -344,6 +347,11 @@ class Zygote:
         for _, _, part in received:
             found.frombytes(part[: len(part) - len(part) % 4])
         return data, list(found)
+
+
+def _close(*descriptors: int) -> None:
+    for fd in descriptors:
+        os.close(fd)
 
 
 def _pid(pidfd: int) -> int:

@@ -11,9 +11,13 @@ import typer
 
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
-from service.store import appeals, audit, people
+from service.store import audit
+from service.store.courses.hidden_names import hidden_names
 from service.store.engine import open_store
-from service.store.students import DEFAULT_COURSE
+from service.store.grades import appeals
+from service.store.installation import secret_of
+from service.store.people import people
+from service.store.people.students import DEFAULT_COURSE
 
 Course = Annotated[str, typer.Option(help="The course.")]
 
@@ -23,10 +27,13 @@ def list_appeals(
     answered: Annotated[bool, typer.Option("--answered", help="Those that are answered, too.")] = False,
 ) -> None:
     """List the open appeals of a course, the longest waiting first."""
-    with open_store(load_settings()) as store, store.reading() as session:
-        course_id = people.find_course(session, course)
-        found = appeals.in_course(session, course_id, answered=False)
-        found += appeals.in_course(session, course_id, answered=True) if answered else []
+    with open_store(load_settings()) as store:
+        secret = secret_of(store)
+        with store.reading() as session:
+            course_id = people.find_course(session, course)
+            hidden = hidden_names(session, course_id, secret)
+            found = appeals.in_course(session, course_id, hidden, answered=False)
+            found += appeals.in_course(session, course_id, hidden, answered=True) if answered else []
     document(appeals=found)
     if not found:
         tell("no appeal is open")

@@ -16,12 +16,14 @@ from sqlalchemy.orm import Session
 
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
-from service.store import audit, open_assignments, policies
+from service.store import audit
+from service.store.courses import open_assignments, policies
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.courses.policies import PolicyLimits
+from service.store.courses.versions import check_assignment
 from service.store.engine import Store, now, open_store
-from service.store.open_assignments import CourseAssignment
-from service.store.policies import PolicyLimits
-from service.store.students import DEFAULT_COURSE, Students, course_of
-from service.store.versions import check_assignment
+from service.store.people import people
+from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from sim.errors import UsageError
 from submissions.names import shown_name
 from submissions.people import read_people, students_of
@@ -44,12 +46,21 @@ def policy(
         int | None, typer.Option(min=1, max=1000, help="Different submissions that are marked.")
     ] = None,
     cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two submissions.")] = 0.0,
+    drop: Annotated[bool, typer.Option("--drop", help="Let it have nothing of its own: what holds for all.")] = False,
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Set what holds from now on, in place of what held; without options show what holds."""
     allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
+    if drop and allowed != PolicyLimits():
+        raise UsageError("--drop takes away what was set, expected no other limits beside it")
     with open_store(load_settings()) as store:
-        if allowed != PolicyLimits():
+        if drop:
+            with store.transaction() as session:
+                course_id = people.find_course(session, course)
+                policies.drop_policy(session, course_id, assignment)
+                told = {"assignment": assignment, "dropped": True}
+                audit.note(session, audit.this_user(), "policy", "course", str(course_id), **told)
+        elif allowed != PolicyLimits():
             with store.transaction() as session:
                 course_id = course_of(session, course, now(session))
                 check_assignment(session, assignment)
@@ -110,7 +121,7 @@ def prepare(
 ) -> None:
     """Put an assignment into a course, not yet open; again, to mark by what it says now."""
     # With all kinds of criteria, which whoever opens or closes need not wait for.
-    from service.store.versions import freeze
+    from service.store.courses.versions import freeze
     from submissions.assignment.reader import find_assignment
 
     frozen = freeze(find_assignment(assignment))

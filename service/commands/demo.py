@@ -14,7 +14,7 @@ def demo(
     output: Annotated[Path, typer.Option("-o", "--output", help="Where the reports go.")] = Path("robomark-demo"),
 ) -> None:
     """Grade the example submissions of one assignment through a real worker, and say where the report is."""
-    from service.commands.batch.submitting import submit_and_wait
+    from service.commands.batch.submit import submit_and_wait
     from submissions.assignment.examples import examples
 
     submit_and_wait(examples(_ASSIGNMENT), _ASSIGNMENT, output=output)

@@ -9,7 +9,9 @@ import typer
 
 from service.commands import channel_flags
 from service.commands.format_option import format_option
+from service.commands.language_option import LanguageOption
 from service.commands.shown import wants_json
+from service.language import SOURCE
 
 
 def grade(
@@ -19,6 +21,7 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
     form: Annotated[str, format_option("What to print; a wrong one names them all.", _documents)] = "text",
+    language: LanguageOption = SOURCE,
     run: Annotated[
         str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
     ] = None,
@@ -57,7 +60,9 @@ def grade(
         reordering=reordering,
         corruption=corruption,
     )
-    grade_all(submissions, assignment, report, "json" if wants_json() else form, given, run=run, unsafe=unsafe)
+    grade_all(
+        submissions, assignment, report, "json" if wants_json() else form, given, language, run=run, unsafe=unsafe
+    )
 
 
 def _documents() -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.zygote import FULL, NONE
 from service.commands.channel_flags import changed
 from service.commands.shown import note, show
@@ -20,6 +21,7 @@ from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import secret_here
+from service.language import language_called
 from service.reports.formats import FORMATS, Format
 from service.reports.rows import TableRow, missing_words
 from service.settings import load_settings
@@ -39,11 +41,14 @@ def grade_all(
     report: Path | None,
     form: str,
     given: Mapping[str, object],
+    language: str,
     *,
     run: str | None,
     unsafe: bool,
 ) -> None:
     """Grade and print each, or all together; ``given`` are the flags of the channel, ``run`` is of a notebook.
+
+    ``language`` is the code of the one that reports are in.
 
     Raises for the worst of them.
     """
@@ -62,7 +67,7 @@ def grade_all(
     worst: RobomarkError | None = None
     if unsafe:
         warn_of_no_sandbox()
-    with TrialRunner(NONE if unsafe else FULL) as runner:
+    with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
         for path in submissions:
             try:
                 if path in near:
@@ -89,7 +94,7 @@ def grade_all(
             missing = missing_words(graded.missing)
             rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
             if report is not None:
-                written = write_report(report, graded, submission, named_by(path))
+                written = write_report(report, graded, submission, named_by(path), language_called(language))
                 note(f"report: {written}")
     if together is not None:
         sys.stdout.write(together(rows))

@@ -14,8 +14,10 @@ from sqlalchemy.orm import Session
 from service.commands.batch.words import out_of
 from service.commands.shown import document, show, table, tell
 from service.settings import load_settings
-from service.store import audit, batches, comments, marking_history, overrides
+from service.store import audit
+from service.store.batches import batches
 from service.store.engine import open_store
+from service.store.grades import comments, marking_history, overrides
 from service.store.models import Job
 
 GradeId = Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")]

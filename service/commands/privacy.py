@@ -17,8 +17,8 @@ from service.settings import load_settings
 from service.store import audit
 from service.store.backup import back_up
 from service.store.engine import Store, now, open_store
+from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from service.store.purge import erase_student, purge
-from service.store.students import DEFAULT_COURSE, Students, course_of
 from sim.errors import UsageError
 
 Who = Annotated[str, typer.Argument(help="The student's name, as submitted.")]

@@ -11,8 +11,6 @@ from service.commands import channel_flags
 from service.commands.film_option import FilmOption
 from sim.errors import UsageError
 
-RESPONDER_CPU = 10.0
-
 
 def run(
     program: Annotated[Path, typer.Argument(help="The robot program, a .py file, or a notebook.")],
@@ -53,7 +51,7 @@ def run(
     ] = None,
     responder_cpu: Annotated[
         float, typer.Option(min=0.1, max=3600, help="Seconds that the responder, or the notebook, may compute.")
-    ] = RESPONDER_CPU,
+    ] = 10,
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None,

@@ -17,7 +17,8 @@ from service.commands.shown import note, tell
 from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.diagram_parts import Highlights
-from service.reports.plots.own_diagrams import draw_diagram, title_of_cell
+from service.reports.plots.drawn_diagrams import draw_diagram
+from service.reports.plots.own_diagrams import title_of_cell
 from service.reports.plots.style import png
 from service.reports.readable import readable
 from service.reports.written import write_file

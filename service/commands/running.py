@@ -16,12 +16,12 @@ from typing import Any
 from models import weights_bytes
 from responders.channel import Channel
 from responders.code import Code
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
 from responders.trial_spec import PartnerSpec, ProgramSpec, ResponderSpec, TrialSpec
 from service.commands.channel_flags import changed
-from service.commands.run import RESPONDER_CPU
 from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
 from service.commands.shown import document, note, tell
 from service.commands.unsafe import warn_of_no_sandbox
@@ -51,7 +51,7 @@ from submissions.source_text import decode_source
 from submissions.submission import Notebook
 
 _PROGRAM = ChildLimits(5.0, 128 << 20)
-_RESPONDER = ChildLimits(RESPONDER_CPU, 512 << 20)
+_RESPONDER_MEMORY = 512 << 20
 _ALL_CPU = 150.0  # of all processes together, beside what the responder may compute
 _OUTPUT_BYTES = 1_000_000
 _IMAGES = (".png", ".jpg", ".jpeg")
@@ -88,7 +88,7 @@ def run_program(
     wanted = Flags(switches=frozenset(switches)).with_values(**values)
     if unsafe:
         warn_of_no_sandbox()
-    allowed = replace(_RESPONDER, cpu_seconds=responder_cpu)
+    allowed = ChildLimits(responder_cpu, _RESPONDER_MEMORY)
     meter = JobMeter(JobLimits(cpu_seconds=_ALL_CPU + responder_cpu))
     notebook = _notebook(program)
     if notebook is not None:
@@ -100,7 +100,7 @@ def run_program(
             raise UsageError(f"{program.name} is a notebook, which no other program is run over; leave --over out")
         last = LastRun(wanted, seed, seed if sheet is None else sheet, channel, own)
         limits = RunLimits(allowed, _PROGRAM, _OUTPUT_BYTES, seconds)
-        with TrialRunner(NONE if unsafe else FULL) as runner:
+        with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
             text = "\n".join(cell.source for cell in notebook.cells)
             executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner, meter)
         runs = [{"cell": run.cell, **_told(run.recording)} for run in executed.runs]
@@ -136,7 +136,7 @@ def run_program(
     other = None if over is None else _other_program(over)
     for each in chosen.notes:
         note(f"note: {each}")
-    with TrialRunner(NONE if unsafe else FULL) as runner:
+    with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
         recording = runner.run(spec, chosen.obstacles, meter)
         others = NO_OTHERS
         if other is not None:

@@ -16,11 +16,12 @@ from responders.sandbox.manager import Sandboxes
 from service.queue.logs import announce, configure_logging
 from service.queue.supervisor import Supervisor, alone_in
 from service.settings import Settings, load_settings
-from service.store import audit, credentials, people
-from service.store.credentials import LINK_LIFETIME
+from service.store import audit
 from service.store.engine import Store, open_store
+from service.store.people import credentials, people
+from service.store.people.credentials import LINK_LIFETIME
+from service.store.people.students import DEFAULT_COURSE
 from service.store.states import CredentialKind
-from service.store.students import DEFAULT_COURSE
 from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
 from sim.errors import HostError, RobomarkError, UsageError

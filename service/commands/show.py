@@ -10,11 +10,13 @@ from sqlalchemy.orm import Session
 
 from service.commands.batch.words import remarks
 from service.commands.film_option import FilmOption
+from service.commands.language_option import LanguageOption
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
+from service.language import SOURCE, language_called
 from service.settings import load_settings
-from service.store import batches
-from service.store.batches import JobLine
+from service.store.batches import batches
+from service.store.batches.batches import JobLine
 from service.store.engine import open_store
 from service.store.states import JobState
 from sim.errors import UsageError
@@ -40,6 +42,7 @@ def show(
             f"('{_BEFORE}': the last), or the reference's."
         ),
     ] = None,
+    language: LanguageOption = SOURCE,
     film: FilmOption = None,
     trial: Annotated[
         int | None, typer.Option(help="Which trial the film shows, as the replay numbers them; else its first.")
@@ -58,17 +61,18 @@ def show(
             document(job=line, grade=None)
             tell(_not_graded(line))
             return
-        # A stored grade has its recordings, which take longer to load than to find that there is none.
+        # They take longer to load than to find that there is no grade.
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
-        from service.store import intake, results
+        from service.store.batches import intake
+        from service.store.grades import results
 
         with store.reading() as session:
-            graded = results.load(session, line.id)
+            told = staff_view(results.load_words(session, line.id))
             submission = intake.load_submission(session, line.id)
-        document(job=line, grade=json_document(staff_view(graded), submission))
-        tell(plain_text(staff_view(graded), submission).rstrip("\n"))
+        document(job=line, grade=json_document(told, submission))
+        tell(plain_text(told, submission).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if replay is None and film is None and output is None:
@@ -77,15 +81,18 @@ def show(
         from service.report_files import write_grade_film, write_grade_replay, write_report
         from service.reports.written import file_stem
 
+        with store.reading() as session:
+            graded = results.load(session, line.id)
+        spoken = language_called(language)
         if replay is not None:
-            write_grade_replay(store, line, graded, replay, others)
+            write_grade_replay(store, line, graded, replay, others, spoken)
             note(f"replay: {replay}")
         if film is not None:
             write_grade_film(store, line, graded, film, trial)
             note(f"film: {film}")
         if output is None:
             return
-        written = write_report(store, line, graded, output, file_stem(line.student), others)
+        written = write_report(store, line, graded, output, file_stem(line.student), others, spoken)
         note(f"report: {written.path}")
         for name, data in written.plots.items():
             path = output / f"{line.id}-plot-{name}.png"

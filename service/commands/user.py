@@ -12,11 +12,11 @@ import typer
 
 from service.commands.shown import document, show, table, tell
 from service.settings import Settings, load_settings
-from service.store import audit, credentials, people
-from service.store.credentials import LINK_LIFETIME
+from service.store import audit
 from service.store.engine import now, open_store
+from service.store.people import credentials, people, sign_in_links
+from service.store.people.students import DEFAULT_COURSE, course_of
 from service.store.states import CredentialKind
-from service.store.students import DEFAULT_COURSE, course_of
 from sim.errors import UsageError
 from submissions.people import Student
 
@@ -41,16 +41,9 @@ def add(
         member = make(session, course, Student(who, name, email))
         if operator:
             people.make_operator(session, member.person_id)
-        secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
-        audit.note(
-            session,
-            audit.this_user(),
-            "add",
-            "person",
-            str(member.person_id),
-            role=member.role.value,
-            operator=operator,
-        )
+        actor, told = audit.this_user(), {"role": member.role.value, "operator": operator}
+        audit.note(session, actor, "add", "person", str(member.person_id), **told)
+        secret = sign_in_links.make_link(session, member.person_id, actor)
     _tell_link(settings, member.id, secret)
 
 
@@ -59,8 +52,7 @@ def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
     settings = load_settings()
     with open_store(settings) as store, store.transaction() as session:
         member = people.member(session, course, who)
-        secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
-        audit.note(session, audit.this_user(), "link", "person", str(member.person_id))
+        secret = sign_in_links.make_link(session, member.person_id, audit.this_user())
     _tell_link(settings, member.id, secret)
 
 

@@ -7,8 +7,9 @@ from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
 from service.settings import load_settings
-from service.store import batches, intake, results
+from service.store.batches import batches, intake
 from service.store.engine import open_store
+from service.store.grades import results
 from service.store.installation import secret_of
 from service.store.models import Job
 from service.version import GRADER_VERSION, grader_sha256

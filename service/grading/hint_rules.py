@@ -13,10 +13,14 @@ from dataclasses import replace
 from responders.message_format import IMG_DATA, JSON, PY, kind
 from service.grading.hint_clues import Clues, Listing
 from service.grading.judging.words import quoted
-from sim.recorded import faults_of
+from sim.recorded import faults_of, stood_still
 from sim.recording import Fault, Verdict
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.bundle import meant_as
+from submissions.criteria.line import Follows, Laps
+from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
+from submissions.criteria.path import Visits
+from submissions.criteria.point import Circuits
 from submissions.magics import magic_place
 from submissions.marked_cell import NEARLY_MAGIC
 from submissions.raw_files import shown
@@ -45,6 +49,8 @@ _ADVICE = [
         (r"^TypeError: dump\(\)", "Did you mean json.dumps?"),
     )
 ]
+#: What a robot that stands still has no marks for.
+_DRIVEN = (Circuits, Displacement, Encounters, Excursions, Follows, Laps, Moves, Visits)
 _NO_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
 _NOTHING_RETURNED = "the responder returned NoneType"
 #: What ``image_data`` without a side comes to.
@@ -182,6 +188,13 @@ def _body(listing: Listing, number: int, indent: int) -> Iterator[tuple[int, str
         if text.strip() and len(text) - len(text.lstrip()) <= indent:
             return
         yield place, text
+
+
+def of_stillness(clues: Clues) -> Iterator[str]:
+    """A robot that should drive and never did."""
+    drives = any(isinstance(each, _DRIVEN) for each in clues.lost)
+    if drives and clues.recordings and all(stood_still(each) for each in clues.recordings):
+        yield "the robot never moved; expected the program to switch its motors on"
 
 
 def of_answers(clues: Clues) -> Iterator[str]:

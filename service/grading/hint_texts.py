@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from responders.message_format import kind
 from service.grading.hint_clues import Clues
 from service.grading.judging.words import quoted
 from submissions.criteria import Criterion
@@ -68,6 +69,19 @@ def of_texts(clues: Clues) -> Iterator[str]:
                 at = {"equals": "", "starts_with": " at its start"}.get(each.how, " in it")
                 yield f"{_where(clues, part, near)} {verb} {quoted(near)}; expected {quoted(each.text)}{at}"
                 break
+
+
+def of_unspoken(clues: Clues) -> Iterator[str]:
+    """A text that is printed where it should be said, and nothing is."""
+    wanted = [list(_wanted(each)) for each in clues.lost if isinstance(each, Says)]
+    if clues.spoken or not wanted:
+        return
+    asked = [one for each in wanted for one in each]
+    printed = [text for text in clues.printed if kind(text) == "text"]
+    meant = (text for text in printed if not asked or any(_is_near(each, text) for each in asked))
+    for text in list(meant)[-1:]:
+        where = _where(clues, "program", text)
+        yield f"{where} prints {quoted(text)}, and nothing is said; expected say(...), which prints as well"
 
 
 def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:

@@ -19,8 +19,9 @@ from service.grading.hint_rules import (
     of_missing_files,
     of_printed_answers,
     of_responder_names,
+    of_stillness,
 )
-from service.grading.hint_texts import of_texts
+from service.grading.hint_texts import of_texts, of_unspoken
 from service.grading.judging.bounded import sentences_within
 from service.grading.run_plan import RunPlan
 from submissions.submission import Submission
@@ -54,7 +55,9 @@ def near_misses(clues: Clues) -> tuple[str, ...]:
     """All that the rules find, whatever the marks; what keeps everything else from happening first."""
     explained = _found(_OF_ERRORS, clues)
     errors = () if explained else tuple(of_errors(clues))
-    found = (*of_missing_files(clues), *explained, *_found(_OF_MESSAGES, clues), *errors, *of_texts(clues))
+    still = () if explained or errors else tuple(of_stillness(clues))
+    told = (*_found(_OF_MESSAGES, clues), *errors, *still, *of_texts(clues), *of_unspoken(clues))
+    found = (*of_missing_files(clues), *explained, *told)
     return tuple(dict.fromkeys(found))[:_MOST]
 
 

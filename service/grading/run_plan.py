@@ -24,6 +24,7 @@ from sim.recording import Recording
 from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
 from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
+from submissions.bundle import missing_part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.helper_modules import modules_of
@@ -118,7 +119,7 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
 
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
-    asked, missing = assignment.parts, _missing(submission, assignment)
+    asked, missing = assignment.parts, missing_part(submission, assignment.parts)
     if missing == "program":
         asked = replace(asked, program="none")
     elif missing == "responder":
@@ -147,17 +148,6 @@ def _stand_in(assignment: Assignment) -> ProgramSpec | None:
         return None
     text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
     return _program(Code("questions.py", text), Flags(), {}, assignment)
-
-
-def _missing(submission: Submission, assignment: Assignment) -> Part | None:
-    """The one part of two that was not submitted; with neither there is nothing to grade."""
-    asked = assignment.parts
-    if (asked.program, asked.responder) == ("student", "student"):
-        if submission.program is None and submission.responder is not None:
-            return "program"
-        if submission.responder is None and submission.program is not None:
-            return "responder"
-    return None
 
 
 def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:

@@ -11,10 +11,12 @@ from decimal import Decimal
 from math import sqrt
 from typing import TYPE_CHECKING
 
+from service.grading.endings import ENDED
+from sim.recording import Verdict
+
 if TYPE_CHECKING:
     from service.grading.grade import Grade
 
-_FINISHED = "finished"
 _BINS, _MOST_BINS = 10, 15
 
 
@@ -54,10 +56,11 @@ class CriterionStatistics:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """What cost these students marks."""
+    """What cost these students marks; ``criterion`` is the title of the one that they lost them for, if it is one."""
 
     sentence: str
     students: tuple[str, ...]
+    criterion: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,16 +159,21 @@ def _criterion(own: Sequence[MarkedCriterion]) -> CriterionStatistics:
 
 
 def _causes(found: Sequence[MarkedSubmission]) -> tuple[Cause, ...]:
-    """A submission that ended by a fault lost its marks by that; of any other each criterion counts."""
-    students: dict[str, list[str]] = {}
+    """A submission that ended by a fault lost its marks by that; of any other each criterion counts.
+
+    One that was still running at the end is both: that is no fault by itself.
+    """
+    students: dict[tuple[str, str], list[str]] = {}
     for submission in found:
         if submission.marks >= submission.max_marks:
             continue
-        if submission.verdict != _FINISHED:
-            sentences = [f"ended as {submission.verdict}"]
-        else:
-            sentences = [f"lost marks for: {each.title}" for each in submission.criteria if each.marks < each.max_marks]
-        for sentence in sentences:
-            students.setdefault(sentence, []).append(submission.who)
+        causes = []
+        if submission.verdict != Verdict.FINISHED:
+            causes.append((ENDED[Verdict(submission.verdict)], ""))
+        if submission.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
+            lost = [each.title for each in submission.criteria if each.marks < each.max_marks]
+            causes += [(f"lost marks for: {title}", title) for title in lost]
+        for cause in causes:
+            students.setdefault(cause, []).append(submission.who)
     commonest = sorted(students.items(), key=lambda cause: (-len(cause[1]), cause[0]))
-    return tuple(Cause(sentence, tuple(sorted(who))) for sentence, who in commonest)
+    return tuple(Cause(sentence, tuple(sorted(who)), criterion) for (sentence, criterion), who in commonest)

@@ -17,12 +17,12 @@ from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_n
 from responders.notebook_process import NotebookSpec
 from responders.pair import run_pair
 from responders.repeated_faults import RepeatedFaults
-from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.child_ends import KilledFromOutside
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
-from responders.sandbox.running_child import KilledFromOutside, LibrariesNeeded
-from responders.sandbox.zygote import FULL, Isolation
+from responders.sandbox.processor import one_processor
+from responders.sandbox.running_child import LibrariesNeeded
 from responders.training import Named, TrainingSpec, train_and_name
 from responders.trial import run_trial
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
@@ -45,23 +45,21 @@ AnArena = TypeVar("AnArena", bound=Arena)
 class TrialRunner:
     """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
 
-    ``slots`` are those of the machine's graders; without them there is no other. A ``meter`` counts what one job costs.
-    All student code runs in ``group``, where there is one, which is closed with the runner. Unless it ``spares``
-    children that would only do again what they did before, every child is run.
+    All student code runs in ``sandboxes``, which are closed with the runner. ``slots`` are those of the machine's
+    graders; without them there is no other. A ``meter`` counts what one job costs. Unless it ``spares`` children that
+    would only do again what they did before, every child is run.
     """
 
     def __init__(
         self,
-        isolation: Isolation = FULL,
+        sandboxes: Sandboxes | None = None,
         slots: Slots | None = None,
-        group: ControlGroup | None = None,
         spares: bool = True,
     ) -> None:
         remove_left_overs()
         self._slots = slots
-        self._sandboxes = Sandboxes(isolation, group)
+        self._sandboxes = sandboxes or Sandboxes()
         self._spares = spares
-        self._forgets = isolation.seccomp
         self._cameras = Cameras()
         self._arenas: OrderedDict[tuple[Rectangle, ...], Arena] = OrderedDict()
         self._shared_arenas: OrderedDict[tuple[tuple[Rectangle, ...], str, int], SharedArena] = OrderedDict()
@@ -130,7 +128,7 @@ class TrialRunner:
 
     def check_forgetting(self) -> None:
         """Hidden trials must leave nothing for later ones. Raises HostError where they could; done once in a while."""
-        reason = self._sandboxes.remembers() if self._forgets else None
+        reason = self._sandboxes.remembers() if self._sandboxes.isolation.seccomp else None
         if reason is not None:
             raise HostError(f"a trial could leave something for the next, so nothing hidden is graded here: {reason}")
 
@@ -177,18 +175,18 @@ class TrialRunner:
         before = meter.spent
         try:
             with self._slots.beside_others(meter.heartbeat) if self._slots is not None else nullcontext():
-                return work()
+                return _on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run again, alone: %s", killed)
         meter.give_back(before)
         try:
             with self._alone(meter):
-                return work()
+                return _on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run a last time, alone: %s", killed)
         meter.give_back(before)
         with self._alone(meter), self._sandboxes.blaming():
-            return work()
+            return _on_one_processor(work)
 
     def _alone(self, meter: JobMeter) -> AbstractContextManager[None]:
         return self._slots.alone(meter.heartbeat) if self._slots is not None else nullcontext()
@@ -200,6 +198,11 @@ class TrialRunner:
         """That of robot ``number`` of two of a kind."""
         key, partner = (obstacles, robot.name, number), f"robot {3 - number}"
         return _kept(self._shared_arenas, key, lambda: SharedArena(obstacles, robot, partner))
+
+
+def _on_one_processor(work: Callable[[], Result]) -> Result:
+    with one_processor():
+        return work()
 
 
 def _kept(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable[[], AnArena]) -> AnArena:

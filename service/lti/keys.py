@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from jwt.algorithms import RSAAlgorithm
 from sqlalchemy.orm import Session
 
-from service.store import lti
+from service.store.people import lti
 
 _BITS = 2048
 

@@ -15,7 +15,7 @@ from jwt import PyJWKSet
 from jwt.exceptions import PyJWTError
 
 from service.lti.fetching import fetch
-from service.store.lti import PendingLaunch, Platform
+from service.store.people.lti import PendingLaunch, Platform
 from service.store.states import Role
 from sim.errors import UsageError
 from submissions.people import Student

@@ -6,10 +6,10 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.lti.services import Score, send_scores
-from service.store import lti
 from service.store.engine import Store, now
-from service.store.lti import CourseLink
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
+from service.store.people import lti
+from service.store.people.lti import CourseLink
 from service.store.states import JobState, Standing
 from sim.errors import UsageError
 

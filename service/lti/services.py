@@ -22,7 +22,7 @@ from service.lti.fetching import PlatformError, fetch
 from service.lti.keys import signing_key
 from service.lti.launch import role_of, student_of, tables_in, text_of
 from service.store.engine import Store
-from service.store.lti import CourseLink, Platform
+from service.store.people.lti import CourseLink, Platform
 from service.store.states import Role
 from submissions.people import Student
 

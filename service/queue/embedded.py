@@ -8,9 +8,9 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
+from service.queue.alive import release_dead_workers, worker_lives
 from service.queue.broker import EmbeddedBroker
 from service.queue.supervised import SupervisedWorker
-from service.queue.worker import release_dead_workers, worker_lives
 from service.settings import Settings
 from service.store.engine import Store
 from sim.errors import HostError
@@ -29,12 +29,13 @@ class EmbeddedServices:
 
     def ensure(self) -> None:
         """Start what is not there, or not there any more. Raises HostError when it cannot be started."""
-        self._broker.ensure()
         if self._worker.process.short_lives >= _SHORT_LIVES:
             log = self._worker.process.log
             raise HostError(f"the worker ends as soon as it is started; {log} may tell why")
         if self._worker.process.pid is not None or not worker_lives(self.settings):
             self._worker.ensure()
+        # It is there long before the worker needs it.
+        self._broker.ensure()
 
     def stop(self, grace_seconds: float) -> None:
         """End what was started here; the jobs in flight go back after ``grace_seconds``."""

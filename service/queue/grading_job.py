@@ -18,9 +18,11 @@ from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
 from service.plotting import draw
 from service.settings import Settings
-from service.store import intake, jobs, plots, results
+from service.store.batches import intake
 from service.store.engine import Store
+from service.store.grades import plots, results
 from service.store.installation import secret_of
+from service.store.queue import jobs
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recorded import faults_of
 from sim.recording import Verdict

@@ -32,6 +32,9 @@ def configure_logging(level: str) -> None:
         )
     )
     logging.basicConfig(level=number, handlers=[handler], force=True)
+    logging.captureWarnings(True)
+    # What Celery's pool says of its processes goes to no other logger's handlers.
+    logging.getLogger("multiprocessing").handlers = [handler]
     structlog.configure(
         processors=[*shared, structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
         logger_factory=structlog.stdlib.LoggerFactory(),

@@ -16,10 +16,11 @@ from redis.exceptions import RedisError
 
 from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES, TRYOUT_TASK, TRYOUTS
 from service.settings import Settings
-from service.store import plots, tryouts
 from service.store.engine import Store
-from service.store.jobs import Retry
-from service.store.lease_reaper import forget_notices, note_notices, requeue_lost, wanting_notices
+from service.store.grades import plots
+from service.store.queue import tryouts
+from service.store.queue.jobs import Retry
+from service.store.queue.lease_reaper import forget_notices, note_notices, requeue_lost, wanting_notices
 from service.store.states import Lane
 
 _log = structlog.get_logger(__name__)

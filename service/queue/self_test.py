@@ -1,6 +1,6 @@
 """A process of a worker checks itself: it grades a submission whose recordings' hashes and marks are known.
 
-What follows from a wrong answer is ``service.store.self_tests``'s; this module only asks the question.
+What follows from a wrong answer is ``service.store.queue.self_tests``'s; this module only asks the question.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ import json
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from pathlib import Path
 from threading import Event, Lock, Thread
 
 import structlog
@@ -21,9 +20,9 @@ import structlog
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue.right_answers import RightAnswer
-from service.store import self_tests
+from service.queue.right_answers import QUESTION, RightAnswer
 from service.store.engine import Store
+from service.store.queue import self_tests
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import read_assignment
@@ -31,8 +30,7 @@ from submissions.bundle import read_submission
 from submissions.submission import Submission
 
 _log = structlog.get_logger(__name__)
-FOLDER = Path(__file__).with_name("known_answer")
-_ANSWER = FOLDER / "answer.json"
+_ANSWER = QUESTION / "answer.json"
 #: How long a process that was spared the question at its start may work before it is asked.
 _SOON_SECONDS = 30.0
 #: A trial that ended so was cut by the machine or its load, and says nothing of the simulator.
@@ -59,12 +57,6 @@ def known() -> KnownAnswer:
     """What a worker must find."""
     told = json.loads(_ANSWER.read_text(encoding="utf-8"))
     return KnownAnswer(told["marks"], tuple(told["chains"]))
-
-
-def right_answer(folder: Path) -> RightAnswer:
-    """Where in ``folder`` it stands that the known answer was given rightly."""
-    asked = sorted(file for file in FOLDER.rglob("*") if file.is_file() and file.suffix in (".py", ".toml", ".json"))
-    return RightAnswer(folder, b"".join(file.read_bytes() for file in asked))
 
 
 def ask(runner: TrialRunner) -> KnownAnswer | None:
@@ -123,11 +115,12 @@ class Watch:
             yield
 
     def begin(self) -> None:
-        """Look now; or soon, where this build has answered rightly on this machine not long ago."""
-        if self._right is not None and self._right.given:
-            self._next = time.monotonic() + min(self._every, _SOON_SECONDS)
-        else:
-            self.look()
+        """Look now; or soon, where this build has answered rightly on this machine not long ago, or does now."""
+        with nullcontext() if self._right is None else self._right.alone():
+            if self._right is not None and self._right.given:
+                self._next = time.monotonic() + min(self._every, _SOON_SECONDS)
+            else:
+                self.look()
 
     def look(self) -> SelfTestAnswer:
         """Grade the known answer now, and write down what came of it."""
@@ -185,8 +178,8 @@ class Watch:
 
 @cache
 def _question() -> tuple[Submission, Assignment]:
-    assignment = read_assignment(FOLDER)
-    return read_submission(FOLDER / "submission", asked=assignment.parts), assignment
+    assignment = read_assignment(QUESTION)
+    return read_submission(QUESTION / "submission", asked=assignment.parts), assignment
 
 
 def _start(answer: KnownAnswer, number: int) -> str:

@@ -15,10 +15,10 @@ from types import TracebackType
 from typing import Self
 
 from service.home import open_home
+from service.queue.alive import release_dead_workers
 from service.queue.broker import EmbeddedBroker
 from service.queue.processes import run_file
 from service.queue.supervised import SupervisedProcess, SupervisedWorker, stop_all
-from service.queue.worker import release_dead_workers
 from service.settings import Settings
 from service.store.engine import Store
 from sim.errors import HostError, UsageError

@@ -6,8 +6,8 @@ tasks by their names alone: what does them is loaded in the pool children.
 
 from __future__ import annotations
 
+import gc
 import os
-import socket
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,22 +19,14 @@ from celery import Task, current_app, shared_task, signals
 
 from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK, TRYOUT_TASK
 from service.queue.logs import configure_logging
-from service.queue.notifier import Notifier
 from service.settings import Settings, load_settings
-from service.store.engine import Store, open_store
 
 if TYPE_CHECKING:
     from service.grading.trial_runner import TrialRunner
     from service.queue.self_test import Watch
+    from service.store.engine import Store
 
 _log = structlog.get_logger(__name__)
-#: Set by the worker for its pool children: one name for all of them, so that a dead worker's jobs can be found.
-WORKER_VARIABLE = "ROBOMARK_WORKER_NAME"
-
-
-def worker_name() -> str:
-    """The name of the worker that this process is part of."""
-    return os.environ.get(WORKER_VARIABLE) or f"{socket.gethostname()}:{os.getpid()}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,16 +62,30 @@ class _Children:
     @cached_property
     def child(self) -> PoolChild:
         from responders.sandbox import control_group
+        from responders.sandbox.manager import Sandboxes
         from responders.sandbox.zygote import FULL, NONE
-        from service.grading.slots import Slots
-        from service.grading.trial_runner import TrialRunner
-        from service.queue.self_test import Watch, right_answer
+        from service.queue.right_answers import ANSWERED_BY, right_answer
 
         settings = load_settings()
         unsafe = current_app.conf.get(NO_SANDBOX)
         group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
-        store, runner = open_store(settings), TrialRunner(NONE if unsafe else FULL, Slots(settings.home / "run"), group)
-        right = right_answer(settings.home / "run")
+        sandboxes = Sandboxes(NONE if unsafe else FULL, group)
+        try:
+            # They load what they need while this process does.
+            right = right_answer(settings.home / "run")
+            for role in ANSWERED_BY if right.is_ours_to_ask() else ():
+                sandboxes.begin(role, ())
+            sandboxes.begin("robot", ())
+            from service.grading.slots import Slots
+            from service.grading.trial_runner import TrialRunner
+            from service.queue.alive import worker_name
+            from service.queue.self_test import Watch
+            from service.store.engine import open_store
+
+            store, runner = open_store(settings), TrialRunner(sandboxes, Slots(settings.home / "run"))
+        except BaseException:
+            sandboxes.close()
+            raise
         watch = Watch(store, runner, worker_name(), settings.self_test_seconds, right)
         return PoolChild(settings, store, runner, watch)
 
@@ -96,6 +102,7 @@ _children = _Children()
 @shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
 def grade_notice(task: WarmTask) -> None:
     """Grade the job whose turn it is, then ask for its plots."""
+    from service.queue.alive import worker_name
     from service.queue.grading_job import JobOutcome, grade_next
 
     child = task.child
@@ -103,6 +110,8 @@ def grade_notice(task: WarmTask) -> None:
     with child.watch.busy():
         outcome = grade_next(child.store, child.settings, child.runner, worker_name())
     if outcome is JobOutcome.GRADED:
+        from service.queue.notifier import Notifier
+
         Notifier(task.app, child.store, child.settings).plot()
     elif outcome is JobOutcome.HOST_FAULT:
         # Whatever broke may be something that was kept warm.
@@ -146,15 +155,26 @@ def _begin(**_: object) -> None:
     # When the machine runs out of memory a pool child goes before its parent, as student code does before both.
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("300")
+    # Imports throw nothing away, and to look for garbage is a tenth of what they cost.
+    gc.disable()
     # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
     try:
-        _children.child.runner.check_sandbox()
-        _children.child.watch.begin()
-        _children.child.watch.keep_looking()
+        child = _children.child
+        # A first job would wait for it.
+        from service.queue import grading_job  # noqa: F401
+
+        child.runner.check_sandbox()
+        child.watch.begin()
+        child.watch.keep_looking()
     except Exception:
         _log.exception("pool_child.cold")
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @signals.worker_process_shutdown.connect
-def _end(**_: object) -> None:
+def _end(exitcode: int, **_: object) -> None:
     _children.drop()
+    # Celery would sleep for a second, to be killed by a parent that only waits for its end.
+    os._exit(exitcode)

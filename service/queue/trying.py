@@ -12,10 +12,10 @@ import structlog
 from service.grading.grader import GradingProgress
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
-from service.store import tryouts
+from service.store.courses.versions import assignment_from_bytes
 from service.store.engine import Store
-from service.store.tryouts import TryoutClaim
-from service.store.versions import assignment_from_bytes
+from service.store.queue import tryouts
+from service.store.queue.tryouts import TryoutClaim
 from service.trying import run_tryout, tryout_assignment
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recording import Verdict

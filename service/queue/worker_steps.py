@@ -9,6 +9,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Thread
@@ -17,17 +18,21 @@ from typing import Any
 import structlog
 from celery import Celery, bootsteps
 from celery.worker import state
+from kombu.asynchronous import set_event_loop
 from redis.exceptions import ConnectionError as BrokerGone
+from redis.exceptions import RedisError
 
+from service.queue.broker import broker_client
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import workers
 from service.store.engine import Store
-from service.store.workers import WorkerDescription
+from service.store.queue import workers
+from service.store.queue.workers import WorkerDescription
 
 _log = structlog.get_logger(__name__)
 _ALIVE_SECONDS = 5.0
 _LONGEST_REAP_SECONDS = 5.0
+_UNBLOCK_SECONDS = 1.0
 #: So many times in a row messages waited, this worker had nothing to do, and it took none.
 _DEAF_BEATS = 3
 
@@ -68,8 +73,9 @@ class _Hearing:
 
 
 def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescription, alive: Path) -> None:
-    """Make the workers of this app sweep, and write down in the file and in the database that they live."""
+    """Make the workers of this app reap leases, and write down in the file and in the database that they live."""
     beat = _Beat()
+    app.conf.broker_transport_options["client_name"] = worker.name
     notifier = Notifier(app, store, settings)
     period = min(settings.lease_seconds / 3, _LONGEST_REAP_SECONDS)
 
@@ -89,6 +95,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
         def __init__(self, parent: Any, **options: Any) -> None:
             super().__init__(parent, **options)
             self.beat, self.file, self.hearing = beat, alive, _Hearing(beat)
+            self.broker_url, self.client_name = settings.broker_url, worker.name
 
     app.steps["worker"].add(LeaseReaper)
     app.steps["consumer"].add(Alive)
@@ -132,13 +139,36 @@ class _Beating(bootsteps.StartStopStep):
     beat: _Beat
     file: Path
     hearing: _Hearing
+    broker_url: str
+    client_name: str  # of our connections to the broker
 
     def start(self, parent: Any) -> None:
         self._beat()
         self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, self._beat)
+        # Told to end, the consumer would else notice when it next looks up by itself, after up to a second.
+        self._waking = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        parent.hub.add_reader(self._waking[0], os.read, self._waking[0], 64)
+        signal.set_wakeup_fd(self._waking[1], warn_on_full_buffer=False)
 
     def stop(self, parent: Any) -> None:
         self._timer.cancel()
+        signal.set_wakeup_fd(-1)
+        parent.hub.remove(self._waking[0])
+        for end in self._waking:
+            os.close(end)
+        if state.should_stop is not None and not state.reserved_requests:
+            self._hurry()
+
+    def _hurry(self) -> None:
+        """Do without Celery's waits for what may still come, where nothing was being done."""
+        # The thread in which timers go on until the pool has ended sleeps for half a second.
+        set_event_loop(None)
+        # And the broker is given a second to answer whether there is a message.
+        client = broker_client(self.broker_url, _UNBLOCK_SECONDS)
+        with suppress(RedisError, OSError), client:
+            for each in client.client_list():
+                if each["name"] == self.client_name:
+                    client.client_unblock(int(each["id"]))
 
     def _beat(self) -> None:
         self.beat.at = time.monotonic()

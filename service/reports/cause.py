@@ -7,18 +7,26 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from service.grading.grade import CriterionResult, Evidence, Grade
+from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade
+from service.language import ENGLISH, Language
 from service.reports.faults import SourceLine, excerpt_around, fault_groups, source_called
 from service.reports.readable import one_line, readable
-from service.reports.words import accuracy_counted, grade_words, hints_of, is_ours, verdict_words
+from service.reports.words import (
+    FULL_MARKS,
+    accuracy_counted,
+    grade_words,
+    hints_of,
+    is_ours,
+    trial_words,
+    verdict_words,
+)
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.submission import Submission
 
-FULL_MARKS = "Full marks: everything that was asked for is there."
 _PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
 _QUOTED = re.compile(r'"([^"]{2,})"')
 #: A hint on one text that is nearly what is asked for: found, then expected. Nothing else comes of it.
@@ -53,41 +61,45 @@ def excerpt_lines(diagnosis: Diagnosis) -> list[str]:
     return [f"{'→' if line.marked else ' '} {line.number:>4}  {line.text}".rstrip() for line in lines]
 
 
-def ended(grade: Grade, diagnosis: Diagnosis) -> str:
-    """How it ended and whose doing that is, without what the cause has said."""
-    words = grade_words(grade)
+def ended(grade: Grade, diagnosis: Diagnosis, language: Language = ENGLISH) -> str:
+    """How it ended and whose doing that is, without what the cause, in the same language, has said."""
+    words = grade_words(grade, language)
     return words.whose if words.happened in diagnosis.cause else f"{words.happened} {words.whose}"
 
 
-def diagnose(grade: Grade, submission: Submission | None = None) -> Diagnosis:
+def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:
     """The one cause: what a hint names, else a fault that cost marks, a missing part, what the dearest criterion lacks.
 
     Excerpts need the ``submission``.
     """
-    words = grade_words(grade)
+    words = grade_words(grade, language)
     # What was set by hand is told in the words of whoever set it.
     graded = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
     lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
     if is_ours(grade.verdict):
         return Diagnosis(words.happened, words.next_step)
     if grade.criteria and grade.marks >= grade.max_marks:
-        return Diagnosis(FULL_MARKS, "Nothing is left to do.")
+        return Diagnosis(language.say(FULL_MARKS), language.say("Nothing is left to do."))
     hints = hints_of(grade)
     if hints:
-        return _of_hint(grade, hints, lost, submission)
+        return _of_hint(grade, hints, lost, submission, language)
     fault = _costly_fault(grade, lost)
     # A program that waits for an answer which nobody gives runs until the time is up.
     waited_in_vain = bool(grade.missing) and fault is not None and fault.verdict is Verdict.TIME_LIMIT
     if fault is not None and not waited_in_vain:
-        return _of_fault(grade, fault, lost, submission)
+        return _of_fault(grade, fault, lost, submission, language)
     if grade.missing:
         concerned = (index for index, each in lost.items() if grade.missing in each.message)
         return Diagnosis(words.happened, words.next_step, lost=frozenset(concerned))
-    return _of_criterion(grade, lost) if lost else Diagnosis(words.happened, words.next_step)
+    return _of_criterion(grade, lost, language) if lost else Diagnosis(words.happened, words.next_step)
 
 
 def _of_hint(
-    grade: Grade, hints: tuple[str, ...], lost: dict[int, CriterionResult], submission: Submission | None
+    grade: Grade,
+    hints: tuple[str, ...],
+    lost: dict[int, CriterionResult],
+    submission: Submission | None,
+    language: Language,
 ) -> Diagnosis:
     hint = hints[0]
     fault = next((each for each in _faults(grade) if readable(each.message, 200).rstrip(".") in hint), None)
@@ -100,70 +112,102 @@ def _of_hint(
         with_it = frozenset(index for index, each in lost.items() if not each.marks)
     place = _PLACE.match(hint)
     if place is None:
-        words = grade_words(grade)
-        step = words.next_step if words.tone == "bad" else "Mend that first, and submit it again."
+        words = grade_words(grade, language)
+        step = words.next_step if words.tone == "bad" else language.say("Mend that first, and submit it again.")
         return Diagnosis(hint, step, hints[1:], lost=with_it)
     line, name = int(place[1]), place[2]
-    step = f"Mend what line {line} of {name} needs, run it once in the simulator, and submit it again."
+    step = language.say(
+        "Mend what line %(line)s of %(file)s needs, run it once in the simulator, and submit it again.",
+        line=line,
+        file=name,
+    )
     return Diagnosis(hint, step, hints[1:], _excerpt(submission, name, line), lost=with_it)
 
 
-def _of_fault(grade: Grade, fault: Fault, lost: dict[int, CriterionResult], submission: Submission | None) -> Diagnosis:
-    step = grade_words(grade).next_step
+def _of_fault(
+    grade: Grade,
+    fault: Fault,
+    lost: dict[int, CriterionResult],
+    submission: Submission | None,
+    language: Language,
+) -> Diagnosis:
+    step = grade_words(grade, language).next_step
     if fault.verdict is Verdict.TIME_LIMIT:
-        words = verdict_words(fault.verdict)
+        words = verdict_words(fault.verdict, language)
         return Diagnosis(words.happened, words.next_step, lost=_lost_by(grade, fault, lost))
-    group = next(each for each in fault_groups(grade, submission) if each.message == readable(fault.message, 600))
+    groups = fault_groups(grade, submission, language=language)
+    group = next(each for each in groups if each.message == readable(fault.message, 600))
     hint = f" {group.hint}" if group.hint else ""
     cause = f"{group.where}: {group.message.rstrip('.')}.{hint}"
     excerpt = Excerpt(group.where, group.excerpt) if group.excerpt else None
     return Diagnosis(cause, step, excerpt=excerpt, lost=_lost_by(grade, fault, lost))
 
 
-def _of_criterion(grade: Grade, lost: dict[int, CriterionResult]) -> Diagnosis:
+def _of_criterion(grade: Grade, lost: dict[int, CriterionResult], language: Language) -> Diagnosis:
     main = max(lost, key=lambda index: lost[index].max_marks - lost[index].marks)
     result = lost[main]
     with_it = {index for index, each in lost.items() if _alike(grade, result, each)}
-    step = grade_words(grade).next_step
-    return Diagnosis(found(grade, result) + _practised(grade, result), step, lost=frozenset({main, *with_it}))
+    step = grade_words(grade, language).next_step
+    cause = found(grade, result, language) + _practised(grade, result, language)
+    return Diagnosis(cause, step, lost=frozenset({main, *with_it}))
 
 
-def _practised(grade: Grade, result: CriterionResult) -> str:
+def _practised(grade: Grade, result: CriterionResult, language: Language) -> str:
     """What is to be seen in practice, where nothing may be told of what is marked."""
     if _failed(result):
         return ""
     seen = (each for each in grade.criteria if not each.max_marks and _failed(each))
-    return next((f" In practice: {found(grade, each)}" for each in seen), "")
+    told = (found(grade, each, language) for each in seen)
+    return next((" " + language.say("In practice: %(found)s", found=each) for each in told), "")
 
 
 def _failed(result: CriterionResult) -> list[Evidence]:
     return [each for each in result.evidence if not each.passed]
 
 
-def found(grade: Grade, result: CriterionResult) -> str:
+def found(grade: Grade, result: CriterionResult, language: Language = ENGLISH) -> str:
     """What a criterion found instead of what it asked for, in a sentence or two."""
     if result.set_by_hand is not None:
         return readable(result.message, 1000, lines=12)
     accuracy = result.accuracy
     wrong = _confused(result)
     if accuracy is not None and wrong:
-        right, of = accuracy_counted(accuracy)
-        taken = [f"“{one_line(truth, 60)}” was taken for “{one_line(answer, 60)}”" for truth, answer in wrong[:2]]
-        others = ", among others" if len(wrong) > len(taken) else ""
-        return f"{right} of {accuracy.n} {of} were named rightly: {' and '.join(taken)}{others}."
+        return _confused_words(accuracy, wrong, language)
     failed = next((each for each in _failed(result) if each.message), None)
     if failed is None:
         return readable(result.message, 600, lines=6)
     told = readable(failed.message, 600, lines=6)
-    return told if failed.t is None else f"{told.rstrip('.')}, at {failed.t:.2f} s.{_where(grade, failed)}"
+    if failed.t is None:
+        return told
+    at = language.say("%(found)s, at %(seconds)s s.", found=told.rstrip("."), seconds=f"{failed.t:.2f}")
+    return at + _where(grade, failed, language)
 
 
-def _where(grade: Grade, evidence: Evidence) -> str:
+def _confused_words(accuracy: Accuracy, wrong: Sequence[tuple[str, str]], language: Language) -> str:
+    right, of = accuracy_counted(accuracy, language)
+    taken = [
+        language.say("“%(truth)s” was taken for “%(answer)s”", truth=one_line(truth, 60), answer=one_line(answer, 60))
+        for truth, answer in wrong[:2]
+    ]
+    examples = language.say(" and ").join(taken)
+    if len(wrong) > len(taken):
+        examples = language.say("%(examples)s, among others", examples=examples)
+    return language.say(
+        "%(right)s of %(all)s %(of)s were named rightly: %(examples)s.",
+        right=right,
+        all=accuracy.n,
+        of=of,
+        examples=examples,
+    )
+
+
+def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
     if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
     trial = grade.trials[evidence.trial]
     several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
-    return f" That was in {one_line(trial.scenario, 60)}{f', trial {trial.index + 1}' if several else ''}."
+    where = trial_words(trial, language) if several else one_line(trial.scenario, 60)
+    return " " + language.say("That was in %(where)s.", where=where)
 
 
 def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:

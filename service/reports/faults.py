@@ -12,7 +12,9 @@ from types import MappingProxyType
 
 from responders.code import Code
 from service.grading.grade import Grade
+from service.language import ENGLISH, Language, translatable
 from service.reports.readable import one_line, readable
+from service.reports.words import trial_words
 from sim.errors import UsageError
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
@@ -23,12 +25,12 @@ from submissions.submission import PART_FILES, Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {
-        "program": "Robot program",
-        "second program": "Program of the second robot",
-        "responder": "Responder",
-        "bridge": "Bridge",
-        "host": "Grading machine",
-        "assignment": "Assignment",
+        "program": translatable("Robot program"),
+        "second program": translatable("Program of the second robot"),
+        "responder": translatable("Responder"),
+        "bridge": translatable("Bridge"),
+        "host": translatable("Grading machine"),
+        "assignment": translatable("Assignment"),
     }
 )
 
@@ -61,32 +63,52 @@ def faults_beside(cause: str, grade: Grade, submission: Submission | None = None
         yield (group.where if told else f"{group.where}: {group.message}"), group
 
 
-def fault_groups(grade: Grade, submission: Submission | None = None, limit: int = 12) -> tuple[FaultGroup, ...]:
+def fault_groups(
+    grade: Grade, submission: Submission | None = None, limit: int = 12, language: Language = ENGLISH
+) -> tuple[FaultGroup, ...]:
     """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
     found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
         for fault in faults_of(trial.recording):
             found.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
-    return tuple(_group(grade, places, submission) for places in list(found.values())[:limit])
+    return tuple(_group(grade, places, submission, language) for places in list(found.values())[:limit])
 
 
-def _group(grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None) -> FaultGroup:
+def place_words(fault: Fault, language: Language = ENGLISH) -> str:
+    """Where in the student's own text it was: ``cell 7, line 3``, ``line 3 of helper.py``; empty if nobody knows."""
+    within = [fault.agent] if fault.agent else []
+    within += [language.say("cell %(number)s", number=fault.cell)] if fault.cell is not None else []
+    if fault.line is not None and fault.file:
+        within.append(language.say("line %(number)s of %(file)s", number=fault.line, file=fault.file))
+    elif fault.line is not None:
+        within.append(language.say("line %(number)s", number=fault.line))
+    return ", ".join(within)
+
+
+def _group(
+    grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None, language: Language
+) -> FaultGroup:
     index, fault = places[0]
     source = _source(fault, submission)
-    where = f"Agent {fault.agent}" if fault.agent else _WHERE[fault.who]
+    where = language.say("Agent %(name)s", name=fault.agent) if fault.agent else language.say(_WHERE[fault.who])
     if source is not None and not fault.file:
         where += f" ({one_line(source.name, 60)})"
-    place = replace(fault, agent="").place
+    place = place_words(replace(fault, agent=""), language)
     if place:
         where += f", {place}"
-    trial = grade.trials[index]
-    first = f"at {fault.t:.2f} s in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
-    trials = len({trial_index for trial_index, _ in places})
-    often = (
-        first if len(places) == 1 else f"{len(places)} times in {trials} of {len(grade.trials)} trials, first {first}"
+    first = language.say(
+        "at %(seconds)s s in %(trial)s", seconds=f"{fault.t:.2f}", trial=trial_words(grade.trials[index], language)
     )
+    often = language.say(
+        "%(times)s times in %(trials)s of %(all)s trials, first %(first)s",
+        times=len(places),
+        trials=len({trial_index for trial_index, _ in places}),
+        all=len(grade.trials),
+        first=first,
+    )
+    how_often = first if len(places) == 1 else often
     excerpt = () if source is None or fault.line is None else excerpt_around(source, fault.line)
-    return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), often, excerpt)
+    return FaultGroup(fault.verdict, where, readable(fault.message, 600), readable(fault.hint, 600), how_often, excerpt)
 
 
 def _source(fault: Fault, submission: Submission | None) -> Code | None:

@@ -23,10 +23,12 @@ from markupsafe import Markup, escape
 
 from service.grading.grade import Grade
 from service.grading.ranks import RankTable
+from service.language import ENGLISH, Language
 from service.reports.page import page_of
-from service.reports.plots.style import DPI
+from service.reports.plots.plot import DPI
 from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
+from service.reports.replay.words import replay_words
 from service.reports.rows import TableRow
 from service.reports.view import NO_OTHERS, OtherTrials, View
 from service.reports.words import verdict_words
@@ -108,12 +110,21 @@ def report_parts(
     images = {name: ShownImage(_data_uri(data), *_shown_size(data)) for name, data in plots.items()}
     replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
     played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
-    body = _environment().get_template("report_body.html")
+    body = _environment(view.language).get_template("report_body.html")
     told = body.render(
-        page=page_of(view, submission, played), images=images, replay=_written_out(replay) if replay else ""
+        page=page_of(view, submission, played),
+        images=images,
+        replay=_written_out(replay) if replay else "",
+        words=replay_words(view.language),
     )
     title = f"{view.grade.assignment_title}: {view.grade.student}"
     return ReportParts(title, Markup(told), report_style(), report_script())
+
+
+def prepare() -> None:
+    """Load what the reports of a batch are rendered with, in English, for whoever has to wait for their grades."""
+    for template in ("report.html", "report_body.html", "batch.html"):
+        _environment(ENGLISH).get_template(template)
 
 
 def report_style() -> str:
@@ -140,19 +151,19 @@ def report(
     """The page of one grade: its parts in one file."""
     parts = report_parts(view, plots, submission, own_floors, others)
     script = parts.script if view.grade.trials else ""
-    return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body})
+    return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language)
 
 
-def replay_page(replay: Mapping[str, Any]) -> str:
-    """A page with nothing but a replay."""
-    context = {"title": replay["title"], "replay": _written_out(replay)}
-    return _render("replay.html", report_style(), report_script(), context)
+def replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) -> str:
+    """A page with nothing but a replay, whose document is in the same language."""
+    context = {"title": replay["title"], "replay": _written_out(replay), "words": replay_words(language)}
+    return _render("replay.html", report_style(), report_script(), context, language)
 
 
-def replay_section(document: bytes) -> Markup:
+def replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
     """A replay, ``packed``, as a part of a page that has the style and the script of reports."""
     written = Markup(base64.b64encode(document).decode("ascii"))
-    return Markup(_environment().get_template("replay_section.html").render(replay=written))
+    return render_part("replay_section.html", language, replay=written, words=replay_words(language))
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
@@ -189,30 +200,35 @@ def batch_index(
     return render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
 
 
+def render_part(template: str, language: Language, **context: object) -> Markup:
+    """A part of a page that has the style of reports."""
+    return Markup(_environment(language).get_template(template).render(**context))
+
+
 def render(template: str, **context: object) -> str:
-    """A page of ``templates``, with the one style and a policy that lets it load and run nothing."""
-    return _render(template, _style("report.css"), "", context)
+    """A page of ``templates`` in English, with the one style and a policy that lets it load and run nothing."""
+    return _render(template, _style("report.css"), "", context, ENGLISH)
 
 
 def _written_out(replay: Mapping[str, Any]) -> Markup:
     return Markup(base64.b64encode(packed(replay)).decode("ascii"))
 
 
-def _render(template: str, style: str, script: str, context: Mapping[str, object]) -> str:
+def _render(template: str, style: str, script: str, context: Mapping[str, object], language: Language) -> str:
     policy = f"default-src 'none'; img-src data:; style-src {_digest(style)}; base-uri 'none'; form-action 'none'"
     if script:
         policy += f"; script-src {_digest(script)}"
-    page = _environment().get_template(template)
-    return page.render(style=Markup(style), script=Markup(script), policy=policy, **context)
+    page = _environment(language).get_template(template)
+    return page.render(style=Markup(style), script=Markup(script), policy=policy, language=language.code, **context)
 
 
 def _digest(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    return Environment(
+@lru_cache(maxsize=16)
+def _environment(language: Language) -> Environment:
+    environment = Environment(
         loader=PackageLoader("service.reports"),
         autoescape=True,
         finalize=_shown,
@@ -220,6 +236,9 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    # A sentence with its parts is text like any other: spelled out and escaped as a whole.
+    environment.globals["_"] = language.say
+    return environment
 
 
 @lru_cache(maxsize=2)

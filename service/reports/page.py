@@ -11,29 +11,31 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
+from service.language import ENGLISH, Language, translatable
 from service.reports.cause import Diagnosis, diagnose, ended, found
-from service.reports.crossing import befell_in_full
+from service.reports.crossing import befell_in_full, note_words
 from service.reports.faults import FaultGroup, fault_groups
 from service.reports.plots.drawn import plots_of, same_answers
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot
 from service.reports.plots.sequence import MOST_CALL_STEPS, Step, inside
-from service.reports.plots.style import turned
 from service.reports.plots.talk import talk_words, talks
-from service.reports.readable import message_words, number, one_line, readable
+from service.reports.readable import message_words, number, one_line, readable, turned
 from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
 from service.reports.replay.trial import loss_moment, moment_hash
-from service.reports.robots import messages_of, robots_of
+from service.reports.robots import called, messages_of, robots_of
 from service.reports.view import View, scenarios, worst_trial
 from service.reports.words import (
+    KINDS,
     VerdictWords,
     channel_words,
     comments_of,
     cost_words,
     grade_words,
+    trial_words,
     verdict_words,
 )
-from sim.recorded import stood_still
+from sim.recorded import printed_alone, stood_still
 from sim.recording import Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in
 from submissions.submission import Submission
@@ -41,7 +43,7 @@ from submissions.submission import Submission
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
 _MOST_TRIALS = 250
-_STOOD_STILL = "the robot stood still, so neither its path nor its sensors are drawn"
+_STOOD_STILL = translatable("the robot stood still, so neither its path nor its sensors are drawn")
 PROCESS_LIMITS = "process limits only"
 
 
@@ -58,7 +60,7 @@ class CriterionLine:
     marks: str
     max_marks: str
     share: float
-    state: str  # full, part, none
+    state: str  # full, part, none, excused
     visibility: str
     where: str
     moment: str  # a link to where the replay shows it, and what it says; empty if it does not
@@ -68,22 +70,27 @@ class CriterionLine:
 
 @dataclass(frozen=True, slots=True)
 class TimelineEntry:
-    """One moment of a timeline; ``t`` is empty for a line that says how many were left out."""
+    """One moment of a timeline; ``t`` is empty for a line that says how many were left out. ``what`` says its kind."""
 
     t: str
     kind: str
+    what: str
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class MessageLine:
-    """One row of the messages table; ``kind`` is ``wrong``, or ``inner`` for what a responder asked of others."""
+    """One row of the messages table; ``kind`` is ``wrong``, or ``inner`` for what a responder asked of others.
+
+    ``lost`` is what never arrived.
+    """
 
     t: str
     sender: str
     text: str
     arrived: str
     kind: str
+    lost: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,13 +173,13 @@ class Page:
 
 def page_of(view: View, submission: Submission | None = None, played: frozenset[int] = frozenset()) -> Page:
     """Everything a report says of what the reader may see; ``played`` are the trials of its replay, from 1."""
-    grade = view.grade
-    plots = plots_of(grade)
-    lines = tuple(_trial_line(trial) for trial in grade.trials[:_MOST_TRIALS])
-    faults = fault_groups(grade, submission)
-    diagnosis = diagnose(grade, submission)
+    grade, language = view.grade, view.language
+    plots = plots_of(grade, language)
+    lines = tuple(_trial_line(trial, language) for trial in grade.trials[:_MOST_TRIALS])
+    faults = fault_groups(grade, submission, language=language)
+    diagnosis = diagnose(grade, submission, language)
     criteria = tuple(
-        _criterion_line(grade, result, played, told=index in diagnosis.lost)
+        _criterion_line(grade, result, played, language, told=index in diagnosis.lost)
         for index, result in enumerate(grade.criteria)
     )
     time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
@@ -182,45 +189,45 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         max_marks=number(grade.max_marks),
         share=_share(float(grade.marks), float(grade.max_marks)),
         state=_state(grade.marks, grade.max_marks),
-        words=grade_words(grade),
-        ended=ended(grade, diagnosis),
+        words=grade_words(grade, language),
+        ended=ended(grade, diagnosis, language),
         diagnosis=diagnosis,
         comments=comments_of(grade),
         criteria=criteria,
         lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
         others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
-        faults_title="How it ended" if time_alone else "What went wrong",
-        recognition=tuple(_seen(grade, alike, plots) for alike in same_answers(grade)),
-        scenes=tuple(_scene(grade, scenario, plots) for scenario in scenarios(grade)),
-        diagrams=own_diagrams(grade, diagrams_in(submission.notebook).cells) if submission is not None else (),
+        faults_title=language.say("How it ended") if time_alone else language.say("What went wrong"),
+        recognition=tuple(_seen(grade, alike, plots, language) for alike in same_answers(grade)),
+        scenes=tuple(_scene(grade, scenario, plots, language) for scenario in scenarios(grade)),
+        diagrams=() if submission is None else own_diagrams(grade, diagrams_in(submission.notebook).cells, language),
         trials=lines,
         more_trials=len(grade.trials) - len(lines),
         notes=tuple(readable(note, 400) for note in grade.notes[:20]),
-        channel=channel_words(grade),
-        cost=cost_words(grade),
+        channel=channel_words(grade, language),
+        cost=cost_words(grade, language),
         weak_sandbox=PROCESS_LIMITS in grade.sandbox,
         staff=view.staff,
         withheld=view.withheld,
     )
 
 
-def timeline(recording: Recording) -> tuple[TimelineEntry, ...]:
+def timeline(recording: Recording, language: Language = ENGLISH) -> tuple[TimelineEntry, ...]:
     """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
     moments: list[tuple[float, str, str]] = []
     for robot, own in robots_of(recording):
-        whose = "" if own is recording else f"{robot}: "
-        moments += [(line.t, "printed", whose + line.text) for line in own.printed]
+        whose = "" if own is recording else f"{called(robot, language)}: "
+        moments += [(line.t, "printed", whose + line.text) for line in printed_alone(own)]
         moments += [(line.t, "said", whose + line.text) for line in own.spoken]
         moments += [(touch.t, "touched", whose + touch.what) for touch in own.touches]
         moments += [(fault.t, _kind(fault), whose + fault.message) for fault in own.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
+    entries = [_entry(t, kind, text, language) for t, kind, text in moments]
     if omitted <= 1:
-        return tuple(_entry(*moment) for moment in moments)
-    first, last = moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:]
-    gap = TimelineEntry("", "", f"{omitted:,} more entries are not shown")
-    return (*(_entry(*moment) for moment in first), gap, *(_entry(*moment) for moment in last))
+        return tuple(entries)
+    gap = language.say("%(count)s more entries are not shown", count=language.whole(omitted))
+    return (*entries[:_TIMELINE_FIRST], TimelineEntry("", "", "", gap), *entries[-_TIMELINE_LAST:])
 
 
 def _kind(fault: Fault) -> str:
@@ -228,124 +235,137 @@ def _kind(fault: Fault) -> str:
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
-def _criterion_line(grade: Grade, result: CriterionResult, played: frozenset[int], *, told: bool) -> CriterionLine:
+def _criterion_line(
+    grade: Grade, result: CriterionResult, played: frozenset[int], language: Language, *, told: bool
+) -> CriterionLine:
     full = result.marks >= result.max_marks
+    excused = result.set_by_hand is not None and result.set_by_hand.excused
     missed = [item for item in result.evidence if not item.passed]
     failed = next(iter(missed), None)
     watched = next((item for item in missed if item.trial + 1 in played), None) if not full else None
     seconds = loss_moment(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
     return CriterionLine(
         title=one_line(result.title, 200),
-        told="" if told or (full and result.set_by_hand is None) else found(grade, result),
+        told="" if told or (full and result.set_by_hand is None) else found(grade, result, language),
         message=readable(result.message, 1000, lines=12),
         marks=number(result.marks),
         max_marks=number(result.max_marks),
         share=_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
-        state=_state(result.marks, result.max_marks),
+        state="excused" if excused else _state(result.marks, result.max_marks),
         visibility=result.visibility,
-        where="" if full or failed is None else _where(grade, failed),
+        where="" if full or failed is None else _where(grade, failed, language),
         moment="" if watched is None else moment_hash(watched.trial + 1, seconds),
-        watch=f"Watch it at {seconds:.2f} s",
+        watch="" if watched is None else _watch(grade, watched.trial, seconds, language),
         for_staff=readable(result.for_staff, 1000, lines=4),
     )
+
+
+def _watch(grade: Grade, trial: int, seconds: float, language: Language) -> str:
+    if len(grade.trials) == 1:
+        return language.say("Watch it at %(seconds)s s", seconds=f"{seconds:.2f}")
+    return language.say("Watch trial %(trial)s at %(seconds)s s", trial=trial + 1, seconds=f"{seconds:.2f}")
 
 
 def _state(marks: Decimal, max_marks: Decimal) -> str:
     return "full" if marks >= max_marks else ("part" if marks > 0 else "none")
 
 
-def _where(grade: Grade, evidence: Evidence) -> str:
+def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
     if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
-    trial = grade.trials[evidence.trial]
-    return f"First missed in {one_line(trial.scenario, 60)}, trial {trial.index + 1}"
+    return language.say("First missed in %(trial)s", trial=trial_words(grade.trials[evidence.trial], language))
 
 
-def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...]) -> Scene:
+def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language: Language) -> Scene:
     index = worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
-    lines = tuple(_message_lines(recording))
+    lines = tuple(_message_lines(recording, language))
     several = len(grade.trials) > 1
     return Scene(
-        where=f": {one_line(scenario, 80)}, trial {trial.index + 1}" if several else "",
+        where=f": {trial_words(trial, language, 80)}" if several else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
-        timeline=timeline(recording),
+        timeline=timeline(recording, language),
         messages=lines[:_MOST_MESSAGES],
         more_messages=max(0, len(lines) - _MOST_MESSAGES),
-        talk=talk_words(talks(recording)),
-        outputs=tuple(each for each in _outputs(recording) if each.text),
+        talk=talk_words(talks(recording), language),
+        outputs=tuple(each for each in _outputs(recording, language) if each.text),
         notes=(
-            *((_STOOD_STILL,) if stood_still(recording) else ()),
+            *((language.say(_STOOD_STILL),) if stood_still(recording) else ()),
             *(readable(note, 400) for note in recording.notes[:10] if note not in grade.notes),
         ),
     )
 
 
-def _outputs(recording: Recording) -> Iterator[TextOutput]:
-    yield TextOutput("What your responder printed", readable(recording.responder_output, 4000))
-    yield TextOutput("What your responder wrote to logger.txt", readable(recording.responder_log, 4000))
+def _outputs(recording: Recording, language: Language) -> Iterator[TextOutput]:
+    say = language.say
+    yield TextOutput(say("What your responder printed"), readable(recording.responder_output, 4000))
+    yield TextOutput(say("What your responder wrote to logger.txt"), readable(recording.responder_log, 4000))
     for each in recording.agent_outputs:
-        yield TextOutput(f"What the agent {each.agent} printed", readable(each.printed, 4000))
-        yield TextOutput(f"What the agent {each.agent} wrote to logger.txt", readable(each.log, 4000))
+        yield TextOutput(say("What the agent %(name)s printed", name=each.agent), readable(each.printed, 4000))
+        yield TextOutput(say("What the agent %(name)s wrote to logger.txt", name=each.agent), readable(each.log, 4000))
 
 
-def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...]) -> Seen:
+def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...], language: Language) -> Seen:
     results = [grade.criteria[index] for index in alike]
-    tables = tuple(recognition_table(result) for result in results if result.accuracy is not None)
+    tables = tuple(recognition_table(result, language) for result in results if result.accuracy is not None)
     return Seen(
-        " and ".join(f"“{one_line(result.title, 80)}”" for result in results),
+        language.say(" and ").join(f"“{one_line(result.title, 80)}”" for result in results),
         tables,
         tables[0].classes if tables else (),
         tuple(plot for plot in plots if not plot.scenario and plot.subject in alike),
     )
 
 
-def _message_lines(recording: Recording) -> Iterator[MessageLine]:
+def _message_lines(recording: Recording, language: Language) -> Iterator[MessageLine]:
     """Each message of the robot's is followed by what was called and what agents said until it was answered.
 
     Two robots have no agents, so the index of a message among those told is its index in the recording.
     """
-    yield from map(_inner_line, inside(recording, -1))
-    for index, (sender, message) in enumerate(messages_of(recording)):
-        arrived = "never" if message.delivered is None else f"{message.delivered:.2f} s"
-        happened = befell_in_full(message)
+    yield from (_inner_line(step, language) for step in inside(recording, -1))
+    for index, (sender, message) in enumerate(messages_of(recording, language)):
+        lost = message.delivered is None
+        arrived = language.say("never") if message.delivered is None else f"{message.delivered:.2f} s"
+        happened = befell_in_full(message, language)
         if happened:
             arrived += f" ({happened})"
-        kind = "wrong" if message.delivered is None or happened else ""
-        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, kind)
+        kind = "wrong" if lost or happened else ""
+        yield MessageLine(f"{message.t:.2f}", sender, message_words(message.text, 240), arrived, kind, lost)
         if recording.partner is None:
-            yield from map(_inner_line, itertools.islice(inside(recording, index), MOST_CALL_STEPS))
+            steps = itertools.islice(inside(recording, index), MOST_CALL_STEPS)
+            yield from (_inner_line(step, language) for step in steps)
 
 
-def _inner_line(step: Step) -> MessageLine:
+def _inner_line(step: Step, language: Language) -> MessageLine:
     t = "" if step.t is None else f"{step.t:.2f}"
-    note = f"({step.note})" if step.note else ""
-    return MessageLine(t, f"{step.source} → {step.target}", step.label, note, "wrong" if step.note else "inner")
+    way = f"{called(step.source, language)} → {called(step.target, language)}"
+    note = f"({note_words(step.note, language)})" if step.note else ""
+    return MessageLine(t, way, step.label, note, "wrong" if step.note else "inner")
 
 
-def _trial_line(trial: TrialResult) -> TrialLine:
+def _trial_line(trial: TrialResult, language: Language) -> TrialLine:
     start = trial.recording.start
     return TrialLine(
         scenario=one_line(trial.scenario, 60),
         index=trial.index + 1,
         start=f"{start.x:.0f}, {start.y:.0f}, {turned(start.heading)}°",
-        noise=f"{trial.light_noise:g} / {trial.motor_noise:g}{_channel_words(trial)}",
+        noise=f"{trial.light_noise:g} / {trial.motor_noise:g}{_channel_words(trial, language)}",
         seed=str(trial.seed),
         seconds=f"{trial.recording.end_t:.2f}",
-        words=verdict_words(trial.verdict),
+        words=verdict_words(trial.verdict, language),
         sha256=trial.recording.sha256[:12],
         visibility=trial.visibility,
     )
 
 
-def _channel_words(trial: TrialResult) -> str:
+def _channel_words(trial: TrialResult, language: Language) -> str:
     """What the channel was swept to; offsets and noise have columns of their own."""
-    return "".join(f"; {condition} {level:g}" for condition, level in trial.sweep if condition in ("loss", "delay"))
+    words = {"loss": language.say("loss"), "delay": language.say("delay")}
+    return "".join(f"; {words[condition]} {level:g}" for condition, level in trial.sweep if condition in words)
 
 
-def _entry(t: float, kind: str, text: str) -> TimelineEntry:
-    return TimelineEntry(f"{t:.2f}", kind, readable(text, 400, lines=8))
+def _entry(t: float, kind: str, text: str, language: Language) -> TimelineEntry:
+    return TimelineEntry(f"{t:.2f}", kind, language.say(KINDS[kind]), readable(text, 400, lines=8))
 
 
 def _share(part: float, whole: float) -> float:

@@ -5,6 +5,7 @@ It does not escape for HTML, XML or a terminal's markup; whoever writes those fo
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from decimal import Decimal
@@ -50,6 +51,16 @@ def message_words(text: str, limit: int = 120) -> str:
     if text.startswith("IMG_DATA::{") and len(text) > 200:
         return "IMG_DATA::{left, right}"
     return one_line(text, limit)
+
+
+def whole(value: float) -> str:
+    """``value`` without decimals, with a true minus sign and never as minus nought."""
+    return str(round(value)).replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
+
+
+def turned(heading: float) -> str:
+    """A heading as whole degrees from 0 to 359, however often the robot has turned round."""
+    return str(round(heading) % 360) if math.isfinite(heading) else "?"
 
 
 def number(value: Decimal) -> str:

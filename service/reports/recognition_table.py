@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.grading.grade import CriterionResult
+from service.grading.grade import Accuracy, CriterionResult
 from service.grading.judging.per_class import class_scores
+from service.language import ENGLISH, Language
 from service.reports.readable import one_line
+from service.reports.words import accuracy_counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +37,22 @@ class RecognitionTable:
     classes: tuple[ClassLine, ...]
 
 
-def recognition_table(result: CriterionResult) -> RecognitionTable:
+def recognition_table(result: CriterionResult, language: Language = ENGLISH) -> RecognitionTable:
     """The figures of a criterion that measured an accuracy."""
     accuracy = result.accuracy
     assert accuracy is not None
-    of = accuracy.counts.of if accuracy.counts is not None else "images"
     return RecognitionTable(
         title=one_line(result.title, 200),
-        accuracy=f"Accuracy {accuracy.value:.3f}, 95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
-        f"n = {accuracy.n} {of}.",
-        sums=_sums(result),
-        confidence=_confidence(result),
+        accuracy=language.say(
+            "Accuracy %(value)s, 95 %% interval %(low)s to %(high)s, n = %(n)s %(of)s.",
+            value=f"{accuracy.value:.3f}",
+            low=f"{accuracy.low:.3f}",
+            high=f"{accuracy.high:.3f}",
+            n=accuracy.n,
+            of=accuracy_counted(accuracy, language)[1],
+        ),
+        sums=_sums(accuracy, language),
+        confidence=_confidence(accuracy, language),
         classes=tuple(
             ClassLine(
                 one_line(score.label, 60),
@@ -61,28 +68,42 @@ def recognition_table(result: CriterionResult) -> RecognitionTable:
     )
 
 
-def _sums(result: CriterionResult) -> str:
-    counts = result.accuracy.counts if result.accuracy is not None else None
+def _sums(accuracy: Accuracy, language: Language) -> str:
+    counts = accuracy.counts
     if counts is None:
         return ""
-    missing = f", and {counts.missing} that were missing, each a wrong answer" if counts.missing else ""
-    return (
-        f"Images sent: {counts.sent} = {counts.answered} answered + {counts.late} late + {counts.malformed} "
-        f"malformed + {counts.unanswered} unanswered; duplicate answers: {counts.duplicates}. "
-        f"Counted: {counts.counted} {counts.of}{missing}."
+    sent = language.say(
+        "Images sent: %(sent)s = %(answered)s answered + %(late)s late + %(malformed)s malformed + "
+        "%(unanswered)s unanswered; duplicate answers: %(duplicates)s.",
+        sent=counts.sent,
+        answered=counts.answered,
+        late=counts.late,
+        malformed=counts.malformed,
+        unanswered=counts.unanswered,
+        duplicates=counts.duplicates,
     )
+    of = accuracy_counted(accuracy, language)[1]
+    counted = language.say("Counted: %(counted)s %(of)s.", counted=counts.counted, of=of)
+    if counts.missing:
+        counted = language.say(
+            "Counted: %(counted)s %(of)s, and %(missing)s that were missing, each a wrong answer.",
+            counted=counts.counted,
+            of=of,
+            missing=counts.missing,
+        )
+    return f"{sent} {counted}"
 
 
-def _confidence(result: CriterionResult) -> str:
-    found = result.accuracy.confidence if result.accuracy is not None else None
+def _confidence(accuracy: Accuracy, language: Language) -> str:
+    found = accuracy.confidence
     if found is None:
         return ""
-    means = [
-        f"{mean:.2f} when {how} (n = {count})"
-        for mean, count, how in ((found.right, found.n_right, "right"), (found.wrong, found.n_wrong, "wrong"))
-        if mean is not None
-    ]
-    return f"Mean confidence {' and '.join(means)}."
+    means = []
+    if found.right is not None:
+        means.append(language.say("%(mean)s when right (n = %(n)s)", mean=f"{found.right:.2f}", n=found.n_right))
+    if found.wrong is not None:
+        means.append(language.say("%(mean)s when wrong (n = %(n)s)", mean=f"{found.wrong:.2f}", n=found.n_wrong))
+    return language.say("Mean confidence %(means)s.", means=language.say(" and ").join(means))
 
 
 def _share(value: float | None) -> str:

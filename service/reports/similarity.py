@@ -5,18 +5,26 @@ What is alike was decided before; who may see it is ``view.py``'s. What students
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import zip_longest
+from types import MappingProxyType
 from typing import Any
 
-from service.reports.html import render
+from markupsafe import Markup
+
+from service.language import ENGLISH, Language, translatable
+from service.reports.html import render, render_part
 from service.reports.readable import one_line
 from service.reports.view import SimilarityView
-from service.similarity.behaviour import SameInTrial
+from service.similarity.behaviour import Aspect, SameInTrial
 from service.similarity.pairs import Similarity, SimilarPair
 from service.similarity.writing import FEWEST_TOKENS, AlikeSources, Stretch
 
+#: In which two students did the same.
+_ASPECTS: Mapping[Aspect, str] = MappingProxyType(
+    {"path": translatable("path"), "messages": translatable("messages"), "faults": translatable("faults")}
+)
 #: Gives the text of a source by assignment, student and file.
 Texts = Callable[[str, str, str], str]
 
@@ -24,22 +32,36 @@ Texts = Callable[[str, str, str], str]
 _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 
 
-def what_it_says(found: Similarity) -> str:
+def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
     """One sentence on an assignment: how many pairs, and of what nothing can be said."""
-    pairs = "1 pair is" if len(found.pairs) == 1 else f"{len(found.pairs) or 'no'} pairs are"
-    said = f"{found.assignment}: {pairs} alike among {found.students} students"
+    parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
+    said = language.say("%(assignment)s: no pairs are alike among %(students)s students", **parts)
+    if found.pairs:
+        said = language.counted(
+            "%(assignment)s: %(count)s pair is alike among %(students)s students",
+            "%(assignment)s: %(count)s pairs are alike among %(students)s students",
+            len(found.pairs),
+            **parts,
+        )
     if found.too_short:
-        who = "1 has" if len(found.too_short) == 1 else f"{len(found.too_short)} have"
-        said += f"; {who} too little code of their own to compare (under {FEWEST_TOKENS} tokens)"
+        said += "; " + language.counted(
+            "%(count)s has too little code of their own to compare (under %(tokens)s tokens)",
+            "%(count)s have too little code of their own to compare (under %(tokens)s tokens)",
+            len(found.too_short),
+            tokens=FEWEST_TOKENS,
+        )
     if found.not_compared:
-        said += f"; {found.not_compared} pairs that have less in common were too many to compare"
+        said += "; " + language.say(
+            "%(count)s pairs that have less in common were too many to compare", count=found.not_compared
+        )
     return said
 
 
-def similarity_rows(found: Similarity) -> list[tuple[str, ...]]:
+def similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
     """Both students, how much of a source is alike, where, and in how many trials both did the same."""
     return [
-        (*pair.students, f"{pair.share:.0%}" if pair.sources else "", _where(pair), _same(pair)) for pair in found.pairs
+        (*pair.students, f"{pair.share:.0%}" if pair.sources else "", _where(pair, language), _same(pair, language))
+        for pair in found.pairs
     ]
 
 
@@ -53,41 +75,57 @@ def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
 
 def similarity_page(view: SimilarityView, texts: Texts, title: str, most: int) -> str:
     """A page with the first ``most`` pairs of each assignment."""
-    assignments = [
+    return render("similarity.html", title=title, assignments=_assignments(view, texts, most), links={})
+
+
+def similarity_body(view: SimilarityView, texts: Texts, most: int, links: Mapping[tuple[str, str], str]) -> Markup:
+    """The same as a part of another page, with ``links`` by assignment and student."""
+    return render_part("similarity_body.html", view.language, assignments=_assignments(view, texts, most), links=links)
+
+
+def _assignments(view: SimilarityView, texts: Texts, most: int) -> list[dict[str, object]]:
+    return [
         {
-            "words": what_it_says(found),
-            "rows": similarity_rows(found)[:most],
+            "name": found.assignment,
+            "words": what_it_says(found, view.language),
+            "same": found.same,
+            "rows": similarity_rows(found, view.language)[:most],
             "more": len(found.pairs) - most,
-            "pairs": [_pair(found.assignment, pair, texts) for pair in found.pairs[:most]],
+            "pairs": [_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:most]],
         }
         for found in view.found
     ]
-    return render("similarity.html", title=title, assignments=assignments)
 
 
-def _where(pair: SimilarPair) -> str:
-    return "; ".join(" and ".join(dict.fromkeys(each.files)) for each in pair.sources)
+def _where(pair: SimilarPair, language: Language) -> str:
+    return "; ".join(language.say(" and ").join(dict.fromkeys(each.files)) for each in pair.sources)
 
 
-def _same(pair: SimilarPair) -> str:
+def _same(pair: SimilarPair, language: Language) -> str:
     trials = {same.trial for same in pair.trials}
-    return "" if not trials else "1 trial" if len(trials) == 1 else f"{len(trials)} trials"
+    return language.counted("%(count)s trial", "%(count)s trials", len(trials)) if trials else ""
 
 
-def _pair(assignment: str, pair: SimilarPair, texts: Texts) -> dict[str, object]:
+def _pair(assignment: str, pair: SimilarPair, texts: Texts, language: Language) -> dict[str, object]:
     return {
         "students": pair.students,
-        "sources": [_source(assignment, each, texts) for each in pair.sources],
-        "trials": [_trial(same) for same in pair.trials],
+        "sources": [_source(assignment, each, texts, language) for each in pair.sources],
+        "trials": [_trial(same, language) for same in pair.trials],
     }
 
 
-def _source(assignment: str, alike: AlikeSources, texts: Texts) -> dict[str, object]:
+def _source(assignment: str, alike: AlikeSources, texts: Texts, language: Language) -> dict[str, object]:
     both = [
         texts(assignment, student, file).split("\n") for student, file in zip(alike.students, alike.files, strict=True)
     ]
     heads = [
-        f"{student}: {file}, {share:.0%} of {own} tokens"
+        language.say(
+            "%(student)s: %(file)s, %(share)s of %(tokens)s tokens",
+            student=student,
+            file=file,
+            share=f"{share:.0%}",
+            tokens=own,
+        )
         for student, file, share, own in zip(alike.students, alike.files, alike.shares, alike.own_tokens, strict=True)
     ]
     in_order = sorted(alike.stretches[:_MOST_STRETCHES], key=lambda stretch: stretch.lines)
@@ -119,6 +157,8 @@ def _depth(line: str) -> int:
     return (len(start) - len(start.lstrip())) // 4
 
 
-def _trial(same: SameInTrial) -> tuple[str, ...]:
-    chance = "with noise" if same.trial.noisy else "without noise"
-    return (f"{same.trial.scenario} {same.trial.index + 1}", chance, same.aspect, f"{same.sharing} of {same.students}")
+def _trial(same: SameInTrial, language: Language) -> tuple[str, ...]:
+    say = language.say
+    chance = say("with noise") if same.trial.noisy else say("without noise")
+    sharing = say("%(sharing)s of %(students)s", sharing=same.sharing, students=same.students)
+    return f"{same.trial.scenario} {same.trial.index + 1}", chance, say(_ASPECTS[same.aspect]), sharing

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
 from service.grading.judging.words import shown_words
+from service.language import ENGLISH, Language
 from service.reports.words import by_hand_words
 from sim.errors import UsageError
 from sim.recording import Verdict
@@ -29,11 +30,15 @@ _HUNDREDTH = Decimal("0.01")
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A grade as one reader may see it: ``grade`` is what is left of it, ``withheld`` says that it is not all."""
+    """A grade as one reader may see it, and in which language they read of it.
+
+    ``grade`` is what is left of it, ``withheld`` says that it is not all.
+    """
 
     grade: Grade
     staff: bool
     withheld: bool
+    language: Language = ENGLISH
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +78,25 @@ class SimilarityView:
     """What is alike in a batch, as staff may see it; a student has no view of it, and no grade has anything of it."""
 
     found: tuple[Similarity, ...]
+    language: Language = ENGLISH
 
 
 #: Where no trial lies over another.
 NO_OTHERS = OtherTrials("", MappingProxyType({}))
 
 
-def staff_similarity(found: Sequence[Similarity]) -> SimilarityView:
+def staff_similarity(found: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
     """All of it."""
-    return SimilarityView(tuple(found))
+    return SimilarityView(tuple(found), language)
 
 
-def staff_view(grade: Grade) -> View:
+def staff_view(grade: Grade, language: Language = ENGLISH) -> View:
     """All of it."""
-    told = tuple(_with_by_hand(result) for result in grade.criteria)
-    return View(replace(grade, criteria=told), staff=True, withheld=False)
+    told = tuple(_with_by_hand(result, language) for result in grade.criteria)
+    return View(replace(grade, criteria=told), staff=True, withheld=False, language=language)
 
 
-def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) -> View:
+def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, language: Language = ENGLISH) -> View:
     """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
 
     A comment on a criterion is seen with that, one on all of the submission with whatever is seen of it.
@@ -105,7 +111,7 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
     left = replace(
         grade,
         criteria=tuple(
-            _with_by_hand(replace(_without_hidden_trials(result, new_index), for_staff="", unjudged=""))
+            _with_by_hand(replace(_without_hidden_trials(result, new_index), for_staff="", unjudged=""), language)
             for result in grade.criteria
             if result.id in shown
         ),
@@ -114,7 +120,7 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION) ->
         comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
     )
     withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
-    return View(left, staff=False, withheld=withheld)
+    return View(left, staff=False, withheld=withheld, language=language)
 
 
 def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OtherTrials:
@@ -196,8 +202,8 @@ def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
     return replace(view.grade.criteria[0], evidence=(), predictions=())
 
 
-def _with_by_hand(result: CriterionResult) -> CriterionResult:
-    words = by_hand_words(result)
+def _with_by_hand(result: CriterionResult, language: Language) -> CriterionResult:
+    words = by_hand_words(result, language)
     return replace(result, message=" ".join(filter(None, (words, result.message)))) if words else result
 
 

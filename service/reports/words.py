@@ -11,10 +11,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
-from service.grading.grade import Accuracy, CriterionResult, Grade
+from service.grading.endings import ENDED
+from service.grading.grade import Accuracy, CriterionResult, Grade, TrialResult
+from service.language import ENGLISH, Language, translatable
 from service.reports.readable import number, one_line, readable
 from sim.recording import LossReason, Verdict
 
+FULL_MARKS = translatable("Full marks: everything that was asked for is there.")
 Tone = Literal["good", "notice", "bad"]
 _MEGABYTE = 1 << 20
 
@@ -33,88 +36,106 @@ class VerdictWords:
 _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
     {
         Verdict.FINISHED: VerdictWords(
-            "finished",
-            "Your program ran to its end without an error.",
-            "Nothing stopped it.",
-            "Compare what each criterion asked for with what your robot did.",
+            ENDED[Verdict.FINISHED],
+            translatable("Your program ran to its end without an error."),
+            translatable("Nothing stopped it."),
+            translatable("Compare what each criterion asked for with what your robot did."),
             "good",
         ),
         Verdict.PROGRAM_ERROR: VerdictWords(
-            "error in the robot program",
-            "Your robot program stopped with an error before it was done.",
-            "The error is in your robot program.",
-            "Go to the line named below, mend it, and run the program once in the simulator before submitting it.",
+            ENDED[Verdict.PROGRAM_ERROR],
+            translatable("Your robot program stopped with an error before it was done."),
+            translatable("The error is in your robot program."),
+            translatable(
+                "Go to the line named below, mend it, and run the program once in the simulator before submitting it."
+            ),
             "bad",
         ),
         Verdict.RESPONDER_ERROR: VerdictWords(
-            "error in the responder",
-            "Your responder raised an error, so the robot got no answer to that message.",
-            "The error is in your responder, or in a function that it calls.",
-            "Call the responder yourself with the message shown below and mend the line that is named.",
+            ENDED[Verdict.RESPONDER_ERROR],
+            translatable("Your responder raised an error, so the robot got no answer to that message."),
+            translatable("The error is in your responder, or in a function that it calls."),
+            translatable("Call the responder yourself with the message shown below and mend the line that is named."),
             "bad",
         ),
         Verdict.PROTOCOL_ERROR: VerdictWords(
-            "answer could not be read",
-            "Your responder answered, but not in a form that the robot can read.",
-            "The answer that your responder returns is at fault.",
-            "Return a string; one that starts with JSON:: must go on with valid JSON, as json.dumps makes it.",
+            ENDED[Verdict.PROTOCOL_ERROR],
+            translatable("Your responder answered, but not in a form that the robot can read."),
+            translatable("The answer that your responder returns is at fault."),
+            translatable(
+                "Return a string; one that starts with JSON:: must go on with valid JSON, as json.dumps makes it."
+            ),
             "bad",
         ),
         Verdict.TIME_LIMIT: VerdictWords(
-            "still running at the end",
-            "Your program was still running when the simulated time was up.",
-            "That is no fault by itself: a line follower, for one, may run for ever.",
-            "If the program was meant to end, check what its loops wait for, and whether that ever happens.",
+            ENDED[Verdict.TIME_LIMIT],
+            translatable("Your program was still running when the simulated time was up."),
+            translatable(
+                "That is no fault where a program may run for ever, as a line follower may; "
+                "where it was to end, it is one."
+            ),
+            translatable(
+                "If the program was meant to end, check what its loops wait for, and whether that ever happens."
+            ),
             "notice",
         ),
         Verdict.CPU_LIMIT: VerdictWords(
-            "computed for too long",
-            "Your code computed for so long without waiting that it was stopped.",
-            "A loop never ends, or never waits, so that the robot's world cannot move; or a calculation is too long.",
-            "Check when the loop in the line below ends. In a robot program, put a sensor reading or a short "
-            "time.sleep inside it; in a responder, make the calculation smaller.",
+            ENDED[Verdict.CPU_LIMIT],
+            translatable("Your code computed for so long without waiting that it was stopped."),
+            translatable(
+                "A loop never ends, or never waits, so that the robot's world cannot move; "
+                "or a calculation is too long."
+            ),
+            translatable(
+                "Check when the loop in the line below ends. In a robot program, put a sensor reading or a short "
+                "time.sleep inside it; in a responder, make the calculation smaller."
+            ),
             "bad",
         ),
         Verdict.MEMORY_LIMIT: VerdictWords(
-            "used too much memory",
-            "Your code asked for more memory than it may use, and was stopped.",
-            "Something in your code keeps growing.",
-            "Look for a list or a string that grows on every turn of a loop and is never emptied.",
+            ENDED[Verdict.MEMORY_LIMIT],
+            translatable("Your code asked for more memory than it may use, and was stopped."),
+            translatable("Something in your code keeps growing."),
+            translatable("Look for a list or a string that grows on every turn of a loop and is never emptied."),
             "bad",
         ),
         Verdict.OUTPUT_LIMIT: VerdictWords(
-            "printed too much",
-            "Your code printed more than may be recorded, and was stopped.",
-            "A loop in your code prints on every turn.",
-            "Print only when something changes, or put a short time.sleep inside the loop.",
+            ENDED[Verdict.OUTPUT_LIMIT],
+            translatable("Your code printed more than may be recorded, and was stopped."),
+            translatable("A loop in your code prints on every turn."),
+            translatable("Print only when something changes, or put a short time.sleep inside the loop."),
             "bad",
         ),
         Verdict.STALLED: VerdictWords(
-            "stopped responding",
-            "Your code fell silent: it neither computed nor asked the robot for anything, and was stopped.",
-            "Your code waits for something that never comes.",
-            "Look for a call that waits for a person, a file or another program; none of these exist here.",
+            ENDED[Verdict.STALLED],
+            translatable(
+                "Your code fell silent: it neither computed nor asked the robot for anything, and was stopped."
+            ),
+            translatable("Your code waits for something that never comes."),
+            translatable(
+                "Look for a call that waits for a person, a file or another program; none of these exist here."
+            ),
             "bad",
         ),
         Verdict.SANDBOX_VIOLATION: VerdictWords(
-            "did something not allowed",
-            "Your code tried something that graded code may not do, and was stopped.",
-            "The attempt came from your code or from a module that it imports.",
-            "Use no network, no other programs, and no files outside your own folder.",
+            ENDED[Verdict.SANDBOX_VIOLATION],
+            translatable("Your code tried something that graded code may not do, and was stopped."),
+            translatable("The attempt came from your code or from a module that it imports."),
+            translatable("Use no network, no other programs, and no files outside your own folder."),
             "bad",
         ),
         Verdict.ASSIGNMENT_ERROR: VerdictWords(
-            "assignment is broken",
-            "The assignment itself has a mistake, so your work could not be marked fairly.",
-            "This is not your fault: the instructor has to mend the assignment.",
-            "You need not do anything but tell your instructor; your work can be graded again.",
+            ENDED[Verdict.ASSIGNMENT_ERROR],
+            translatable("The assignment itself has a mistake, so your work could not be marked fairly."),
+            translatable("This is not your fault: the instructor has to mend the assignment."),
+            translatable("You need not do anything but tell your instructor; your work can be graded again."),
             "notice",
         ),
         Verdict.HOST_ERROR: VerdictWords(
-            "grading failed",
-            "The machine that grades your work failed before it was done.",
-            "This is not your fault, and it does not count as an attempt.",
-            "You need not do anything; the grading can be run again.",
+            ENDED[Verdict.HOST_ERROR],
+            translatable("The machine that grades your work failed before it was done."),
+            translatable("This is not your fault, and it does not count as an attempt."),
+            translatable("You need not do anything; the grading can be run again."),
             "notice",
         ),
     }
@@ -123,25 +144,34 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
 
 _LOSSES: Mapping[LossReason, str] = MappingProxyType(
     {
-        "chance": "by chance",
-        "out of range": "because the robot was out of range",
-        "facing away": "because it faced away",
-        "blocked": "because a wall or an obstacle stood between",
+        "chance": translatable("by chance"),
+        "out of range": translatable("because the robot was out of range"),
+        "facing away": translatable("because it faced away"),
+        "blocked": translatable("because a wall or an obstacle stood between"),
     }
 )
 
 
-def verdict_words(verdict: Verdict) -> VerdictWords:
+#: What an accuracy is of.
+_COUNTED: Mapping[str, str] = MappingProxyType({"images": translatable("images"), "patterns": translatable("patterns")})
+
+
+def verdict_words(verdict: Verdict, language: Language = ENGLISH) -> VerdictWords:
     """The words for ``verdict``; every verdict has some."""
-    return _WORDS[verdict]
+    return _said(_WORDS[verdict], language)
+
+
+def _said(words: VerdictWords, language: Language) -> VerdictWords:
+    say = language.say
+    return VerdictWords(say(words.short), say(words.happened), say(words.whose), say(words.next_step), words.tone)
 
 
 #: Where no robot was run: only functions were called and texts were read.
 _NO_ROBOT = VerdictWords(
-    "code checked",
-    "Your functions were called and your code was read; no robot was run.",
-    "What came of it is told at each criterion.",
-    "Call the function yourself with the values that are named there.",
+    translatable("code checked"),
+    translatable("Your functions were called and your code was read; no robot was run."),
+    translatable("What came of it is told at each criterion."),
+    translatable("Call the function yourself with the values that are named there."),
     "good",
 )
 
@@ -150,17 +180,19 @@ _NO_ROBOT = VerdictWords(
 _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     {
         "robot.py": VerdictWords(
-            "no robot.py",
-            "There is no robot.py, so only your responder was graded, by itself.",
-            "The marks that need a robot program are missing for that alone.",
-            "Submit robot.py beside responder.py; if it is there, check its name.",
+            translatable("no robot.py"),
+            translatable("There is no robot.py, so only your responder was graded, by itself."),
+            translatable("The marks that need a robot program are missing for that alone."),
+            translatable("Submit robot.py beside responder.py; if it is there, check its name."),
             "bad",
         ),
         "responder.py": VerdictWords(
-            "no responder.py",
-            "There is no responder.py, so nothing answered your robot program, which was graded by itself.",
-            "The marks that need a responder are missing for that alone.",
-            "Submit responder.py beside robot.py; if it is there, check its name.",
+            translatable("no responder.py"),
+            translatable(
+                "There is no responder.py, so nothing answered your robot program, which was graded by itself."
+            ),
+            translatable("The marks that need a responder are missing for that alone."),
+            translatable("Submit responder.py beside robot.py; if it is there, check its name."),
             "bad",
         ),
     }
@@ -168,21 +200,23 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
 
 #: Where an agent of the responder's failed.
 _AGENT_ERROR = VerdictWords(
-    "error in an agent",
-    "An agent of yours raised an error, so whoever asked it got no answer.",
-    "The error is in the agent that is named below, or in a function that it calls.",
-    "Call the agent's function yourself with the message that it was sent, and mend the line that is named.",
+    translatable("error in an agent"),
+    translatable("An agent of yours raised an error, so whoever asked it got no answer."),
+    translatable("The error is in the agent that is named below, or in a function that it calls."),
+    translatable(
+        "Call the agent's function yourself with the message that it was sent, and mend the line that is named."
+    ),
     "bad",
 )
 
 
-def grade_words(grade: Grade) -> VerdictWords:
+def grade_words(grade: Grade, language: Language = ENGLISH) -> VerdictWords:
     """The words for a grade's verdict, for what was not submitted, or that nothing was run; and what to do next."""
-    words = _what_happened(grade)
-    return replace(words, next_step=_next_step(grade, words))
+    words = _what_happened(grade, language)
+    return replace(words, next_step=_next_step(grade, words, language))
 
 
-def _next_step(grade: Grade, words: VerdictWords) -> str:
+def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
     """The verdict's advice if something went wrong, else what would gain most marks, if any are missing."""
     if words.tone == "bad" or is_ours(grade.verdict):
         return words.next_step
@@ -190,31 +224,53 @@ def _next_step(grade: Grade, words: VerdictWords) -> str:
     if lost is None:
         return words.next_step
     if lost.marks >= lost.max_marks:
-        return "Full marks: everything that was asked for is there."
-    missing, of = number(lost.max_marks - lost.marks), number(lost.max_marks)
-    most = f"Most marks are missing at “{one_line(lost.title, 100)}”: {missing} of {of}."
+        return language.say(FULL_MARKS)
+    most = language.say(
+        "Most marks are missing at “%(criterion)s”: %(missing)s of %(of)s.",
+        criterion=one_line(lost.title, 100),
+        missing=number(lost.max_marks - lost.marks),
+        of=number(lost.max_marks),
+    )
     return f"{most} {words.next_step}"
 
 
-def _what_happened(grade: Grade) -> VerdictWords:
+def _what_happened(grade: Grade, language: Language) -> VerdictWords:
     if not grade.missing:
-        return _ended(grade) if grade.trials else _NO_ROBOT
-    words = _WITHOUT[grade.missing]
+        return _said(_ended(grade) if grade.trials else _NO_ROBOT, language)
+    words = _said(_WITHOUT[grade.missing], language)
     if grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
         return words
-    ended = _ended(grade)
+    ended = _said(_ended(grade), language)
     return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
 
 
 def _ended(grade: Grade) -> VerdictWords:
     if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
         return _AGENT_ERROR
-    return verdict_words(grade.verdict)
+    return _WORDS[grade.verdict]
 
 
 def _is_of_an_agent(grade: Grade) -> bool:
     faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
     return bool(faults and faults[0].agent)
+
+
+#: What can happen in a trial.
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "printed": translatable("printed"),
+        "said": translatable("said"),
+        "touched": translatable("touched"),
+        "stopped": translatable("stopped"),
+        "fault": translatable("fault"),
+    }
+)
+
+
+def trial_words(trial: TrialResult, language: Language = ENGLISH, longest: int = 60) -> str:
+    """Which trial it is: of which scenario, and its number there."""
+    scenario = one_line(trial.scenario, longest)
+    return language.say("%(scenario)s, trial %(number)s", scenario=scenario, number=trial.index + 1)
 
 
 def hints_of(grade: Grade) -> tuple[str, ...]:
@@ -230,23 +286,33 @@ def is_ours(verdict: Verdict) -> bool:
     return verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 
 
-def accuracy_counted(accuracy: Accuracy) -> tuple[int, str]:
+def accuracy_counted(accuracy: Accuracy, language: Language = ENGLISH) -> tuple[int, str]:
     """How many were named rightly, and what is counted."""
-    return round(accuracy.value * accuracy.n), accuracy.counts.of if accuracy.counts else "images"
+    of = accuracy.counts.of if accuracy.counts else "images"
+    return round(accuracy.value * accuracy.n), language.say(_COUNTED.get(of, "%(of)s"), of=of)
 
 
-def by_hand_words(result: CriterionResult) -> str:
+def by_hand_words(result: CriterionResult, language: Language = ENGLISH) -> str:
     """What an instructor set in place of the grader's marks, and why; empty where nobody did."""
     said = result.set_by_hand
     if said is None:
         return ""
     reason = one_line(said.reason, 500)
     reason += "" if reason.endswith((".", "!", "?", "…")) else "."
+    marks = number(result.marks)
+    if said.excused and said.graded is None:
+        return language.say("Excused, so that it does not count: %(reason)s", reason=reason)
+    if said.graded is None:
+        return language.say("Set by hand to %(marks)s: %(reason)s", marks=marks, reason=reason)
+    had = number(said.graded)
     if said.excused:
-        had = "" if said.graded is None else f" (it had {number(said.graded)} of {number(said.worth)})"
-        return f"Excused, so that it does not count{had}: {reason}"
-    was = "" if said.graded is None else f" from {number(said.graded)}"
-    return f"Set by hand{was} to {number(result.marks)}: {reason}"
+        return language.say(
+            "Excused, so that it does not count (it had %(had)s of %(worth)s): %(reason)s",
+            had=had,
+            worth=number(said.worth),
+            reason=reason,
+        )
+    return language.say("Set by hand from %(had)s to %(marks)s: %(reason)s", had=had, marks=marks, reason=reason)
 
 
 def comments_of(grade: Grade) -> tuple[str, ...]:
@@ -267,29 +333,44 @@ def accuracy_words(grade: Grade) -> str:
     )
 
 
-def channel_words(grade: Grade) -> str:
+def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
     """A sentence or two on what the channel lost in all trials, and why; empty where it lost nothing."""
     messages = [message for trial in grade.trials for message in trial.recording.messages]
     lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
     if not lost:
         return ""
-    reasons = ", ".join(f"{lost[reason]} {words}" for reason, words in _LOSSES.items() if lost[reason])
-    fair = " What was lost by chance is held against nobody." if lost["chance"] else ""
-    return f"The channel lost {lost.total()} of {len(messages)} messages: {reasons}.{fair}"
+    reasons = ", ".join(f"{lost[reason]} {language.say(words)}" for reason, words in _LOSSES.items() if lost[reason])
+    told = language.say(
+        "The channel lost %(lost)s of %(sent)s messages: %(reasons)s.",
+        lost=lost.total(),
+        sent=len(messages),
+        reasons=reasons,
+    )
+    fair = language.say("What was lost by chance is held against nobody.")
+    return f"{told} {fair}" if lost["chance"] else told
 
 
-def cost_words(grade: Grade) -> str:
+def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
     """One sentence with what all trials cost together, or may cost where that is not told; empty if nobody knows."""
     if grade.cost is None:
         return ""
     limits, spent = grade.cost.limits, grade.cost.spent
+    most = {
+        "most_cpu": f"{limits.cpu_seconds:g}",
+        "most_sleep": f"{limits.sleep_seconds:g}",
+        "most_output": limits.kept_bytes >> 20,
+    }
     if spent is None:
-        return (
-            f"All trials together may use {limits.cpu_seconds:g} s of CPU, {limits.sleep_seconds:g} s of sleep and "
-            f"{limits.kept_bytes >> 20} MB of output."
+        return language.say(
+            "All trials together may use %(most_cpu)s s of CPU, %(most_sleep)s s of sleep and "
+            "%(most_output)s MB of output.",
+            **most,
         )
-    return (
-        f"Used {round(spent.cpu_seconds, 1):g} of {limits.cpu_seconds:g} s of CPU, "
-        f"{round(spent.sleep_seconds, 1):g} of {limits.sleep_seconds:g} s of sleep, "
-        f"{round(spent.kept_bytes / _MEGABYTE, 1):g} of {limits.kept_bytes >> 20} MB of output."
+    return language.say(
+        "Used %(cpu)s of %(most_cpu)s s of CPU, %(sleep)s of %(most_sleep)s s of sleep, "
+        "%(output)s of %(most_output)s MB of output.",
+        cpu=f"{round(spent.cpu_seconds, 1):g}",
+        sleep=f"{round(spent.sleep_seconds, 1):g}",
+        output=f"{round(spent.kept_bytes / _MEGABYTE, 1):g}",
+        **most,
     )

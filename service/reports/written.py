@@ -1,4 +1,7 @@
-"""Reports as files in a folder: one HTML page a submission. Making the page is ``html.py``'s."""
+"""Reports as files in a folder: one HTML page a submission. Making the page is ``html.py``'s.
+
+What makes and draws them is loaded when something is written: a folder is prepared before there is anything.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +13,18 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from service.grading.grade import Grade, TrialResult
 from service.home import for_the_user
-from service.reports.film import film
-from service.reports.html import replay_page, report
-from service.reports.plots.drawn import draw_all
-from service.reports.view import student_view
+from service.language import ENGLISH, Language
 from sim.errors import UsageError
-from submissions.diagram_cells import diagrams_in
-from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from service.grading.grade import Grade, TrialResult
+    from submissions.submission import Submission
 
 #: Of a name, in a file's name; a file system allows 255 for all of it.
 _MOST_BYTES = 80
@@ -78,14 +79,18 @@ def write_page(folder: Path, name: str, page: str) -> Path:
     return write_file(folder, name, page.encode())
 
 
-def write_replay(path: Path, replay: Mapping[str, Any]) -> None:
+def write_replay(path: Path, replay: Mapping[str, Any], language: Language = ENGLISH) -> None:
     """Write the page that plays it, or its data as JSON if the file is called so. Raises UsageError if it cannot be."""
-    page = json.dumps(replay, allow_nan=False) if path.suffix.lower() == ".json" else replay_page(replay)
+    from service.reports.html import replay_page
+
+    page = json.dumps(replay, allow_nan=False) if path.suffix.lower() == ".json" else replay_page(replay, language)
     write_file(path.parent, path.name, page.encode())
 
 
 def write_film(path: Path, trial: TrialResult, own_floors: Mapping[str, NDArray[np.uint8]]) -> None:
     """Write a film of the trial. Raises UsageError if it cannot be written."""
+    from service.reports.film import film
+
     write_file(path.parent, path.name, film(trial, own_floors))
 
 
@@ -101,8 +106,13 @@ def write_file(folder: Path, name: str, data: bytes) -> Path:
     return path
 
 
-def write_report(folder: Path, grade: Grade, submission: Submission, written: str) -> Path:
+def write_report(folder: Path, grade: Grade, submission: Submission, written: str, language: Language) -> Path:
     """Draw the plots of a grade and write the report, called after the student as the name was written; where it is."""
+    from service.reports.html import report
+    from service.reports.plots.drawn import draw_all
+    from service.reports.view import student_view
+    from submissions.diagram_cells import diagrams_in
+
     plots = draw_all(grade, cells=diagrams_in(submission.notebook).cells)
-    page = report(student_view(grade), plots, submission)
+    page = report(student_view(grade, language=language), plots, submission)
     return write_page(folder, f"{file_stem(written)}.html", page)

@@ -39,6 +39,7 @@ class Similarity:
     pairs: tuple[SimilarPair, ...]
     too_short: tuple[str, ...]  # who has too little of their own for anything to be said of it
     not_compared: int = 0  # pairs of sources that were too many to compare
+    same: tuple[tuple[str, ...], ...] = ()  # groups who have a whole file in common, however many they are
 
 
 def similarity(
@@ -55,7 +56,7 @@ def similarity(
     pairs = [SimilarPair(pair, tuple(alike.get(pair, ())), same.get(pair, ())) for pair in {*alike, *often}]
     pairs.sort(key=lambda pair: (-pair.share, -len(pair.trials), pair.students))
     students = {source.student for source in sources} | set(behaviours)
-    return Similarity(assignment, len(students), tuple(pairs), writing.too_short, writing.not_compared)
+    return Similarity(assignment, len(students), tuple(pairs), writing.too_short, writing.not_compared, writing.same)
 
 
 def _often(same: Sequence[SameInTrial], trials: Iterable[int]) -> bool:

@@ -22,6 +22,8 @@ ALIKE = 0.6
 FEWEST_TOKENS = 60
 #: What this part of the students has, and at least so many, is common to them: a page of the docs, a hint in class.
 COMMON_PART, FEWEST_IN_COMMON = 1 / 3, 5
+#: A whole file that more than this part of the students has is nobody's own.
+NEARLY_ALL = 2 / 3
 #: Pairs that are compared, those with most in common; hundreds of copies of one large file are thousands of pairs.
 MOST_PAIRS = 2000
 #: Places of the same gram that a stretch may go on from.
@@ -67,12 +69,14 @@ class AlikeSources:
 class Writing:
     """What is alike in a batch, the most alike first.
 
-    ``too_short`` are the students with too little of their own, ``not_compared`` how many pairs were too many.
+    ``same`` are groups of students who have a whole file in common but for names, comments and layout, however many
+    they are; ``too_short`` those with too little of their own, ``not_compared`` how many pairs were too many.
     """
 
     alike: tuple[AlikeSources, ...]
     too_short: tuple[str, ...]
     not_compared: int = 0
+    same: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +104,8 @@ def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIK
     """
     sources = sorted(sources, key=lambda source: source.student)
     all_grams = [grams(source.tokens) for source in sources]
-    left_out = np.union1d(_given(given), _common(sources, all_grams))
+    all_given = _given(given)
+    left_out = np.union1d(all_given, _common(sources, all_grams))
     indexed = [_index(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
     long_enough = [each for each in indexed if each.own >= FEWEST_TOKENS]
     candidates = list(_candidates(long_enough, alike))
@@ -109,13 +114,28 @@ def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIK
     found = sorted(
         (each for each in compared if each.share >= alike), key=lambda each: (-each.share, each.students, each.files)
     )
-    heard = {each.source.student for each in long_enough}
+    same = _same(sources, all_grams, all_given)
+    heard = {each.source.student for each in long_enough}.union(*same)
     too_short = sorted({source.student for source in sources} - heard)
-    return Writing(tuple(found), tuple(too_short), len(candidates) - len(chosen))
+    return Writing(tuple(found), tuple(too_short), len(candidates) - len(chosen), same)
 
 
 def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
     return np.concatenate([np.empty(0, np.uint64), *(grams(tokens_of(text)) for text in texts)])
+
+
+def _same(
+    sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given: NDArray[np.uint64]
+) -> tuple[tuple[str, ...], ...]:
+    """Who shares a whole file of which enough is not given; what nearly all have was given in some other way."""
+    students: dict[bytes, set[str]] = {}
+    for source, own in zip(sources, all_grams, strict=True):
+        size = len(source.tokens)
+        if size - int(covered(np.isin(own, given), size).sum()) >= FEWEST_TOKENS:
+            students.setdefault(own.tobytes(), set()).add(source.student)
+    most = max(FEWEST_IN_COMMON, NEARLY_ALL * len({source.student for source in sources}))
+    groups = {tuple(sorted(group)) for group in students.values() if 1 < len(group) <= most}
+    return tuple(sorted(groups, key=lambda group: (-len(group), group)))
 
 
 def _common(sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]]) -> NDArray[np.uint64]:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Engine, text
 from sqlalchemy.engine import Connection
 
-from service.store.revision import newest_revision
+from service.store import recorded_schema
+from service.store.revision import newest_revision, revision_of
 from sim.errors import HostError
 
 if TYPE_CHECKING:
@@ -42,22 +43,29 @@ def upgrade(engine: Engine) -> None:
 
     Raises HostError if the database was made by a newer Robomark.
     """
-    from alembic import command
-    from alembic.runtime.migration import MigrationContext
-    from alembic.script import ScriptDirectory
-
     with engine.begin() as connection:
         # SQLite holds its write lock since BEGIN IMMEDIATE.
         if engine.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
-        config = configuration(connection)
-        present = MigrationContext.configure(connection).get_current_revision()
-        if present == newest_revision():
+        if revision_of(connection) == newest_revision():
             return
-        known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-        if present is not None and present not in known:
-            raise HostError(
-                f"The database was made by a newer Robomark (its tables are at {present}); "
-                "upgrade this Robomark, or restore a backup: there is no way down."
-            )
-        command.upgrade(config, "head")
+        if recorded_schema.can_be_laid(connection):
+            recorded_schema.lay(connection, newest_revision())
+        else:
+            migrate(connection)
+
+
+def migrate(connection: Connection) -> None:
+    """Apply one migration after another. Raises HostError if the database was made by a newer Robomark."""
+    from alembic import command
+    from alembic.script import ScriptDirectory
+
+    config = configuration(connection)
+    present = revision_of(connection)
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if present is not None and present not in known:
+        raise HostError(
+            f"The database was made by a newer Robomark (its tables are at {present}); "
+            "upgrade this Robomark, or restore a backup: there is no way down."
+        )
+    command.upgrade(config, "head")

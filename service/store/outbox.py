@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 from service.store.engine import Store, now
 from service.store.models import Batch, Enrolment, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState
-from service.store.web_tables import Delivery, Webhook
+from service.store.web_tables import Delivery, OpenAssignment, Webhook
 
 #: For so long a delivery is tried; then it is given up.
 TRIED_FOR = timedelta(days=1)
@@ -181,6 +181,9 @@ def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | Non
         # Of two workers that end the last two jobs at once, the second has to see what the first did.
         number = int.from_bytes(hashlib.sha256(batch_id.encode()).digest()[:8], signed=True)
         session.execute(select(func.pg_advisory_xact_lock(number)))
+    takes_in = (OpenAssignment.batch_id == batch_id, OpenAssignment.closed_at.is_(None))
+    if session.scalar(select(OpenAssignment.id).where(*takes_in)) is not None:
+        return
     counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
     states = dict(session.execute(counted.group_by(Job.state)).all())
     if states and not any(state in UNFINISHED for state in states):

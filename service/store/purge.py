@@ -75,23 +75,42 @@ def erase_student(store: Store, enrolment_id: int, actor: str) -> Purged:
     Raises UsageError for an instructor, and while something of theirs is being graded.
     """
     with store.transaction() as session:
-        enrolment = session.get_one(Enrolment, enrolment_id)
-        if enrolment.role is not Role.STUDENT:
-            raise UsageError(f"{enrolment.student} is no student of this course")
-        running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
-        if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
-            raise UsageError(f"a submission of {enrolment.student} is being graded; wait until it is, or cancel it")
-        _TEMPORARY.create_all(session.connection())
-        own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
-        session.execute(insert(_GOING).from_select(["id"], own))
-        session.execute(insert(_LEAVING).values(id=enrolment_id))
-        found = _found(session)
-        _forget_names(session, enrolment)
-        _remove(session)
-        detail = {"submissions": found.submissions, "grades": found.grades}
-        audit.note(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
-        _TEMPORARY.drop_all(session.connection())
-        return found
+        return _erase(session, enrolment_id, actor)
+
+
+def remove_student(store: Store, enrolment_id: int, actor: str) -> None:
+    """Take somebody out of a course who has submitted nothing to it. Raises UsageError for who has, or instructs it."""
+    with store.transaction() as session:
+        if has_submitted(session, enrolment_id):
+            student = session.get_one(Enrolment, enrolment_id).student
+            raise UsageError(f"{student} has submitted something; robomark course delete-student removes that, too")
+        _erase(session, enrolment_id, actor)
+
+
+def has_submitted(session: Session, enrolment_id: int) -> bool:
+    """Whether anything of theirs was taken in."""
+    own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
+    return session.scalar(own.limit(1)) is not None
+
+
+def _erase(session: Session, enrolment_id: int, actor: str) -> Purged:
+    enrolment = session.get_one(Enrolment, enrolment_id)
+    if enrolment.role is not Role.STUDENT:
+        raise UsageError(f"{enrolment.student} is no student of this course")
+    running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
+    if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
+        raise UsageError(f"a submission of {enrolment.student} is being graded; wait until it is, or cancel it")
+    _TEMPORARY.create_all(session.connection())
+    own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
+    session.execute(insert(_GOING).from_select(["id"], own))
+    session.execute(insert(_LEAVING).values(id=enrolment_id))
+    found = _found(session)
+    _forget_names(session, enrolment)
+    _remove(session)
+    detail = {"submissions": found.submissions, "grades": found.grades}
+    audit.note(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
+    _TEMPORARY.drop_all(session.connection())
+    return found
 
 
 def _found(session: Session) -> Purged:
@@ -147,6 +166,7 @@ def _remove(session: Session) -> None:
     used = (
         Batch.id.in_(select(Job.batch_id).where(Job.batch_id.is_not(None))),
         Batch.id.in_(select(SubmissionRow.batch_id).where(SubmissionRow.batch_id.is_not(None))),
+        Batch.id.in_(select(OpenAssignment.batch_id).where(OpenAssignment.batch_id.is_not(None))),
     )
     # A batch of regrades goes before the one that it is of.
     session.execute(delete(Batch).where(~or_(*used), Batch.regrade_of.is_not(None)))

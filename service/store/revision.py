@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sqlalchemy import Engine, column, inspect, select, table
+from sqlalchemy.engine import Connection
 
 _TABLE = "alembic_version"
 
@@ -21,7 +22,12 @@ def newest_revision() -> str:
 def current_revision(engine: Engine) -> str | None:
     """The revision the database is at; None for an empty one."""
     with engine.begin() as connection:
-        if not inspect(connection).has_table(_TABLE):
-            return None
-        found: str | None = connection.scalar(select(column("version_num")).select_from(table(_TABLE)))
-        return found
+        return revision_of(connection)
+
+
+def revision_of(connection: Connection) -> str | None:
+    """The revision the database is at, asked in a transaction of the caller's; None for an empty one."""
+    if not inspect(connection).has_table(_TABLE):
+        return None
+    found: str | None = connection.scalar(select(column("version_num")).select_from(table(_TABLE)))
+    return found

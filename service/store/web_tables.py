@@ -49,6 +49,8 @@ class OpenAssignment(Base):
     opened_at: Mapped[datetime | None]  # None: prepared, and seen by instructors alone
     closed_at: Mapped[datetime | None]
     names_hidden: Mapped[bool] = mapped_column(default=False)  # while it is marked
+    # What its students submit on the web is all in one batch, made when it is opened first.
+    batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
 
 
 class Override(Base):

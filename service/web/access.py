@@ -6,22 +6,22 @@ reader may see is ``reports/view.py``'s.
 
 from __future__ import annotations
 
-import hashlib
 import hmac
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Path, Request
 from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException
 
-from service.store import credentials
-from service.store.credentials import Identity
+from service.language import translatable
+from service.store.grades import appeals
 from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
+from service.store.people import credentials
+from service.store.people.credentials import Identity
 from service.store.states import CredentialKind, Role
 from service.web.context import Context
-from service.web.language import translatable
 from sim.errors import RobomarkError
 
 SESSION_COOKIE = "robomark"
@@ -39,10 +39,11 @@ class SignInNeeded(RobomarkError):
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Somebody who is signed in with a browser, and the word that their forms have to carry."""
+    """Somebody who is signed in with a browser, and what follows from their session alone."""
 
     identity: Identity
-    csrf: str
+    csrf: str  # the word that their forms have to carry
+    link_key: bytes = field(repr=False)  # what the links that they make for others follow from
 
     @property
     def actor(self) -> str:
@@ -57,6 +58,7 @@ class InCourse:
     reader: Reader
     course_id: int
     course: str  # its name
+    appeals: int = 0  # that wait for an instructor's answer
 
     @property
     def actor(self) -> str:
@@ -71,7 +73,11 @@ def actor_of(identity: Identity) -> str:
 
 def csrf_word(session_secret: str) -> str:
     """What a form has to carry: it follows from the session, and the session does not follow from it."""
-    return hmac.new(session_secret.encode(), b"robomark csrf", hashlib.sha256).hexdigest()
+    return _following(session_secret, b"robomark csrf").hex()
+
+
+def _following(session_secret: str, what: bytes) -> bytes:
+    return hmac.digest(session_secret.encode(), what, "sha256")
 
 
 def reader_of(request: Request, context: Context) -> Reader | None:
@@ -81,7 +87,7 @@ def reader_of(request: Request, context: Context) -> Reader | None:
         return None
     with context.store.reading() as session:
         identity = credentials.identify(session, secret, CredentialKind.SESSION)
-    return None if identity is None else Reader(identity, csrf_word(secret))
+    return None if identity is None else Reader(identity, csrf_word(secret), _following(secret, b"robomark links"))
 
 
 MaybeReader = Annotated[Reader | None, Depends(reader_of)]
@@ -129,7 +135,7 @@ def course_of_role(session: Session, identity: Identity, course_id: int, role: R
 def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
     with context.store.reading() as session:
         course = course_of_role(session, reader.identity, course_id, Role.INSTRUCTOR)
-        return InCourse(reader, course.id, course.name)
+        return InCourse(reader, course.id, course.name, appeals.waiting(session, course.id))
 
 
 def _studying(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:

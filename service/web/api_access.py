@@ -11,8 +11,8 @@ from fastapi.security import HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
 from starlette.exceptions import HTTPException
 
-from service.store import credentials
-from service.store.credentials import Identity
+from service.store.people import credentials
+from service.store.people.credentials import Identity
 from service.store.states import CredentialKind, Role
 from service.web.access import RowNumber, SignInNeeded, actor_of, course_of_role, nothing_here
 from service.web.api_scopes import SCOPES

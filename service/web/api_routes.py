@@ -31,6 +31,8 @@ LONGEST_KEY = 200
 #: For a route that takes no key: it changes nothing, or answers a secret that is to be kept nowhere.
 NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
+#: What a route can be answered, by status, as the description tells it.
+Described = dict[int | str, dict[str, Any]]
 
 Limit = Annotated[int, Query(ge=1, le=200, description="How many at most.")]
 After = Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from service.web.language import translatable
+from service.language import translatable
 
 #: By name; a token does what its owner may do, and of that what its scopes name.
 SCOPES: Mapping[str, str] = MappingProxyType(

@@ -17,6 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from service.doctor import examine_service
+from service.language import translatable
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
@@ -51,7 +52,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     def static(name: str) -> Response:
         """A file that pages load; its name changes when it does."""
         if name not in static_files():
-            raise HTTPException(404, "There is no such file.")
+            raise HTTPException(404, translatable("There is no such file."))
         media_type, data = static_files()[name]
         return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
 

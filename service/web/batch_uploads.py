@@ -10,7 +10,8 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from service.store import intake, open_assignments
+from service.store.batches import intake
+from service.store.courses import open_assignments
 from service.store.models import Course
 from service.store.states import Lane
 from service.web.context import WebContext

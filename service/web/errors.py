@@ -14,21 +14,26 @@ from fastapi.responses import RedirectResponse, Response
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
+from service.language import ENGLISH, Language
 from service.lti.fetching import PlatformError
 from service.web.access import SignInNeeded, reader_of
-from service.web.language import translatable
+from service.web.language import language_of
 from service.web.problems import API, problem
+from service.web.refusing import said_in
 from service.web.rendering import page
 from sim.errors import HostError, RobomarkError, UsageError
+from sim.sentences import Sentence
 
 _log = structlog.get_logger(__name__)
 #: What the router says of paths and methods that there are not.
 _OF_THE_ROUTER = {
-    (404, "Not Found"): translatable("There is nothing here, or nothing that you may see."),
-    (405, "Method Not Allowed"): translatable("This can be asked for, but not by this method."),
+    (404, "Not Found"): Sentence("There is nothing here, or nothing that you may see."),
+    (405, "Method Not Allowed"): Sentence(
+        "This address only takes what a form sends; go back to the page with the form."
+    ),
 }
-_OURS = translatable("Something went wrong here, not with you; it is written down. Try again in a minute.")
-_NO_DATABASE = translatable("The database does not answer; nothing was changed. Try again in a minute.")
+_OURS = Sentence("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_NO_DATABASE = Sentence("The database does not answer; nothing was changed. Try again in a minute.")
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -55,8 +60,9 @@ async def _sign_in_needed(request: Request, _error: Exception) -> Response:
 
 async def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    sentence = _OF_THE_ROUTER.get((error.status_code, str(error.detail)), str(error.detail))
-    return answer(request, error.status_code, sentence, dict(error.headers or {}))
+    routers = _OF_THE_ROUTER.get((error.status_code, str(error.detail)))
+    said = said_in(error) if routers is None else routers
+    return answer(request, error.status_code, said, dict(error.headers or {}))
 
 
 async def _misread(request: Request, error: Exception) -> Response:
@@ -64,11 +70,12 @@ async def _misread(request: Request, error: Exception) -> Response:
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"][1:]) or str(first["loc"][0])
     message = str(first["msg"])
-    return answer(request, 422, f"{where}: {message[:1].lower()}{message[1:]}")
+    return answer(request, 422, Sentence(f"{where}: {message[:1].lower()}{message[1:]}"))
 
 
 async def _usage(request: Request, error: Exception) -> Response:
-    return answer(request, 422, sentence_of(error))
+    assert isinstance(error, UsageError)
+    return answer(request, 422, error)
 
 
 async def _host(request: Request, error: Exception) -> Response:
@@ -77,7 +84,8 @@ async def _host(request: Request, error: Exception) -> Response:
 
 
 async def _platform(request: Request, error: Exception) -> Response:
-    return answer(request, 502, sentence_of(error))
+    assert isinstance(error, PlatformError)
+    return answer(request, 502, error)
 
 
 async def _no_database(request: Request, error: Exception) -> Response:
@@ -90,9 +98,14 @@ async def _surprise(request: Request, error: Exception) -> Response:
     return answer(request, 500, _OURS)
 
 
-def answer(request: Request, status: int, sentence: str, headers: dict[str, str] | None = None) -> Response:
-    """The sentence, as whoever asks can read it."""
-    if request.url.path.startswith(API):
+def answer(
+    request: Request, status: int, said: Sentence | RobomarkError, headers: dict[str, str] | None = None
+) -> Response:
+    """What is said, as whoever asks can read it: a person in their language, a program in English."""
+    asked_by_program = request.url.path.startswith(API)
+    language = ENGLISH if asked_by_program else language_of(request)
+    sentence = language.tell(said) if isinstance(said, Sentence) else sentence_of(said, language)
+    if asked_by_program:
         return problem(status, sentence, headers)
     try:
         reader = reader_of(request, request.app.state.context)
@@ -103,9 +116,9 @@ def answer(request: Request, status: int, sentence: str, headers: dict[str, str]
     return shown
 
 
-def sentence_of(error: Exception) -> str:
+def sentence_of(error: RobomarkError, language: Language) -> str:
     """What an error says, as a sentence on a page."""
-    text = str(error)
+    text = language.tell(error.said)
     # The name of a file stays as it is.
     first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
     return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

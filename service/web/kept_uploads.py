@@ -28,12 +28,17 @@ _NOTE = "upload.json"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedSubmission:
-    """A submission that would be taken in."""
+    """A submission that would be taken in, and what is to be known of it first."""
 
     student: str
     name: str
     assignment: str
     source: str
+    missing: str = ""  # the file of the part that it lacks
+    enrolled: bool = True
+    known: bool = False
+    copied: bool = False
+    empty: str = ""  # a file of it that has nothing in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +95,12 @@ class KeptUploads:
         if found is None or (found.person_id, found.course_id) != (person_id, course_id):
             return None
         return found
+
+    def waiting(self, person_id: int, course_id: int) -> list[KeptUpload]:
+        """Those of this sender to this course that were looked at and are neither taken in nor discarded."""
+        names = [path.name for path in self._folder.iterdir()] if self._folder.is_dir() else []
+        found = [each for name in sorted(names) if (each := self.find(name, person_id, course_id)) is not None]
+        return [each for each in found if each.expected or each.refusals]
 
     def remove(self, upload: KeptUpload) -> None:
         """Forget it."""

@@ -12,7 +12,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from service.store.engine import Store
-from service.store.metrics import ServiceMetrics, collect, quantile
+from service.store.queue.metrics import ServiceMetrics, collect, quantile
 from service.store.states import JobState, Lane, PlotState
 from service.version import GRADER_VERSION
 

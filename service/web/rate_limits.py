@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-from starlette.exceptions import HTTPException
+from service.web.refusing import Declined
+from sim.sentences import Sentence
 
 _MOST_KNOWN = 10_000
 
@@ -49,7 +50,8 @@ class RateLimit:
 
     def _refuse(self, left: float) -> NoReturn:
         seconds = max(1, round((1 - left) / self._per_second))
-        raise HTTPException(429, f"That is too often; come again in {seconds} s.", {"retry-after": str(seconds)})
+        said = Sentence("That is too often; come again in %(seconds)s s.", {"seconds": seconds})
+        raise Declined(429, said, {"retry-after": str(seconds)})
 
 
 @dataclass(frozen=True, slots=True)

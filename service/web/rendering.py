@@ -15,11 +15,13 @@ from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from service.language import Language, languages
 from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
 from service.store.states import Role
 from service.web.access import Reader
-from service.web.language import language_of, languages, translations
+from service.web.language import language_of
+from service.web.moments import zone_now, zone_of
 
 _LONGEST_TEXT = 20_000
 
@@ -28,22 +30,17 @@ def page(
     request: Request, reader: Reader | None, template: str, *, status_code: int = 200, **context: object
 ) -> HTMLResponse:
     """A page of ``templates`` for somebody, or for anybody."""
-    code = language_of(request)
+    language = language_of(request)
     told = {
         "request": request,
         "reader": reader,
-        "language": code,
+        "language": language.code,
         "languages": languages(),
         "statics": statics(),
         "Role": Role,
         **context,
     }
-    return HTMLResponse(_environment(code).get_template(template).render(told), status_code=status_code)
-
-
-def words(request: Request, sentence: str) -> str:
-    """A sentence of ours in the reader's language."""
-    return translations(language_of(request)).gettext(sentence)
+    return HTMLResponse(_environment(language).get_template(template).render(told), status_code=status_code)
 
 
 def wants_part(request: Request) -> bool:
@@ -79,7 +76,7 @@ def statics() -> Mapping[str, str]:
 
 
 @lru_cache(maxsize=16)
-def _environment(code: str) -> Environment:
+def _environment(language: Language) -> Environment:
     environment = Environment(
         loader=PackageLoader("service.web"),
         autoescape=True,
@@ -89,12 +86,13 @@ def _environment(code: str) -> Environment:
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
     )
-    environment.install_gettext_translations(translations(code), newstyle=True)  # type: ignore[attr-defined]
+    environment.install_gettext_translations(language.catalogue, newstyle=True)  # type: ignore[attr-defined]
     environment.filters["marks"] = _marks
     environment.filters["moment"] = _moment
     environment.filters["share"] = _share
     environment.filters["duration"] = _duration
     environment.filters["typed"] = _typed
+    environment.globals["zone_now"] = zone_now
     return environment
 
 
@@ -114,7 +112,8 @@ def _moment(value: datetime | None) -> Markup | str:
     if value is None:
         return "–"
     here = value.astimezone()
-    return Markup('<time datetime="{}">{}</time>').format(here.isoformat(), f"{here:%Y-%m-%d %H:%M}")
+    shown = Markup('{} <span class="zone">{}</span>').format(f"{here:%Y-%m-%d %H:%M}", zone_of(here))
+    return Markup('<time datetime="{}">{}</time>').format(here.isoformat(), shown)
 
 
 def _typed(text: str) -> Markup:

@@ -32,13 +32,14 @@ _HEADERS = {
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 #: Asked by what watches over the service, by whatever name.
 _FOR_ANY_NAME = ("/health/", "/metrics")
+_TAKE_UPLOADS = ("/courses/", "/api/")
 
 
 class TooMuch(HTTPException):
     """A body was longer than is read."""
 
-    def __init__(self) -> None:
-        super().__init__(413, f"This is too much: at most {LARGEST_BODY // 2**20} MB are read.")
+    def __init__(self, most: int) -> None:
+        super().__init__(413, f"This is too much: at most {most // 2**20} MB are read.")
 
 
 class Guarded:
@@ -59,12 +60,14 @@ class Guarded:
             sentence = "This is not a name of this server; ROBOMARK_PUBLIC_URL says which is."
             await _refusal(scope["path"], 400, sentence)(scope, receive, send)
             return
+        # A body is read before anybody is asked who sends it; nothing is uploaded anywhere else.
+        most = LARGEST_BODY if scope["path"].startswith(_TAKE_UPLOADS) else 2**20
         length = headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > LARGEST_BODY:
-            error = TooMuch()
+        if not length.isdigit() or int(length) > most:
+            error = TooMuch(most)
             await _refusal(scope["path"], error.status_code, error.detail)(scope, receive, self._headed(send))
             return
-        await self._app(scope, _counted(receive), self._headed(send))
+        await self._app(scope, _counted(receive, most), self._headed(send))
 
     def _headed(self, send: Send) -> Send:
         async def headed(message: Message) -> None:
@@ -80,7 +83,7 @@ class Guarded:
         return headed
 
 
-def _counted(receive: Receive) -> Receive:
+def _counted(receive: Receive, most: int) -> Receive:
     """The body as it comes, until it is too much."""
     so_far = 0
 
@@ -88,8 +91,8 @@ def _counted(receive: Receive) -> Receive:
         nonlocal so_far
         message = await receive()
         so_far += len(message.get("body", b""))
-        if so_far > LARGEST_BODY:
-            raise TooMuch()
+        if so_far > most:
+            raise TooMuch(most)
         return message
 
     return counted

@@ -11,6 +11,7 @@ import sys
 import uvicorn
 
 from service.home import keep_private
+from service.outside import ALL_OTHERS, NO_OTHERS
 from service.queue.broker import broker_url
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
@@ -33,7 +34,7 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
             lifespan="off",
             timeout_graceful_shutdown=5,
         )
-        with WebhookSender(store, inside=settings.webhooks_inside):
+        with WebhookSender(store, ALL_OTHERS if settings.webhooks_inside else NO_OTHERS):
             uvicorn.Server(config).run(sockets=[listening])
 
 

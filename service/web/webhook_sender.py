@@ -15,11 +15,11 @@ from typing import Self
 
 import structlog
 
+from service.outside import Networks, NotPublic, NotReached, ask
 from service.store import outbox
 from service.store.engine import Store
 from service.store.outbox import ClaimedDelivery
 from service.version import GRADER_VERSION
-from service.web.outside import NotReached, post
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 2.0
@@ -27,11 +27,11 @@ _AT_ONCE = 8
 
 
 class WebhookSender:
-    """Sends while it is open. ``inside`` allows addresses that are not public."""
+    """Sends while it is open, to public addresses and to these networks."""
 
-    def __init__(self, store: Store, *, inside: bool) -> None:
+    def __init__(self, store: Store, others: Networks) -> None:
         self._store = store
-        self._inside = inside
+        self._others = others
         self._ended = Event()
         self._thread = Thread(target=self._run, name="webhooks", daemon=True)
 
@@ -47,18 +47,18 @@ class WebhookSender:
     def _run(self) -> None:
         while not self._ended.wait(_LOOK_SECONDS):
             try:
-                while not self._ended.is_set() and send_due(self._store, inside=self._inside):
+                while not self._ended.is_set() and send_due(self._store, self._others):
                     pass
             except Exception:
                 _log.exception("webhooks.failed")
 
 
-def send_due(store: Store, *, inside: bool) -> int:
+def send_due(store: Store, others: Networks) -> int:
     """Send some of what is due; how many that were."""
     claimed = outbox.claim(store, _AT_ONCE)
     if claimed:
         with ThreadPoolExecutor(_AT_ONCE) as pool:
-            list(pool.map(lambda each: _send(store, each, inside=inside), claimed))
+            list(pool.map(lambda each: _send(store, each, others), claimed))
     return len(claimed)
 
 
@@ -68,7 +68,7 @@ def signature(secret: str, at: int, body: bytes) -> str:
     return f"t={at},v1={signed}"
 
 
-def _send(store: Store, claimed: ClaimedDelivery, *, inside: bool) -> None:
+def _send(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
     body = json.dumps(
         {"id": claimed.id, "event": claimed.event, "made_at": claimed.made_at.isoformat(), **claimed.payload}
     ).encode()
@@ -80,7 +80,10 @@ def _send(store: Store, claimed: ClaimedDelivery, *, inside: bool) -> None:
         "Robomark-Signature": signature(claimed.secret, int(time.time()), body),
     }
     try:
-        status = post(claimed.url, body, headers, inside=inside)
+        status = ask(claimed.url, method="POST", body=body, headers=headers, others=others).status
+    except NotPublic as error:
+        outbox.failed(store, claimed, f"{error}; ROBOMARK_WEBHOOKS_INSIDE lets webhooks go inside")
+        return
     except NotReached as error:
         outbox.failed(store, claimed, str(error))
         return

@@ -64,9 +64,9 @@ class Link:
         self._wire: Wire = _Unconnected()
         self._stuck: Callable[[], None] | None = None
         self._free = 0
-        self._sensors: dict[tuple[str, int], tuple[bytes, int | slice]] = {}
-        self._seen: list[float] = []  # what the sensors read in tick number _seen_in
-        self._seen_in = -1
+        self._sensors: dict[tuple[str, int], tuple[bytes, int, int | slice]] = {}
+        self._seen: list[float] = []  # what the sensors read up to _seen_until
+        self._seen_until = 0
         self._tick = SECOND
 
     def connect(self, wire: Wire, stuck: Callable[[], None], sensors: Mapping[str, int], tick: int) -> None:
@@ -80,7 +80,7 @@ class Link:
         for index, (name, width) in enumerate(sensors.items()):
             where = slice(start, start + width) if width else start
             for times in (1, 2):
-                self._sensors[name, times] = _packed(_READ, index, 0, 0, times), where
+                self._sensors[name, times] = _packed(_READ, index, 0, 0, times), times * READ, where
             start += width or 1
 
     def tell(self, frame: Frame) -> None:
@@ -108,6 +108,11 @@ class Link:
         if not set_points and command is not None:
             self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
 
+    def run_forever(self, port: str, speed: float) -> None:
+        """What ``set_motor`` does for the programs that steer all the time."""
+        self.read_freely()
+        self._wire.act_later(_packed(_MOTOR, _PORTS[port], _SET_POINTS["speed_sp"], _COMMANDS["run-forever"], speed))
+
     def ask(self, frame: Frame) -> Any:
         """The answer's value, once the world has moved as far as the question takes."""
         if frame["do"] in _WAITS:
@@ -132,16 +137,16 @@ class Link:
         Values change only at ticks: a reading that ends before the next one is known already, so the world is told
         of it and not asked. The world counts the time by the same rule, and gives no answer then.
         """
-        packed, where = self._sensors[what, times]
+        packed, lasts, where = self._sensors[what, times]
         self._free = 0
-        end = self.units + times * READ
-        if self._seen_in == end // self._tick:
+        end = self.units + lasts
+        if end < self._seen_until:
             self.units = end
             self._wire.act_later(packed)
         else:
             self._wire.act(packed)
             self._seen = self._answer()
-            self._seen_in = self.ticks
+            self._seen_until = (self.ticks + 1) * self._tick
         return self._seen[where]
 
     @property

@@ -5,14 +5,34 @@ Reading one to mark by it, with every mistake named, is ``reader.py``'s, which t
 
 from __future__ import annotations
 
+import re
+import textwrap
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from submissions.assignment.folder import FILE_NAME
+
+#: What the parts of the course's materials are called, by the number that sections begin with.
+TOPICS: Mapping[str, str] = MappingProxyType(
+    {
+        "01": "Introducing notebooks and the RoboLab environment",
+        "02": "Getting started with robot and Python programming",
+        "03": "Controlling program execution flow",
+        "04": "Not quite intelligent robots",
+        "05": "Experimenting with sensors",
+        "06": "Where in the world are we",
+        "07": "Neural networks",
+        "08": "Remote services and multi-agent systems",
+    }
+)
+_SENTENCE_ENDS = re.compile(r"(?<=[.!?]) (?=[A-Z])")
+_WHERE_IT_STARTS = re.compile(r"(The|This)( small)? robot |There are two robots")
+_LONGEST_SENTENCE = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +42,19 @@ class AssignmentOverview:
     section: str
     id: str
     title: str
+    sentence: str  # of its description
     marks: Decimal
     trials: int
+
+    @property
+    def topic(self) -> str:
+        """The number of its part of the course's materials; empty where it stands in none."""
+        return self.section[:2] if self.section[:2] in TOPICS else ""
+
+    def says(self, text: str) -> bool:
+        """Whether all words of the text are in what is said of it, in whatever case."""
+        told = f"{self.section} {self.id} {self.title} {self.sentence} {TOPICS.get(self.topic, '')}".casefold()
+        return all(word in told for word in text.casefold().split())
 
 
 def overview(folder: Path) -> AssignmentOverview:
@@ -33,9 +64,18 @@ def overview(folder: Path) -> AssignmentOverview:
         table.get("section", ""),
         table["id"],
         table["title"],
+        _sentence(table.get("description", "")),
         sum((Decimal(criterion["marks"]) for criterion in table["criterion"]), Decimal(0)),
         sum(_trials(scenario) for scenario in table.get("scenario", ())),
     )
+
+
+def _sentence(description: str) -> str:
+    """What is to be done, by the first sentence that asks for it, or says more than where the robot starts."""
+    sentences = _SENTENCE_ENDS.split(" ".join(description.split()))
+    asking = (each for each in sentences if each.startswith("Write "))
+    others = (each for each in sentences if not _WHERE_IT_STARTS.match(each))
+    return textwrap.shorten(next(asking, next(others, sentences[0])), _LONGEST_SENTENCE, placeholder=" …")
 
 
 def _trials(scenario: Mapping[str, Any]) -> int:

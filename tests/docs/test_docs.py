@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
+from builders import asked_already
 from command import robomark
 from notebook_builder import MESSAGING
 from paths import ROOT
@@ -81,10 +82,11 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     (tmp_path / "my-robots" / "robot.py").write_text("print('PY::hello')\n")
     (tmp_path / "my-robots" / "robot2.py").write_text("%%sim_magic_preloaded -x 1500 -y 500 -a 180\n")
     _download_from_moodle(tmp_path)
+    home = asked_already(tmp_path / "home")
     ids: dict[str, str] = {}
     for words in commands(document):
         given = [ids.get(word, word) for word in words]
-        done = robomark(*given, folder=tmp_path, ROBOMARK_HOME=str(tmp_path / "home"))
+        done = robomark(*given, folder=tmp_path, ROBOMARK_HOME=str(home))
         assert done.returncode == 0, f"robomark {shlex.join(words)}\n{done.stdout}\n{done.stderr}"
         if words[:2] == ["batch", "submit"]:
             ids["BATCH"] = re.search(r"batch (\w+)", done.stdout)[1]  # type: ignore[index]

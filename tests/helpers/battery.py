@@ -34,10 +34,11 @@ from attacks import (
 from filter_machine import listed
 from responders import wire
 from responders.sandbox import manager
+from responders.sandbox.child_ends import KilledFromOutside
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import Child, ChildLimits, KilledFromOutside, LibrariesNeeded
+from responders.sandbox.running_child import Child, ChildLimits, LibrariesNeeded
 from responders.sandbox.zygote import NONE, Isolation, Role
 from sim.recording import TICK, Verdict
 

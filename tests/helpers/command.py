@@ -18,7 +18,13 @@ COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 #: Processes of its context have the modules of the store, the grader and the reports from the beginning.
 FORKING = multiprocessing.get_context("forkserver")
 FORKING.set_forkserver_preload(
-    ["service.command_line", "service.store.regrades", "service.report_files", "service.grading.grader", "sklearn"]
+    [
+        "service.command_line",
+        "service.store.batches.regrades",
+        "service.report_files",
+        "service.grading.grader",
+        "sklearn",
+    ]
 )
 _PATIENCE = 240
 

@@ -24,10 +24,15 @@ _NO_TEXTS = {
 }  # fmt: skip
 
 
+def island_of(page: str) -> dict[str, Any]:
+    """What a page hands to the replay's script."""
+    (island,) = re.findall(r'<script type="application/json">(.*?)</script>', page)
+    return dict(json.loads(island))
+
+
 def data_of(page: str) -> dict[str, Any]:
     """The data in a page."""
-    (packed,) = re.findall(r'<script type="application/json">\{"deflated": "([^"]*)"\}</script>', page)
-    return dict(json.loads(zlib.decompress(base64.b64decode(packed))))
+    return dict(json.loads(zlib.decompress(base64.b64decode(island_of(page)["deflated"]))))
 
 
 def values_of(column: dict[str, Any]) -> np.ndarray:

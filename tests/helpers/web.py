@@ -15,12 +15,12 @@ from fastapi import FastAPI
 from httpx2 import Response
 from starlette.testclient import TestClient
 
-from builders import settings_in
+from builders import opened, settings_in
 from service.queue.broker import broker_url
 from service.settings import Settings
-from service.store import credentials, people
-from service.store.engine import Store, open_store
-from service.store.people import Member
+from service.store.engine import Store
+from service.store.people import credentials, people
+from service.store.people.people import Member
 from service.store.states import CredentialKind
 from service.web.app import make_app
 from submissions.people import Student
@@ -77,7 +77,7 @@ def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
     settings = settings_in(folder, **changes)
     if not settings.broker_url:
         settings = settings.with_broker(broker_url(settings))
-    with open_store(settings) as store:
+    with opened(settings) as store:
         yield Web(settings, store, make_app(settings, store))
 
 

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import io
 import re
+import zlib
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import report_builders
 from builders import echo, grading_request
-from service.store import appeals, credentials, intake, jobs, open_assignments, results, webhooks
-from service.store.people import Member
-from service.store.versions import freeze
+from service.store.batches import intake
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
+from service.store.grades import appeals, results
+from service.store.people import credentials, webhooks
+from service.store.people.people import Member
+from service.store.queue import jobs, tryouts
 from service.web.kept_uploads import KeptUploads
 from service.web.rendering import statics
+from submissions.packed import pack_submission
 from submissions.raw_files import SentFile
 from web import COURSE, Web
 
@@ -58,8 +64,23 @@ def make_world(web: Web) -> World:
         "criterion": report_builders.faulty_grade().criteria[0].id,
         "comment_id": "1",
         "appeal_id": str(appeal),
+        "tryout_id": _tryout(web, ada),
     }
     return World(ada, grace, values)
+
+
+def _tryout(web: Web, member: Member) -> str:
+    """A tryout that has something to play."""
+    packed = pack_submission(grading_request("ada").submission)
+    with web.store.transaction() as session:
+        version_id = open_assignments.find(session, 1, "echo-responder").version_id
+        asked = tryouts.ask(session, member.enrolment_id, version_id, packed)
+    claimed = tryouts.claim(web.store, 60)
+    assert claimed is not None
+    said = {"tone": "good", "happened": "The program ended by itself.", "whose": "", "seconds": 2.0}
+    more = {"lines": [], "more_lines": 0, "faults": [], "failed": "", "notes": []}
+    tryouts.finish(web.store, claimed, said | more, zlib.compress(b"{}"))
+    return asked
 
 
 def _upload(web: Web, member: Member) -> str:

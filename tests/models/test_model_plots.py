@@ -19,7 +19,8 @@ from models.families import shapes
 from models.images import Photographer, Shift
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
 from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
-from service.reports.plots.style import DPI, WIDTH
+from service.reports.plots.plot import DPI
+from service.reports.plots.style import WIDTH
 
 
 @pytest.fixture(scope="module")

@@ -215,7 +215,7 @@ def test_one_that_fails_stops_no_other_and_its_fault_has_its_name(how: str, runn
 
 @pytest.mark.long
 def test_a_real_sleep_is_cut_and_the_others_go_on(runner: TrialRunner) -> None:
-    recording = run(runner, parser="import os\ndef parser(text): os.read(3, 1)")
+    recording = run(runner, parser="import os\ndef parser(text): os.read(4, 1)")
     assert recording.verdict is Verdict.STALLED
     assert recording.faults[0].agent == "parser"
     assert replies(recording) == ["none"] * 3
@@ -339,7 +339,7 @@ def test_no_agent_reaches_another(runner: TrialRunner) -> None:
         files={"given.txt": b"for all"},
     )
     answers = eval(replies(recording)[0])
-    assert answers.pop("descriptors") <= 4  # the null device on 0 to 2, and the wire
+    assert answers.pop("descriptors") <= 5  # the null device on 0 to 2, and the wire's two ends
     assert answers.pop("own files") == ["given.txt"]
     errors = {"PermissionError", "FileNotFoundError", "OSError", "ModuleNotFoundError", "ProcessLookupError"}
     assert answers.items() >= {"its end": "PermissionError", "its text": "ModuleNotFoundError"}.items()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from responders.bridge import worded
 from responders.channel import Channel, ChannelOfTrial
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.zygote import NONE
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -180,9 +182,16 @@ def test_the_logfile_is_read_and_nothing_else(runner: TrialRunner) -> None:
 
 @pytest.mark.parametrize("trick", ["os.symlink('/etc/passwd', 'logger.txt')", "os.mkfifo('logger.txt')"])
 def test_a_logfile_that_is_no_file_is_not_read_even_without_sandbox(trick: str) -> None:
-    with TrialRunner(NONE) as unenclosed:
+    with TrialRunner(Sandboxes(NONE)) as unenclosed:
         recording = run_program(
             unenclosed, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n"
         )
     assert recording.faults == ()
     assert recording.responder_log == ""
+
+
+@pytest.mark.parametrize(
+    "reading", [2550.0, [0.0, -0.0], [-0.0, -0.0, -0.0], [93.77] * 3, [93.77, 93.77, 94.0], [1 / 3, 1 / 3], [-1.5, 2.0]]
+)
+def test_what_a_program_reads_stands_in_the_chain_as_python_writes_it(reading: float | list[float]) -> None:
+    assert worded(reading) == repr(reading)

@@ -9,7 +9,7 @@ from responders.code import Code
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.store.recordings import from_bytes, to_bytes
+from service.store.grades.recordings import from_bytes, to_bytes
 from sim.recorded import seconds_at, ticks_until
 from sim.recording import BROWSER_TICK, TICK, Pose, Recording
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec

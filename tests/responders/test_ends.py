@@ -24,6 +24,7 @@ from responders.bridge import Bridge
 from responders.code import Code
 from responders.conversation import Conversation
 from responders.responder_process import ResponderProcess
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobLimits, JobMeter
 from running import run_program
 from service.grading.grader import grade
@@ -93,7 +94,7 @@ def plain_runner() -> Iterator[TrialRunner]:
     """Without bubblewrap, in which a child's number is another."""
     from responders.sandbox.zygote import Isolation
 
-    with TrialRunner(Isolation(bubblewrap=False)) as made:
+    with TrialRunner(Sandboxes(Isolation(bubblewrap=False))) as made:
         yield made
 
 
@@ -166,7 +167,7 @@ def _raising(error: Exception) -> Callable[..., Any]:
 
 #: Where our own code may stumble while something of a child's is in its hands, and a program that leads there.
 _STUMBLES = [
-    pytest.param(Bridge, "_move", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
+    pytest.param(Bridge, "_act", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
     pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
     pytest.param(Bridge, "_print", "print('x')", None, id="a line"),
     pytest.param(ResponderProcess, "_answer", "print('PY::x')", ECHO, id="an answer"),

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import pickle
-import socket
 import struct
 import subprocess
 import tempfile
@@ -135,19 +134,25 @@ def _sequences(schema: wire.Schema) -> st.SearchStrategy[list[bytes]]:
 @contextmanager
 def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child]:
     """A process that writes these frames, numbered as is due, and listens to nothing."""
-    ours, theirs = socket.socketpair()
+    reading, their_writing = os.pipe()
+    their_reading, writing = os.pipe()
     with tempfile.TemporaryFile() as file:
         for number, frame in enumerate(frames):
             file.write(_numbered(frame, number))
         file.seek(0)
-        process = subprocess.Popen(["sh", "-c", "cat <&1 >/dev/null & exec cat"], stdin=file, stdout=theirs)
-    theirs.close()
-    child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ours, LIMITS, folder)
+        process = subprocess.Popen(["cat"], stdin=file, stdout=their_writing)
+    # It hears nothing, and does not end.
+    ears = subprocess.Popen(["cat"], stdin=their_reading, stdout=subprocess.DEVNULL, pass_fds=[their_writing])
+    for fd in (their_writing, their_reading):
+        os.close(fd)
+    ends = reading, writing
+    child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ends, LIMITS, folder)
     child.begin(meter, blamed=True, has_libraries=True)
     try:
         yield child
     finally:
         child.close()
+        ears.wait()
 
 
 def _numbered(frame: bytes, number: int) -> bytes:

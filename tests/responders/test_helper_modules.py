@@ -28,6 +28,8 @@ responder = "{responder}"
 id = "one"
 poses = [[300, 700, 0]]
 seconds = 5
+[limits]
+program_cpu = 1
 [[criterion]]
 id = "rules"
 title = "Keeps to the rules"

@@ -15,7 +15,7 @@ from responders.conversation import Answer, Conversation
 from responders.link import Cable, InfraredLink
 from running import run_program
 from service.grading.trial_runner import TrialRunner
-from service.store.recordings import from_bytes, to_bytes
+from service.store.grades.recordings import from_bytes, to_bytes
 from sim.arena import Arena
 from sim.bullet import Client, pb
 from sim.camera import HEIGHT, WIDTH

@@ -25,9 +25,13 @@ def _packet(*acts: Raw, number: int = 7) -> bytes:
 
 def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
     data = _packet((0, 1, 0, 0, 2.0), (2, 0, 1, 3, -25.5), (2, 1, 0, 2, 0.0), (1, 0, 0, 0, 100_000.0))
-    assert packed.packet_bytes(data) == len(data)
-    acts = [Read("right", 2), Move("outB", "speed_sp", -25.5, "run-forever"), Move("outC", "", 0.0, "reset")]
-    assert packed.unpack(data) == (7, [*acts, Wait(100_000)])
+    assert packed.read_header(data) == (len(data), 7)
+    assert packed.acts_of(data) == [
+        (Read("right"), 2),
+        (Move("outB", "speed_sp", "run-forever"), -25.5),
+        (Move("outC", "", "reset"), 0),
+        (Wait(), 100_000),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -57,29 +61,31 @@ def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
 )
 def test_an_act_that_no_honest_program_does_is_refused(act: Raw) -> None:
     with pytest.raises(WireError):
-        packed.unpack(_packet((0, 0, 0, 0, 1.0), act))
+        packed.acts_of(_packet((0, 0, 0, 0, 1.0), act))
 
 
 @pytest.mark.parametrize("count", [0, MOST // 12 + 1, 65_535])
 def test_a_packet_is_neither_empty_nor_longer_than_a_line_may_be(count: int) -> None:
     with pytest.raises(WireError, match=f"a packet of {count} acts"):
-        packed.packet_bytes(struct.pack("<BxHxxxxQ", 0, count, 0))
+        packed.read_header(struct.pack("<BxHxxxxQ", 0, count, 0))
 
 
 @given(st.binary(min_size=12, max_size=240).map(lambda data: data[: len(data) // 12 * 12]))
 def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
     try:
-        _, acts = packed.unpack(bytes(16) + data)
+        acts = packed.acts_of(bytes(16) + data)
     except WireError:
         return
     for act in acts:
         match act:
-            case Read(what, times):
+            case Read(what), times:
                 assert (what in SENSORS, times in (1, 2)) == (True, True)
-            case Wait(units):
-                assert (type(units), 0 <= units <= MOST_UNITS) == (int, True)
-            case Move(port, _, value, _):
+            case Wait(), units:
+                assert (units % 1, 0 <= units <= MOST_UNITS) == (0, True)
+            case Move(port, _, _), value:
                 assert (port in ("outB", "outC"), math.isfinite(value)) == (True, True)
+            case _:
+                pytest.fail(f"no act: {act}")
 
 
 def test_a_motor_is_told_whatever_can_be_told(runner: TrialRunner) -> None:

@@ -33,7 +33,7 @@ from service.commands.run_notebook import LastRun, RunLimits, run_notebook
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import differences, in_words
-from service.reports.plots.own_diagrams import draw_diagram
+from service.reports.plots.drawn_diagrams import draw_diagram
 from service.reports.plots.talk import talks
 from sim.recording import LossReason, Pose, Recording, Verdict
 from submissions.assignment.examples import examples

@@ -15,12 +15,15 @@ from builders import grading_request
 from replays import data_of, parting_grade
 from service.grading.grade import Grade
 from service.report_files import write_grade_film, write_grade_replay, write_report
-from service.store import batches, jobs, policies, regrades, results
-from service.store.batches import JobLine
+from service.store.batches import batches, publishing, regrades
+from service.store.batches.batches import JobLine
+from service.store.batches.intake import accept_batch
+from service.store.courses import policies
+from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
-from service.store.intake import accept_batch
-from service.store.policies import PolicyLimits
-from service.store.students import course_of
+from service.store.grades import results
+from service.store.people.students import course_of
+from service.store.queue import jobs
 from sim.errors import UsageError
 
 
@@ -70,7 +73,7 @@ def test_the_reference_is_shown_once_the_grade_is_published_and_other_students_n
     line, batch = stored(store, "ada", 3, build.line_follower_grade())
     with pytest.raises(UsageError, match="published"):
         replay_over(store, line, reference, tmp_path)
-    regrades.publish(store, batch, actor="staff")
+    publishing.publish(store, batch, actor="staff")
     assert replay_over(store, line_of(store, line.id), reference, tmp_path)["name"] == "the reference"
     with pytest.raises(UsageError, match="another student's"):
         replay_over(store, line_of(store, line.id), other, tmp_path)

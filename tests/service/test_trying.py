@@ -13,12 +13,12 @@ from builders import echo, grading_request
 from service.grading.trial_runner import TrialRunner
 from service.queue.trying import try_next
 from service.settings import Settings
-from service.store import tryouts
+from service.store.courses.versions import freeze, keep
 from service.store.engine import Store, now
+from service.store.people.students import Students, course_of
+from service.store.queue import tryouts
+from service.store.queue.tryouts import TryoutLine
 from service.store.states import TryoutState
-from service.store.students import Students, course_of
-from service.store.tryouts import TryoutLine
-from service.store.versions import freeze, keep
 from service.trying import LONGEST_SECONDS, tryout_assignment
 from sim.errors import HostError
 from submissions.assignment.definition import Assignment, Limits, Scenario
@@ -41,9 +41,12 @@ def _with_hidden(asked: Assignment) -> Assignment:
     return replace(asked, scenarios=(hidden, *asked.scenarios), secret="do not tell")
 
 
-def _tried(store: Store, runner: TrialRunner, program: str, asked: Assignment | None = None) -> TryoutLine:
-    """What a student is told of a program that a worker was notified of."""
-    packed = pack_submission(grading_request("ada", program).submission)
+def _tried(
+    store: Store, runner: TrialRunner, program: str, asked: Assignment | None = None, *, alone: bool = False
+) -> TryoutLine:
+    """What a student is told of a program that a worker was notified of; ``alone``, without a responder."""
+    submission = grading_request("ada", program).submission
+    packed = pack_submission(replace(submission, responder=None) if alone else submission)
     frozen = freeze(asked or _with_hidden(echo()))
     with store.transaction() as session:
         at = now(session)
@@ -106,6 +109,15 @@ def test_endless_output_and_endless_loops_end(store: Store, runner: TrialRunner)
     assert line.state is TryoutState.DONE
     assert len(json.dumps(line.words)) < 400_000
     assert line.words["more_lines"] > 0
+
+
+def test_of_a_part_that_is_not_there_no_marks_are_spoken(store: Store, runner: TrialRunner) -> None:
+    line = _tried(store, runner, "import time\nprint('PY::1')\ntime.sleep(1)\n", echo(), alone=True)
+    told = json.dumps(line.words)
+    assert "There is no responder.py: only the part that is there was run." in line.words["notes"]
+    assert "graded" not in told
+    assert "marks" not in told
+    assert "(answer of the simulator) pingpong PY::1" in told
 
 
 def test_a_fault_of_ours_is_no_verdict(store: Store, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.drawn import draw_all
-from service.store.recordings import from_bytes, to_bytes
+from service.store.grades.recordings import from_bytes, to_bytes
 from sim.floors import floor, label_names
 from sim.recording import SENSOR_SIDE, Image
 from submissions.assignment.definition import Assignment

@@ -202,4 +202,5 @@ def test_a_list_says_what_the_assignments_say() -> None:
     for name in catalogue():
         found, listed = find_assignment(name), overview(assignment_folder(name))
         assert (listed.section, listed.id, listed.title) == (found.section, found.id, found.title)
+        assert listed.sentence.removesuffix(" …") in " ".join(found.description.split())
         assert (listed.marks, listed.trials) == (found.max_marks, sum(1 for _ in found.trials())), name

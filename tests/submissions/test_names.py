@@ -15,11 +15,11 @@ from sqlalchemy import insert, select, update
 from builders import grading_request
 from command import robomark
 from service.reports.written import file_stem, file_stems, refused_stems
-from service.store import intake
+from service.store.batches import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Person
+from service.store.people.students import Students, course_of
 from service.store.states import Role
-from service.store.students import Students, course_of
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission

@@ -6,7 +6,6 @@ The role (robot program or responder) takes over once every layer stands.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import dataclasses
 import os
 import resource
@@ -21,9 +20,11 @@ from .frames import Frame, Wire
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
-_WIRE, _DOOR = 3, 4
+_WRITING, _READING, _DOOR = 3, 4, 5
 #: Where the numbers of users begin that exist for one child each; nothing on a machine should belong to them.
 _USERS, _USERS_COUNT = 61_000, 4_000
+#: What Python ignores from its start, to raise an error instead.
+_PYTHONS_OWN = frozenset((signal.SIGPIPE, signal.SIGXFSZ))
 #: All that student code finds: libraries loaded late must not start threads either.
 _ENVIRONMENT = {
     "HOME": "/",
@@ -38,18 +39,22 @@ def start(
     spec: dict[str, Any],
     descriptors: list[int],
     grants: lockdown.Grants,
+    rules: tuple[bytes, ...],
     role: Callable[[Wire, lockdown.Grants], None],
     zygote: int,
     door: int,
 ) -> None:
-    """Never returns. ``descriptors`` are the wire and, if the spec has a folder, the folder."""
+    """Never returns. ``descriptors`` are the wire's two and, if the spec has a folder, the folder.
+
+    ``rules`` say of the ``grants`` what Landlock is told.
+    """
     try:
         _own_session()
         _first_to_go()
-        _descriptors([descriptors[0], door, *descriptors[1:]])
+        _descriptors([*descriptors[:2], door, *descriptors[2:]])
         _limits(spec)
-        wire = Wire(_WIRE)
-        wire.send(_sandbox(spec, grants, zygote))
+        wire = Wire(_WRITING, _READING)
+        wire.send(_sandbox(spec, grants, rules, zygote))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
         role(wire, dataclasses.replace(grants, without=tuple(spec["without"])))
@@ -59,8 +64,11 @@ def start(
 
 def _own_session() -> None:
     os.setsid()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+    # A worker that was started in the background of a shell ignores some, and what it forks would, too.
+    for number in signal.valid_signals() - _PYTHONS_OWN - {signal.SIGKILL, signal.SIGSTOP}:
+        if signal.getsignal(number) is not signal.SIG_DFL:
+            signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 def _first_to_go() -> None:
@@ -68,9 +76,11 @@ def _first_to_go() -> None:
 
     Files of a process that is not to be read, as the zygote, are root's; so this one is to be, until it is locked.
     """
-    ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 1, 0, 0, 0)
-    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
-        score.write("1000")
+    lockdown.control(_PR_SET_DUMPABLE, 1)
+    with contextlib.suppress(OSError):
+        score = os.open("/proc/self/oom_score_adj", os.O_WRONLY)
+        os.write(score, b"1000")
+        os.close(score)
 
 
 def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
@@ -87,23 +97,25 @@ def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
 
 def _end_with(zygote: int) -> None:
     """A change of user forgets both of these, so they come after it."""
-    prctl = ctypes.CDLL(None, use_errno=True).prctl
-    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    lockdown.control(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    lockdown.control(_PR_SET_DUMPABLE, 0)
     if os.getppid() != zygote:
         os._exit(0)
 
 
 def _descriptors(descriptors: list[int]) -> None:
-    """Nothing stays open but the null device on 0 to 2, the wire and the door; a folder becomes the working folder."""
+    """The null device on 0 to 2, the wire and the door; a folder becomes the working folder.
+
+    What the rules need stays open until the layers stand, and nothing else.
+    """
     high = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
     null = os.open(os.devnull, os.O_RDWR)
     for fd in (0, 1, 2):
         os.dup2(null, fd)
-    os.dup2(high[0], _WIRE)
-    os.dup2(high[1], _DOOR)
-    os.chdir(high[2] if len(high) > 2 else "/")
-    os.closerange(_DOOR + 1, 1 << 16)
+    for fd, opened in zip((_WRITING, _READING, _DOOR), high, strict=False):
+        os.dup2(opened, fd)
+    os.chdir(high[3] if len(high) > 3 else "/")
+    os.closerange(_DOOR + 1, lockdown.ABOVE)
     os.umask(0o077)
 
 
@@ -124,7 +136,7 @@ def _limits(spec: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
-def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Frame:
+def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, rules: tuple[bytes, ...], zygote: int) -> Frame:
     """Put up the layers that the spec names, try each, and say what stands; nothing of the student's has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
@@ -136,7 +148,7 @@ def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Fram
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
         if spec["landlock"]:
-            landlock = _files(spec, grants)
+            landlock = _files(spec, rules)
         if spec["doorkeeper"]:
             without_doorkeeper = _ask_about_paths(memory)
         if spec["seccomp"]:
@@ -146,7 +158,7 @@ def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, zygote: int) -> Fram
             seccomp = True
     except lockdown.LayerMissing as layer:
         missing = str(layer)
-    os.closerange(_DOOR, 1 << 8)
+    os.closerange(_DOOR, 1 << 16)
     return {
         "do": "sandbox",
         "landlock": landlock,
@@ -180,11 +192,11 @@ def _ask_about_paths(memory: int | None) -> str | None:
     return None
 
 
-def _files(spec: dict[str, Any], grants: lockdown.Grants) -> int:
-    folder = os.open(".", os.O_PATH) if spec["folder"] else None
-    version = lockdown.restrict_files(lockdown.Grants(grants.read, grants.list_only, folder), spec["landlock"])
-    if folder is not None:
-        os.close(folder)
+def _files(spec: dict[str, Any], rules: tuple[bytes, ...]) -> int:
+    if spec["folder"]:
+        folder = os.open(".", os.O_PATH)
+        rules = *rules, lockdown.writing_rule(folder, spec["landlock"])
+    version = lockdown.restrict_files(rules, spec["landlock"])
     _must_fail("Landlock", lambda: os.open("/etc/passwd", os.O_RDONLY))
     _must_fail("Landlock", lambda: os.listdir("/"))
     return version

@@ -109,7 +109,7 @@ def _serve(door: socket.socket, known: _Known) -> None:
     lockdown.forbid_new_privileges()
     with contextlib.suppress(lockdown.LayerMissing):
         # Not from the version that keeps signals in: that of its death has to reach the zygote.
-        lockdown.restrict_files(lockdown.Grants(()), 5)
+        lockdown.restrict_files((), 5)
     guests: dict[int, _Guest] = {}
     poll = select.epoll()
     poll.register(door.fileno(), select.EPOLLIN)

@@ -1,10 +1,11 @@
-"""The child's end of the wire: one JSON object a line over one descriptor, and packed acts of a robot program between.
+"""The child's end of the wire: one JSON object a line over two pipes, and packed acts of a robot program between.
 
 The worker checks every frame as if it came from the internet; here there is nothing to defend.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import struct
@@ -25,10 +26,10 @@ _encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
 
 
 class Wire:
-    """Sends and receives frames over descriptor ``fd``."""
+    """Sends and receives frames over two descriptors."""
 
-    def __init__(self, fd: int) -> None:
-        self._fd = fd
+    def __init__(self, writing: int, reading: int) -> None:
+        self._writing, self._reading = writing, reading
         self._sent = self._received = 0  # frames
         self._pending = b""
         self._held = b""
@@ -76,7 +77,7 @@ class Wire:
         data = self._held + data
         self._held = b""
         while data:
-            data = data[os.write(self._fd, data) :]
+            data = data[os.write(self._writing, data) :]
 
     def receive(self) -> Frame:
         """The next frame. Ends the process when the worker has gone, or if somebody else has read what was sent."""
@@ -100,13 +101,13 @@ class Wire:
         while len(self._pending) < _HEADER.size:
             self._read()
         _, count, number = _HEADER.unpack_from(self._pending)
-        size = _HEADER.size + 8 * count
-        while len(self._pending) < size:
+        numbers = _numbers(count)
+        while len(self._pending) < numbers.size:
             self._read()
-        packet, self._pending = self._pending[:size], self._pending[size:]
+        units, *values = numbers.unpack_from(self._pending)
+        self._pending = self._pending[numbers.size :]
         if self._counted() != number:
             os._exit(0)
-        units, *values = struct.unpack_from(f"<q{count - 1}d", packet, _HEADER.size)
         return {"t": units, "v": values}
 
     def _counted(self) -> int:
@@ -115,10 +116,16 @@ class Wire:
         return number
 
     def _read(self) -> None:
-        data = os.read(self._fd, _AT_ONCE)
+        data = os.read(self._reading, _AT_ONCE)
         if not data:
             os._exit(0)
         self._pending += data
+
+
+@functools.cache
+def _numbers(count: int) -> struct.Struct:
+    """A packet of the time and of what all sensors read, without what its header says."""
+    return struct.Struct(f"<{_HEADER.size}xq{count - 1}d")
 
 
 def fits(text: str) -> bool:

@@ -6,11 +6,14 @@ back, and neither needs a privilege. Which calls are allowed is in ``system_call
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
+import fcntl
 import hashlib
 import os
 import struct
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from .system_calls import asking, program
@@ -33,6 +36,9 @@ _FILE_ONLY = _EXECUTE | _WRITE_FILE | _READ_FILE | _TRUNCATE
 
 #: All file rights that each version of Landlock's interface knows (linux/landlock.h).
 _FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
+_RULE = struct.Struct("=Qi")  # rights, and the descriptor of what they are on
+#: The first number of descriptors that stay open for ``reading_rules``.
+ABOVE = 256
 _NETWORK_RIGHTS = 0b11  # bind and connect TCP, from version 4
 _SCOPES = 0b11  # abstract sockets and signals, from version 6
 
@@ -43,11 +49,10 @@ class LayerMissing(Exception):
 
 @dataclass(frozen=True)
 class Grants:
-    """What stays reachable: files and folders to read, folders to list, and one flat folder to write in."""
+    """What stays reachable: files and folders to read, and folders to list."""
 
     read: tuple[str, ...]
     list_only: tuple[str, ...] = ()
-    write: int | None = None  # a descriptor of the folder
     open_to_others: bool = False  # whether a user who owns nothing could read them
     without: tuple[str, ...] = ()  # modules that student code does without
 
@@ -56,6 +61,11 @@ def landlock_version() -> int:
     """The version of Landlock's interface, 0 if the kernel has none or has it switched off."""
     version = _libc.syscall(_SYS_LANDLOCK_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(1))
     return max(int(version), 0)
+
+
+def control(option: int, value: int) -> None:
+    """One of the process's own settings, see prctl(2)."""
+    _libc.prctl(option, value, 0, 0, 0)
 
 
 def forbid_new_privileges() -> None:
@@ -89,28 +99,53 @@ def become(user: int) -> None:
         raise LayerMissing(f"own user: {error.strerror}") from None
 
 
-def restrict_files(grants: Grants, most: int = 99) -> int:
-    """Let this process reach nothing but ``grants``; at most version ``most`` is used. The version in force."""
+def reading_rules(grants: Grants) -> tuple[bytes, ...]:
+    """``grants`` as Landlock is told of them. The files stay open, so that a fork need not look for them again."""
+    rights = {**dict.fromkeys(grants.read, _READ_FILE | _READ_DIR), **dict.fromkeys(grants.list_only, _READ_DIR)}
+    return tuple(rule for path, allowed in rights.items() for rule in _rules_for(path, allowed))
+
+
+def _rules_for(path: str, rights: int) -> Iterator[bytes]:
+    with contextlib.suppress(FileNotFoundError):
+        fd = os.open(path, os.O_PATH | os.O_CLOEXEC)
+        yield _RULE.pack(rights if os.path.isdir(path) else rights & _FILE_ONLY, _moved(fd))
+
+
+def _moved(fd: int) -> int:
+    """The descriptor under another number, above those that a child uses."""
+    try:
+        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, ABOVE)
+    finally:
+        os.close(fd)
+
+
+def writing_rule(folder: int, most: int = 99) -> bytes:
+    """That the flat folder with this descriptor may be written in, as version ``most`` is told at most."""
+    own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
+    return _RULE.pack(own & _file_rights(min(landlock_version(), most)), folder)
+
+
+def restrict_files(rules: Iterable[bytes], most: int = 99) -> int:
+    """Let this process reach nothing but what ``rules`` allow; at most version ``most`` is used. That in force."""
     version = min(landlock_version(), most)
     if version < 1:
         raise LayerMissing(
             "Landlock: the kernel does not have it or it is switched off (needs 5.13 with landlock in lsm=)"
         )
-    rights = _FILE_RIGHTS[min(version, 5)]
-    ruleset = _create_ruleset(rights, version)
+    ruleset = _create_ruleset(_file_rights(version), version)
     try:
-        for path in grants.read:
-            _allow_path(ruleset, path, (_READ_FILE | _READ_DIR) & rights)
-        for path in grants.list_only:
-            _allow_path(ruleset, path, _READ_DIR)
-        if grants.write is not None:
-            own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
-            _add_rule(ruleset, grants.write, own & rights)
+        for rule in rules:
+            if _libc.syscall(_SYS_LANDLOCK_ADD_RULE, ruleset, 1, rule, 0) != 0:
+                raise LayerMissing(f"Landlock: {_last_error()}")
         if _libc.syscall(_SYS_LANDLOCK_RESTRICT_SELF, ruleset, 0) != 0:
             raise LayerMissing(f"Landlock: {_last_error()}")
     finally:
         os.close(ruleset)
     return version
+
+
+def _file_rights(version: int) -> int:
+    return _FILE_RIGHTS.get(min(version, 5), 0)
 
 
 def _create_ruleset(rights: int, version: int) -> int:
@@ -125,24 +160,6 @@ def _create_ruleset(rights: int, version: int) -> int:
         if ctypes.get_errno() != errno.EINVAL:
             break
     raise LayerMissing(f"Landlock: {_last_error()}")
-
-
-def _allow_path(ruleset: int, path: str, rights: int) -> None:
-    try:
-        fd = os.open(path, os.O_PATH | os.O_CLOEXEC)
-    except FileNotFoundError:
-        return
-    try:
-        is_folder = os.path.isdir(path)
-        _add_rule(ruleset, fd, rights if is_folder else rights & _FILE_ONLY)
-    finally:
-        os.close(fd)
-
-
-def _add_rule(ruleset: int, fd: int, rights: int) -> None:
-    rule = struct.pack("=Qi", rights, fd)
-    if _libc.syscall(_SYS_LANDLOCK_ADD_RULE, ruleset, 1, rule, 0) != 0:
-        raise LayerMissing(f"Landlock: {_last_error()}")
 
 
 def _last_error() -> str:

@@ -174,7 +174,7 @@ def _rules(pid: int) -> tuple[Rule, ...]:
     )
 
 
-def program(pid: int) -> bytes:
+def instructions(pid: int) -> list[Instruction]:
     """The filter for the process ``pid``: anything that is not allowed fails with EPERM, foreign ABIs kill."""
     code: list[Instruction] = [
         (_LOAD, 0, 0, _AT_ARCH),
@@ -192,7 +192,7 @@ def program(pid: int) -> bytes:
     code += _only_if(_OPENAT, _never_set_uid(2, 3) + _never_truncating(2))
     code += _only_if(_CLONE3, [(_RETURN, 0, 0, _RET_ERRNO | errno.ENOSYS)])
     code += _only_if(_CLONE, [(_RETURN, 0, 0, _RET_ERRNO | errno.EAGAIN)])
-    return _packed([*code, (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)])
+    return [*code, (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)]
 
 
 def asking() -> bytes:
@@ -200,10 +200,11 @@ def asking() -> bytes:
     code: list[Instruction] = [(_LOAD, 0, 0, _AT_NUMBER)]
     for number in PATHS:
         code += _only_if(number, [(_RETURN, 0, 0, _RET_ASK)])
-    return _packed([*code, (_RETURN, 0, 0, _RET_ALLOW)])
+    return packed([*code, (_RETURN, 0, 0, _RET_ALLOW)])
 
 
-def _packed(code: list[Instruction]) -> bytes:
+def packed(code: list[Instruction]) -> bytes:
+    """As the kernel takes them."""
     return b"".join(struct.pack("=HBBI", *instruction) for instruction in code)
 
 
@@ -253,3 +254,13 @@ def _never_truncating(argument: int) -> list[Instruction]:
         (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
         (_RETURN, 0, 0, _RET_ALLOW),
     ]
+
+
+#: More than any process has for its number.
+_NOBODY = 0x7FFF_FFFF
+_OF_NOBODY = packed(instructions(_NOBODY))
+
+
+def program(pid: int) -> bytes:
+    """``instructions``, packed: put together before any fork, but for the number."""
+    return _OF_NOBODY.replace(_NOBODY.to_bytes(4, "little"), pid.to_bytes(4, "little"))

@@ -53,6 +53,7 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
     door = doorkeeper.start(allowed, control.fileno())
     role.preload(without)
+    rules = lockdown.reading_rules(allowed)
     with_libraries = role_name.endswith("with libraries")
     run = role.run if with_libraries else functools.partial(libraries.run_without, role.run)
     roles = {"role": run, "battery": battery.run}
@@ -68,9 +69,10 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
         if spec is None:
             os._exit(0)
         if spec["do"] == "spawn":
+            os.sched_setaffinity(0, spec["processors"])
             pid = os.fork()
             if pid == 0:
-                child.start(spec, descriptors, allowed, roles[spec["work"]], zygote, door.fileno())
+                child.start(spec, descriptors, allowed, rules, roles[spec["work"]], zygote, door.fileno())
             _hand_over(control, pid)
             for fd in descriptors:
                 os.close(fd)

@@ -5,49 +5,105 @@ What is shown of them meanwhile is ``waiting.py``'s.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from responders.sandbox.manager import Sandboxes
-from service.commands.batch.waiting import Waiting
 from service.commands.shown import note, progress
-from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
-from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import batches
 from service.store.engine import Store
-from service.store.states import BatchState, Lane
+
+if TYPE_CHECKING:
+    from service.commands.batch.waiting import Waiting
+
+_GRACE_SECONDS = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class AwaitedBatches:
+    """Batches that services grade meanwhile."""
+
+    waiting: Sequence[Waiting]
+    end_services: Callable[[], object]
+
+    def for_marks(self) -> None:
+        """Return when all marks are there."""
+        for each in self.waiting:
+            each.for_marks()
+
+    def for_plots(self) -> None:
+        """Return when all plots are there; services of our own begin to end then."""
+        for each in self.waiting:
+            each.for_plots()
+        self.end_services()
+
+
+@dataclass(frozen=True, slots=True)
+class Services:
+    """Who grades: what the settings name, or a broker and a worker of our own."""
+
+    settings: Settings
+    ours: bool
+    keep_up: Callable[[], None]
+    end: Callable[[], object]
+
+    def awaited(self, store: Store, batch_ids: Sequence[str], new: int) -> AwaitedBatches:
+        """Batches of which ``new`` jobs were queued just now.
+
+        Raises HostError where student code is to be run here and cannot be enclosed.
+        """
+        unfinished = _unfinished(store, batch_ids)
+        if not unfinished:
+            return AwaitedBatches((), _nothing)
+        with Sandboxes() as sandboxes:
+            if self.ours:
+                sandboxes.begin("robot", ())
+            # It begins meanwhile, and so does the worker.
+            from service.commands.batch.waiting import Waiting
+            from service.queue.celery_app import make_celery
+            from service.queue.notifier import Notifier
+            from service.store.states import Lane
+
+            if self.ours:
+                # Here the reason can be said; a worker that refuses would only be seen to end.
+                sandboxes.check()
+        notifier = Notifier(make_celery(self.settings), store, self.settings)
+        notifier.grade(Lane.BATCH, new)
+        waiting = [Waiting(store, notifier, batch_id, progress(), self.keep_up) for batch_id in unfinished]
+        return AwaitedBatches(waiting, self.end)
 
 
 @contextmanager
-def marks_awaited(store: Store, settings: Settings, batch_ids: Sequence[str], new: int) -> Iterator[None]:
-    """All marks are there when the ``with`` begins, all plots when it ends; ``new`` jobs were queued just now."""
-    unfinished = _unfinished(store, batch_ids)
-    if not unfinished:
-        yield
+def started(store: Store, settings: Settings) -> Iterator[Services]:
+    """Services that begin to start, and are waited for no more than they must be; ours end with the ``with``."""
+    if settings.broker_url:
+        yield Services(settings, False, _nothing, _nothing)
         return
-    with ExitStack() as services:
-        if settings.broker_url:
-            broker, keep_up = settings, _nothing
-        else:
-            with Sandboxes() as sandboxes:
-                # Here the reason can be said; a worker that refuses would only be seen to end.
-                sandboxes.check()
-            embedded = services.enter_context(EmbeddedServices(settings, store))
-            broker, keep_up = embedded.settings, embedded.ensure
-        notifier = Notifier(make_celery(broker), store, broker)
-        notifier.grade(Lane.BATCH, new)
-        waiting = [Waiting(store, notifier, batch_id, progress(), keep_up) for batch_id in unfinished]
-        for each in waiting:
-            each.for_marks()
-        yield
-        for each in waiting:
-            each.for_plots()
+    with EmbeddedServices(settings, store) as embedded, ThreadPoolExecutor(1) as beside:
+        end = partial(beside.submit, embedded.stop, _GRACE_SECONDS)
+        yield Services(embedded.settings, True, embedded.ensure, end)
+
+
+@contextmanager
+def awaited(store: Store, settings: Settings, batch_ids: Sequence[str], new: int) -> Iterator[AwaitedBatches]:
+    """Batches of which ``new`` jobs were queued just now; services of our own have ended when the ``with`` ends."""
+    if not _unfinished(store, batch_ids):
+        yield AwaitedBatches((), _nothing)
+        return
+    with started(store, settings) as services:
+        yield services.awaited(store, batch_ids, new)
 
 
 def _unfinished(store: Store, batch_ids: Sequence[str]) -> list[str]:
     """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
+    from service.store.batches import batches
+    from service.store.states import BatchState
+
     unfinished = []
     with store.reading() as session:
         for batch_id in dict.fromkeys(batch_ids):
@@ -62,4 +118,4 @@ def _unfinished(store: Store, batch_ids: Sequence[str]) -> list[str]:
 
 
 def _nothing() -> None:
-    """Services that are not ours are kept up by others."""
+    """Services that are not ours are kept up, and ended, by others."""

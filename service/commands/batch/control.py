@@ -11,8 +11,10 @@ import typer
 
 from service.commands.shown import document, tell
 from service.settings import load_settings
-from service.store import audit, batch_control, batches
+from service.store import audit
+from service.store.batches import batches
 from service.store.engine import Store, open_store
+from service.store.queue import batch_control
 from sim.errors import UsageError
 
 BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning of it.")]

@@ -20,7 +20,7 @@ from service.reports.formats import FORMATS, Format
 from service.reports.rows import TableRow
 from service.reports.written import file_stems, refused_stems
 from service.settings import load_settings
-from service.store import batches, regrades
+from service.store.batches import batches, publishing
 from service.store.engine import open_store
 from service.store.states import JobState
 from sim.errors import UsageError
@@ -42,7 +42,7 @@ def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | N
             batch_id = batches.find_batch(session, batch)
             lines = batches.job_lines(session, batch_id)
             refusals = batches.batch(session, batch_id).refusals
-            waiting = regrades.unpublished_regrades(session, batch_id)
+            waiting = publishing.unpublished_regrades(session, batch_id)
         for line in lines:
             if line.state is JobState.DONE and line.suspect is None and line.staff_only is not None:
                 _warn(f"{line.student} is for staff only: {line.staff_only}; robomark show {line.id}")

@@ -12,11 +12,9 @@ from service.reports.similarity import as_plain, similarity_page, similarity_row
 from service.reports.view import SimilarityView, staff_similarity
 from service.reports.written import prepare_folder, write_page
 from service.settings import load_settings
-from service.similarity.sources import sources_of
-from service.store import batches, intake
-from service.store.batches import JobLine
-from service.store.engine import Store, open_store
-from service.store.similarities import similarities
+from service.store.batches import batches
+from service.store.batches.similarities import SourceTexts, similarities
+from service.store.engine import open_store
 
 #: Pairs on the screen and on the page; the JSON has all.
 _MOST_SHOWN = 100
@@ -33,7 +31,7 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
             lines = batches.job_lines(session, batch_id)
         view = staff_similarity(similarities(store, lines, given))
         if output is not None:
-            page = similarity_page(view, _Texts(store, lines).of, f"Alike in {name}", _MOST_SHOWN)
+            page = similarity_page(view, SourceTexts(store, lines).of, f"Alike in {name}", _MOST_SHOWN)
             path = write_page(output, "similar.html", page)
             note(f"evidence: {path}")
     document(assignments=as_plain(view))
@@ -50,16 +48,3 @@ def _show(view: SimilarityView) -> None:
             show(alike)
         if len(found.pairs) > _MOST_SHOWN:
             tell(f"and {len(found.pairs) - _MOST_SHOWN} pairs more: --json has them all")
-
-
-class _Texts:
-    """The sources that a page quotes, read when they are asked for."""
-
-    def __init__(self, store: Store, lines: list[JobLine]) -> None:
-        self._store = store
-        self._jobs = {(line.assignment, line.student): line.id for line in lines}
-
-    def of(self, assignment: str, student: str, file: str) -> str:
-        with self._store.reading() as session:
-            submission = intake.load_submission(session, self._jobs[assignment, student])
-        return sources_of(submission)[file]

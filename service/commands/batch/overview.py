@@ -5,6 +5,7 @@ What is in it is ``store/overview.py``'s.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,19 +15,20 @@ from service.commands.batch.control import BatchId
 from service.commands.shown import document, show, table, tell
 from service.commands.statistics_shown import named, statistics_parts
 from service.settings import load_settings
-from service.store import batches
-from service.store.batch_table import table_lines
+from service.store.batches import batches
+from service.store.batches.batch_table import table_lines
+from service.store.batches.overview import PASS_SHARE, missing, overview
+from service.store.courses.hidden_names import hidden_names
 from service.store.engine import open_store
-from service.store.hidden_names import hidden_names
 from service.store.installation import secret_of
 from service.store.models import Batch
-from service.store.overview import PASS_SHARE, overview
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from service.store.batch_table import TableLine
-    from service.store.overview import ClassOverview
+    from service.store.batches.batch_table import TableLine
+    from service.store.batches.overview import ClassOverview
+    from submissions.people import Student
 
 _WHY = {"low": "far below the others", "slow": "took far longer than the others", "close": "close to the pass mark"}
 
@@ -43,10 +45,12 @@ def show_overview(
         with store.reading() as session:
             batch_id = batches.find_batch(session, batch)
             course_id = session.get_one(Batch, batch_id).course_id
-            refusals = batches.batch(session, batch_id).refusals
-            lines = table_lines(session, batch_id, refusals, hidden_names(session, course_id, secret))
+            own = batches.batch(session, batch_id)
+            lines = table_lines(session, batch_id, own.refusals, hidden_names(session, course_id, secret))
             classes = overview(session, course_id, lines, Decimal(pass_mark) / 100)
-    document(batch=batch_id, classes=classes, refusals=refusals)
+            asked = own.web_assignment if not classes else None
+            nobody = missing(session, course_id, asked) if asked else ()
+    document(batch=batch_id, classes=classes, refusals=own.refusals, missing=nobody)
     by_id = {line.id: line for line in lines}
     for each in classes:
         show(*statistics_parts([each.statistics]), _distribution(each))
@@ -55,10 +59,15 @@ def show_overview(
             show(_outliers(each, by_id))
         for same in each.identical:
             tell(f"the very same: {named(tuple(line.student for line in same))}")
-        if each.missing:
-            tell(f"not submitted: {named(tuple(student.name or student.id for student in each.missing))}")
-    for refusal in refusals:
+        _tell_missing(each.missing)
+    _tell_missing(nobody)
+    for refusal in own.refusals:
         tell(f"refused: {refusal.source}: {refusal.reason}")
+
+
+def _tell_missing(students: Sequence[Student]) -> None:
+    if students:
+        tell(f"not submitted: {named(tuple(student.name or student.id for student in students))}")
 
 
 def _distribution(each: ClassOverview) -> Table:

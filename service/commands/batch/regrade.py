@@ -1,6 +1,6 @@
 """``robomark batch regrade`` and ``publish``: grade a batch again, see what changes and why, let it stand.
 
-What they do stands in ``store/regrades.py``.
+What they do stands in ``store/regrades.py`` and ``store/publishing.py``.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from service.commands.batch.control import BatchId
 from service.commands.batch.tables import changes_table
 from service.commands.shown import document, note, show, tell
 from service.settings import load_settings
-from service.store import audit, batches, regrades
+from service.store import audit
+from service.store.batches import batches, publishing, regrades
+from service.store.batches.publishing import Published
+from service.store.batches.regrades import Regraded
 from service.store.engine import Store, open_store
-from service.store.regrades import Published, Regraded
 from service.store.states import JobState, Lane
 from sim.errors import HostError
 
@@ -29,7 +31,7 @@ def regrade(
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
     # The queue takes long to load, which whoever publishes need not wait for.
-    from service.commands.batch.awaited import marks_awaited
+    from service.commands.batch.awaited import awaited
     from service.queue.celery_app import make_celery
     from service.queue.logs import configure_logging
     from service.queue.notifier import Notifier
@@ -48,11 +50,13 @@ def regrade(
             note(f"what changes, and why: robomark batch status {made.batch_id}")
             document(batch=made.batch_id, regraded=made)
             return
-        with marks_awaited(store, settings, [made.batch_id], made.jobs):
+        with awaited(store, settings, [made.batch_id], made.jobs) as regraded:
+            regraded.for_marks()
             with store.reading() as session:
                 changes = regrades.changes(session, made.batch_id)
             show(changes_table(changes))
             note(f"to let the new grades stand: robomark batch publish {made.batch_id}")
+            regraded.for_plots()
     document(batch=made.batch_id, regraded=made, changes=changes)
     dead = [change for change in changes if change.state is JobState.DEAD]
     if dead:
@@ -68,7 +72,7 @@ def publish(
     """Let the newest grades of a batch stand, and release them to the students."""
     with open_store(load_settings()) as store:
         batch_id = _find(store, batch)
-        done = regrades.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
+        done = publishing.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
     document(batch=batch_id, published=done)
     _tell_published(f"batch {batch_id}", done)
 
@@ -83,7 +87,7 @@ def publish_one(
     with open_store(load_settings()) as store:
         with store.reading() as session:
             job_id = batches.find_job(session, grade)
-        done = regrades.publish_one(store, job_id, actor=audit.this_user(), anyway=anyway)
+        done = publishing.publish_one(store, job_id, actor=audit.this_user(), anyway=anyway)
     document(grade=job_id, published=done)
     _tell_published(f"grade {job_id}", done)
 

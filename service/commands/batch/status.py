@@ -14,9 +14,11 @@ from service.commands.shown import document, show, tell
 from service.commands.statistics_shown import statistics_parts
 from service.grading.statistics import statistics_of
 from service.settings import load_settings
-from service.store import audit, batches, metrics, rankings, regrades
+from service.store import audit
+from service.store.batches import batches, publishing, rankings, regrades
 from service.store.engine import open_store
-from service.store.marked import marked
+from service.store.grades.marked import marked
+from service.store.queue import metrics
 
 
 def status(batch: BatchId) -> None:
@@ -26,7 +28,7 @@ def status(batch: BatchId) -> None:
         lines = batches.job_lines(session, line.id)
         ranks = rankings.rank_tables(session, lines)
         changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
-        waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, line.id)
+        waiting = 0 if line.regrade_of is not None else publishing.unpublished_regrades(session, line.id)
         history = audit.entries(session, "batch", line.id)
         pace = metrics.pace(session, line.id)
         statistics = statistics_of(marked(session, lines))

@@ -27,6 +27,7 @@ def submit(
         Path | None,
         typer.Option(help="Who is in the course: a .csv with id, name, email; Moodle's grading worksheet is one."),
     ] = None,
+    course: Annotated[str | None, typer.Option(help="The course, where there are several.")] = None,
 ) -> None:
     """Queue a submission for each student; bad ones are named and stop no other.
 
@@ -37,11 +38,42 @@ def submit(
     Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
     not be graded.
     """
-    from service.commands.batch import submitting
-
     if wait or output is not None:
-        refused = submitting.submit_and_wait(grading_requests, assignment, output=output, again=again, people=people)
+        refused = submit_and_wait(
+            grading_requests, assignment, output=output, again=again, people=people, course=course
+        )
     else:
-        refused = submitting.submit(grading_requests, assignment, again=again, people=people)
+        from service.commands.batch import submitting
+
+        refused = submitting.submit(grading_requests, assignment, again=again, people=people, course=course)
     if refused:
         raise UsageError(f"{refused} of the submissions could not be taken in; the others were")
+
+
+def submit_and_wait(
+    grading_requests: Path,
+    assignment: str | None,
+    *,
+    output: Path | None,
+    again: bool = True,
+    people: Path | None = None,
+    course: str | None = None,
+) -> int:
+    """Queue submissions, grade them with the services that run or with our own, and return how many were refused."""
+    from service.commands.batch.awaited import started
+    from service.queue.logs import configure_logging
+    from service.reports.written import prepare_folder
+    from service.settings import load_settings
+    from service.store.engine import open_store
+
+    if output is not None:
+        prepare_folder(output)
+    settings = load_settings()
+    configure_logging(settings.log_level)
+    with open_store(settings) as store, started(store, settings) as services:
+        # The worker begins while this loads, and while submissions are read and stored.
+        from service.commands.batch.submitting import submit_to
+
+        return submit_to(
+            services, store, grading_requests, assignment, output=output, again=again, people=people, course=course
+        )

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from service.grading.ranks import RankTable
     from service.store.audit import AuditEntry
-    from service.store.batches import JobLine
-    from service.store.regrades import Change, CriterionChange
+    from service.store.batches.batches import JobLine
+    from service.store.batches.regrades import Change, CriterionChange
     from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(

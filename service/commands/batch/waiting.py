@@ -25,12 +25,15 @@ from sqlalchemy import select
 
 from service.commands.shown import note
 from service.queue.notifier import Notifier
-from service.store import batches
+from service.store.batches import batches
 from service.store.engine import Store
 from service.store.models import Batch
 from service.store.states import BatchState
 
-_LOOK_SECONDS = 0.25
+#: Whoever has waited for long sees the end a little later, and takes no time from those who grade.
+_SHORTEST_LOOK_SECONDS = 0.05
+_LONGEST_LOOK_SECONDS = 0.25
+_LOOKS = 20  # in the time that was waited so far
 _REAP_SECONDS = 2.0
 
 
@@ -66,21 +69,18 @@ class Waiting:
 
     def for_plots(self) -> None:
         """Return when the plots of all graded jobs are drawn, or given up."""
-        most = self._look().plots_due
+        most = self._look()[0].plots_due
         self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
 
-    def _held(self) -> bool:
+    def _look(self) -> tuple[batches.BatchProgress, bool]:
+        """How far it is, and whether it is paused; each look takes time from those who grade."""
         with self.store.reading() as session:
             state = session.scalar(select(Batch.state).where(Batch.id == self.batch_id))
-        return state is BatchState.PAUSED
-
-    def _look(self) -> batches.BatchProgress:
-        with self.store.reading() as session:
-            return batches.progress(session, self.batch_id)
+            return batches.progress(session, self.batch_id), state is BatchState.PAUSED
 
     def _wait(self, what: str, count: Callable[[batches.BatchProgress], tuple[int, int, float]]) -> None:
         """``count`` gives how many there are, how many are done, and how much of the next ones."""
-        total, before, _ = count(self._look())
+        total, before, _ = count(self._look()[0])
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -90,19 +90,21 @@ class Waiting:
         )
         with Progress(*columns, console=self.console, transient=True) as bars:
             bar = bars.add_task(what, total=total, completed=before, before=before)
-            swept = float("-inf")
+            begun, swept = time.monotonic(), float("-inf")
             was_held = False
             while True:
-                if (held := self._held()) is not was_held:
-                    goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
-                    note(f"batch {self.batch_id} {goes_on}")
-                    was_held = held
                 self.keep_up()
                 if time.monotonic() - swept >= _REAP_SECONDS:
                     self.notifier.catch_up()
                     swept = time.monotonic()
-                total, done, partial = count(self._look())
+                far, held = self._look()
+                if held is not was_held:
+                    goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
+                    note(f"batch {self.batch_id} {goes_on}")
+                    was_held = held
+                total, done, partial = count(far)
                 bars.update(bar, total=total, completed=min(done + partial, total))
                 if done >= total:
                     return
-                time.sleep(_LOOK_SECONDS)
+                waited = time.monotonic() - begun
+                time.sleep(min(max(_SHORTEST_LOOK_SECONDS, waited / _LOOKS), _LONGEST_LOOK_SECONDS))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from decimal import Decimal
 
-from service.store.batches import BatchLine, JobLine
-from service.store.policies import in_days
+from service.store.batches.batches import BatchLine, JobLine
+from service.store.courses.policies import in_days
 from service.store.states import BatchState, JobState
 
 #: Students that a sentence names.
@@ -15,8 +15,11 @@ _MOST_NAMED = 10
 
 def summary(line: BatchLine) -> str:
     """How many jobs of a batch are in each state."""
+    if line.web_assignment is not None:
+        held = "open: " if line.takes_in else "closed: "
+    else:
+        held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
     parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
     return held + (", ".join(parts) or "empty")
 
 

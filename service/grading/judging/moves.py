@@ -30,7 +30,7 @@ _REST = 2
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One move: rows from ``first`` to ``last`` (``whereabouts``), and what it came to (mm, degrees, seconds)."""
+    """One move: rows from ``first`` to ``last`` of the recording, and what it came to (mm, degrees, seconds)."""
 
     first: int
     last: int

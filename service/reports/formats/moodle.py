@@ -82,7 +82,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
 @packed("moodle-feedback", ".zip")
 def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, ...]:
     """A report for each submission that came from Moodle, where its import of feedback files looks for it."""
-    left_over = []
+    left_over, taken = [], 0
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for page in pages:
             number_of = moodle_number(page.row.source)
@@ -92,6 +92,9 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
             name = re.sub(r"[_/\\\s]+", " ", page.row.source.partition(f"_{number_of}_")[0])
             path = f"{name}_{number_of}_assignfeedback_file_/feedback.html"
             archive.writestr(zipfile.ZipInfo(path, _EPOCH), page.html, zipfile.ZIP_DEFLATED)
+            taken += 1
+    if not taken:
+        raise UsageError("none of these submissions came from Moodle, expected some of a download of its assignment")
     return tuple(left_over)
 
 

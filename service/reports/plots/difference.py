@@ -10,8 +10,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from service.language import ENGLISH, Language
 from service.reports.plots.talk import Talk, party_of
 from service.reports.readable import one_line
+from service.reports.robots import called
 from submissions.diagram import Diagram, DiagramActor
 
 Pair = tuple[str, str]
@@ -87,21 +89,34 @@ def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
     )
 
 
-def in_words(found: Differences) -> str:
+def in_words(found: Differences, language: Language = ENGLISH) -> str:
     """The differences as sentences."""
     if not found:
-        return "It shows what happened."
+        return language.say("It shows what happened.")
     told = []
     if found.drawn_actors:
-        told.append(f"{_listed(found.drawn_actors)} took no part.")
+        told.append(language.say("%(names)s took no part.", names=_listed(found.drawn_actors, language)))
     if found.drawn_arrows:
-        told.append(f"{_listed(map(_arrow, found.drawn_arrows))} did not happen.")
+        arrows = _listed(map(_arrow, found.drawn_arrows), language)
+        told.append(language.say("%(arrows)s did not happen.", arrows=arrows))
     if found.happened_actors:
-        verb = "is" if len(found.happened_actors) == 1 else "are"
-        told.append(f"{_listed(found.happened_actors)} took part and {verb} not drawn.")
+        told.append(
+            language.counted(
+                "%(names)s took part and is not drawn.",
+                "%(names)s took part and are not drawn.",
+                len(found.happened_actors),
+                names=_listed((called(name, language) for name in found.happened_actors), language),
+            )
+        )
     if found.happened_arrows:
-        verb = "is" if len(found.happened_arrows) == 1 else "are"
-        told.append(f"{_listed(map(_arrow, found.happened_arrows))} happened and {verb} not drawn.")
+        told.append(
+            language.counted(
+                "%(arrows)s happened and is not drawn.",
+                "%(arrows)s happened and are not drawn.",
+                len(found.happened_arrows),
+                arrows=_listed(map(_arrow, found.happened_arrows), language),
+            )
+        )
     return " ".join(told)
 
 
@@ -135,9 +150,10 @@ def _arrow(pair: Pair) -> str:
     return f"{one_line(pair[0], 30)} → {one_line(pair[1], 30)}"
 
 
-def _listed(names: Iterable[str]) -> str:
+def _listed(names: Iterable[str], language: Language) -> str:
     """Names as a sentence has them, few enough to be read."""
     found = [one_line(name, 70) for name in names]
     if len(found) > _MOST_NAMED:
-        found = [*found[: _MOST_NAMED - 1], f"{len(found) - _MOST_NAMED + 1} more"]
-    return " and ".join([", ".join(found[:-1]), found[-1]] if len(found) > 1 else found)
+        more = language.say("%(count)s more", count=len(found) - _MOST_NAMED + 1)
+        found = [*found[: _MOST_NAMED - 1], more]
+    return language.say(" and ").join([", ".join(found[:-1]), found[-1]] if len(found) > 1 else found)

@@ -8,35 +8,28 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from matplotlib.figure import Figure
-
-from service.grading.grade import AccuracyCurve, CriterionResult, Grade
-from service.reports.plots.confusion import draw_confusion
-from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.misread import draw_misread, misread
-from service.reports.plots.own_diagrams import draw_own, own_diagrams
-from service.reports.plots.path import Pixels, draw_path
+from service.grading.grade import CriterionResult, Grade, Prediction
+from service.language import ENGLISH, Language
+from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
 from service.reports.plots.plot import Plot, hidden_suffix, slug, title_of, trial_name
-from service.reports.plots.predictions import chosen_predictions, draw_predictions, is_right
-from service.reports.plots.sensor import draw_sensors
-from service.reports.plots.style import png, turned
-from service.reports.plots.track import draw_track, tracks, worst_track
-from service.reports.readable import one_line
+from service.reports.plots.sensor_images import chosen_predictions, is_right, misread
+from service.reports.plots.taken import tracks
+from service.reports.readable import one_line, turned
 from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
-from sim.recorded import floor_of, stood_still
-from sim.recording import Recording
+from sim.floors.canvas import Pixels
+from sim.recorded import stood_still
+from sim.recording import Pose, Recording
 from submissions.diagram_cells import DiagramCell
-from submissions.sweep import CONDITIONS, Varied
 
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
-def plots_of(grade: Grade) -> tuple[Plot, ...]:
+def plots_of(grade: Grade, language: Language = ENGLISH) -> tuple[Plot, ...]:
     """Path and sensors of every scenario's worst trial, and classifications, once for criteria that share them.
 
-    Of a robot that stood still there is neither path nor sensors.
+    Of a robot that stood still there is neither path nor sensors. What is written in a plot itself is English.
     """
-    return (*_classifications(grade), *_trials(grade))
+    return (*_classifications(grade, language), *_trials(grade, language))
 
 
 def draw_all(
@@ -51,54 +44,27 @@ def draw_all(
     for view in (staff_view(grade), student_view(grade)):
         for plot in plots_of(view.grade):
             if plot.name not in drawn:
-                drawn[plot.name] = png(_draw(view.grade, plot, images))
+                drawn[plot.name] = _picture(view.grade, plot, images)
         for own in own_diagrams(view.grade, cells):
             for plot in own.plots:
                 if plot.name not in drawn:
-                    drawn[plot.name] = png(draw_own(own, view.grade, plot))
+                    drawn[plot.name] = _own_picture(own, view.grade, plot)
     return drawn
 
 
-def _draw(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
-    if plot.kind == "path":
-        trial = grade.trials[plot.subject]
-        return draw_path(trial, plot.title, _floor(trial.recording, images))
-    if plot.kind == "sensors":
-        return draw_sensors(grade.trials[plot.subject], plot.title)
-    result = grade.criteria[plot.subject]
-    if plot.kind == "confusion" and result.accuracy is not None:
-        return draw_confusion(result, result.accuracy, plot.title)
-    if plot.kind == "curves":
-        return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
-    if plot.kind == "track":
-        worst = worst_track(result.predictions, grade.trials)
-        floor = _floor(grade.trials[worst].recording, images)
-        return draw_track(result.predictions, grade.trials, plot.title, floor)
-    if plot.kind == "misread":
-        return draw_misread(misread(result.predictions), len(result.predictions), plot.title)
-    return draw_predictions(result.predictions, plot.title)
+def _picture(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
+    # Who has nothing to draw need not load the drawing library, nor who only says what is drawn.
+    from service.reports.plots.figures import figure_of
+    from service.reports.plots.style import png
+
+    return png(figure_of(grade, plot, images))
 
 
-def _panel(curve: AccuracyCurve) -> AccuracyPanel:
-    about = CONDITIONS[curve.along] if curve.along in CONDITIONS else Varied(curve.along, "", 0, 0)
-    levels = curve.levels
-    drawn = Curve(
-        "",
-        tuple(level.at for level in levels),
-        tuple(level.value for level in levels),
-        tuple(level.low for level in levels),
-        tuple(level.high for level in levels),
-        tuple(level.n for level in levels),
-    )
-    return AccuracyPanel(about.words, about.unit, (drawn,), curve.asked)
+def _own_picture(own: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
+    from service.reports.plots.drawn_diagrams import draw_own
+    from service.reports.plots.style import png
 
-
-def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
-    """The floor as it was in the trial, with the same digits and label patches."""
-    if recording.background in images:
-        return images[recording.background]
-    floor = floor_of(recording)
-    return floor.pixels if floor else None
+    return png(draw_own(own, grade, plot))
 
 
 def same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:
@@ -112,7 +78,8 @@ def same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:
     return tuple(map(tuple, alike.values()))
 
 
-def _classifications(grade: Grade) -> Iterator[Plot]:
+def _classifications(grade: Grade, language: Language) -> Iterator[Plot]:
+    say = language.say
     for index, *_ in same_answers(grade):
         result = grade.criteria[index]
         suffix = hidden_suffix(tells_of_hidden(grade, result))
@@ -120,66 +87,99 @@ def _classifications(grade: Grade) -> Iterator[Plot]:
         if accuracy is not None and accuracy.confusion:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
-                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of("what was answered"),
-                f"What each image showed and what was answered, for “{one_line(result.title, 80)}”.",
-                f"Confusion matrix: {right} of {accuracy.n} images on the diagonal, accuracy {accuracy.value:.2f}, "
-                f"interval {accuracy.low:.2f} to {accuracy.high:.2f}.",
+                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of(say("what was answered")),
+                say(
+                    "What each image showed and what was answered, for “%(criterion)s”.",
+                    criterion=one_line(result.title, 80),
+                ),
+                say(
+                    "Confusion matrix: %(right)s of %(all)s images on the diagonal, accuracy %(value)s, "
+                    "interval %(low)s to %(high)s.",
+                    right=right, all=accuracy.n, value=f"{accuracy.value:.2f}", low=f"{accuracy.low:.2f}",
+                    high=f"{accuracy.high:.2f}",
+                ),
             )  # fmt: skip
-        yield from _along(grade, index, result, suffix)
+        yield from _along(grade, index, result, suffix, language)
         if result.predictions:
-            shown = len(chosen_predictions(result.predictions))
             wrong = [prediction for prediction in result.predictions if not is_right(prediction)]
-            told = "; ".join(
-                f"{one_line(prediction.truth, 40)} answered as {one_line(prediction.answer or 'nothing', 40)}"
-                for prediction in wrong[:4]
-            )
             yield Plot(
                 f"predictions-{slug(result.id)}{suffix}",
                 "predictions",
                 index,
                 "",
-                title_of("what the sensor saw"),
-                "What the left light sensor sent, whole and in the focus that a network is shown. "
-                "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer.",
-                f"{shown} sensor images, {len(wrong)} of {len(result.predictions)} answered wrongly"
-                + (f": {told}." if told else "."),
+                title_of(say("what the sensor saw")),
+                say(
+                    "What the left light sensor sent, whole and in the focus that a network is shown. "
+                    "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer."
+                ),
+                _told_of_predictions(result, wrong, language),
             )  # fmt: skip
 
 
-def _along(grade: Grade, index: int, result: CriterionResult, suffix: str) -> Iterator[Plot]:
+def _told_of_predictions(result: CriterionResult, wrong: Sequence[Prediction], language: Language) -> str:
+    answered = "; ".join(
+        language.say(
+            "%(truth)s answered as %(answer)s",
+            truth=one_line(prediction.truth, 40),
+            answer=one_line(prediction.answer or language.say("nothing"), 40),
+        )
+        for prediction in wrong[:4]
+    )
+    told = language.say(
+        "%(shown)s sensor images, %(wrong)s of %(all)s answered wrongly",
+        shown=len(chosen_predictions(result.predictions)),
+        wrong=len(wrong),
+        all=len(result.predictions),
+    )
+    return f"{told}: {answered}." if answered else f"{told}."
+
+
+def _along(grade: Grade, index: int, result: CriterionResult, suffix: str, language: Language) -> Iterator[Plot]:
     """How accuracy changes along what is swept and along the way, and what was misread."""
+    say = language.say
     title = one_line(result.title, 80)
     if result.curves:
         told = "; ".join(
             f"{one_line(curve.along, 20)}: "
-            + ", ".join(f"{level.value:.2f} at {level.at:g}" for level in curve.levels[:9])
+            + ", ".join(
+                say("%(accuracy)s at %(level)s", accuracy=f"{level.value:.2f}", level=f"{level.at:g}")
+                for level in curve.levels[:9]
+            )
             for curve in result.curves
         )
         yield Plot(
-            f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of("robustness"),
-            f"How often images were named rightly as conditions got harder, for “{title}”.",
-            f"Curves of accuracy. {told}.",
+            f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of(say("robustness")),
+            say("How often images were named rightly as conditions got harder, for “%(criterion)s”.", criterion=title),
+            say("Curves of accuracy. %(curves)s.", curves=told),
         )  # fmt: skip
     on_track = tracks(result.predictions, grade.trials)
     if on_track:
         right = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
-            f"track-{slug(result.id)}{suffix}", "track", index, "", title_of("along the track"),
-            "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
-            "floor, and in all trials by the way driven.",
-            f"{right} of {len(result.predictions)} images right along the track in {len(on_track)} trials.",
+            f"track-{slug(result.id)}{suffix}", "track", index, "", title_of(say("along the track")),
+            say(
+                "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
+                "floor, and in all trials by the way driven."
+            ),
+            say(
+                "%(right)s of %(all)s images right along the track in %(trials)s trials.",
+                right=right, all=len(result.predictions), trials=len(on_track),
+            ),
         )  # fmt: skip
     wrong = misread(result.predictions)
     if wrong:
         yield Plot(
-            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of("what was misread"),
-            "Images that were misread, each beside the nearest one of the same truth that was read rightly, and the "
-            "nearest right one of what it was taken for.",
-            f"{len(wrong)} of {len(result.predictions)} images were misread.",
+            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of(say("what was misread")),
+            say(
+                "Images that were misread, each beside the nearest one of the same truth that was read rightly, and "
+                "the nearest right one of what it was taken for."
+            ),
+            say("%(wrong)s of %(all)s images were misread.", wrong=len(wrong), all=len(result.predictions)),
         )  # fmt: skip
 
 
-def _trials(grade: Grade) -> Iterator[Plot]:
+def _trials(grade: Grade, language: Language) -> Iterator[Plot]:
+    say = language.say
     for scenario in scenarios(grade):
         index = worst_trial(grade, scenario)
         trial = grade.trials[index]
@@ -188,30 +188,51 @@ def _trials(grade: Grade) -> Iterator[Plot]:
             continue
         name = trial_name(trial)
         title = title_of(scenario)
-        start, end = recording.start, recording.end
         yield Plot(
-            f"path-{name}", "path", index, scenario, f"{title}: path",
-            "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
-            "darts point where it was heading. The circles are its light sensors, left blue, right orange.",
-            f"Path over the floor {one_line(recording.background, 40)} from ({start.x:.0f}, {start.y:.0f}) mm, heading "
-            f"{turned(start.heading)} degrees, to ({end.x:.0f}, {end.y:.0f}) mm, heading "
-            f"{turned(end.heading)} degrees, in {recording.end_t:.1f} seconds; "
-            f"{len(recording.touches)} touches." + _partners_way(recording.partner),
+            f"path-{name}", "path", index, scenario, say("%(scenario)s: path", scenario=title),
+            say(
+                "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
+                "darts point where it was heading. The circles are its light sensors, left blue, right orange."
+            ),
+            _told_of_path(recording, language),
         )  # fmt: skip
         light = recording.ticks.left_rgb[:, 0]
-        heard = f"left light between {light.min():.0f} and {light.max():.0f}" if len(light) else "no readings"
+        heard = say("no readings")
+        if len(light):
+            heard = say("left light between %(low)s and %(high)s", low=f"{light.min():.0f}", high=f"{light.max():.0f}")
         yield Plot(
-            f"sensors-{name}", "sensors", index, scenario, f"{title}: sensors",
-            "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
-            "messages sent, answers received, speech, touches and faults.",
-            f"Sensor readings over {recording.end_t:.1f} seconds: {heard}, with messages and speech marked.",
+            f"sensors-{name}", "sensors", index, scenario, say("%(scenario)s: sensors", scenario=title),
+            say(
+                "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
+                "messages sent, answers received, speech, touches and faults."
+            ),
+            say(
+                "Sensor readings over %(seconds)s seconds: %(readings)s, with messages and speech marked.",
+                seconds=f"{recording.end_t:.1f}", readings=heard,
+            ),
         )  # fmt: skip
 
 
-def _partners_way(partner: Recording | None) -> str:
-    if partner is None:
-        return ""
-    return (
-        f" The second robot's from ({partner.start.x:.0f}, {partner.start.y:.0f}) mm to "
-        f"({partner.end.x:.0f}, {partner.end.y:.0f}) mm."
+def _told_of_path(recording: Recording, language: Language) -> str:
+    start, end, partner = recording.start, recording.end, recording.partner
+    told = language.say(
+        "Path over the floor %(floor)s from %(start)s mm, heading %(heading)s degrees, to %(end)s mm, heading "
+        "%(end_heading)s degrees, in %(seconds)s seconds; %(touches)s touches.",
+        floor=one_line(recording.background, 40),
+        start=_at(start),
+        heading=turned(start.heading),
+        end=_at(end),
+        end_heading=turned(end.heading),
+        seconds=f"{recording.end_t:.1f}",
+        touches=len(recording.touches),
     )
+    if partner is None:
+        return told
+    other = language.say(
+        "The second robot's from %(start)s mm to %(end)s mm.", start=_at(partner.start), end=_at(partner.end)
+    )
+    return f"{told} {other}"
+
+
+def _at(pose: Pose) -> str:
+    return f"({pose.x:.0f}, {pose.y:.0f})"

@@ -8,7 +8,8 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure, turned, whole
+from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure
+from service.reports.readable import turned, whole
 from sim.floors import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm

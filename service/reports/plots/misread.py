@@ -1,62 +1,26 @@
 """Draws the images that were misread, each beside the nearest ones that were read rightly.
 
-Nearest is by the grey values of the focus that a network is shown; nothing is judged here.
+Which these are is ``sensor_images.py``'s.
 """
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from service.grading.grade import Prediction
-from service.reports.plots.predictions import focus_image, is_right
+from service.reports.plots.sensor_images import MOST_MISREAD, Misread, focus_image
 from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
 
-MOST_MISREAD = 6
 _SIDE, _GAP, _ROW = 0.76, 0.10, 1.24  # inches
 _HEADS = 0.34
 _TEXT = 3 * (_SIDE + _GAP) + 0.08
-
-
-@dataclass(frozen=True, slots=True)
-class Misread:
-    """An image that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
-
-    number: int  # of the image, from 1
-    prediction: Prediction
-    like_truth: Prediction | None
-    like_answer: Prediction | None
-
-
-def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
-    """Every image that was answered, and wrongly, in the order in which they were sent.
-
-    The nearest ones are looked for only for the images that are drawn.
-    """
-    wrong = [
-        (number, prediction)
-        for number, prediction in enumerate(predictions, start=1)
-        if prediction.answer is not None and not is_right(prediction)
-    ]
-    greys = [(prediction, _greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
-    drawn = (
-        Misread(
-            number,
-            prediction,
-            _nearest(prediction, prediction.truth, greys),
-            _nearest(prediction, prediction.answer, greys),
-        )
-        for number, prediction in wrong[:MOST_MISREAD]
-    )
-    return (*drawn, *(Misread(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
 
 
 def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
@@ -113,15 +77,3 @@ def _write(
     axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, ha: str = "left", bold: bool = False
 ) -> None:
     axes.text(x, y, drawable(text), color=colour, font=font(size, bold=bold), ha=ha, va="center", parse_math=False)
-
-
-def _greys(prediction: Prediction) -> NDArray[np.float64]:
-    return np.asarray(focus_image(prediction.image), dtype=np.float64)
-
-
-def _nearest(
-    prediction: Prediction, label: str | None, greys: Sequence[tuple[Prediction, NDArray[np.float64]]]
-) -> Prediction | None:
-    own = _greys(prediction)
-    alike = [(prediction, grey) for prediction, grey in greys if prediction.truth == label and grey.shape == own.shape]
-    return min(alike, key=lambda pair: float(((pair[1] - own) ** 2).sum()), default=(None, own))[0]

@@ -6,29 +6,26 @@ Of several diagrams of a kind the one that is closest to what happened is compar
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
-from matplotlib.figure import Figure
-
 from service.grading.grade import Grade
-from service.reports.plots.blocks import draw_blocks
-from service.reports.plots.diagram_parts import Highlights
-from service.reports.plots.difference import Differences, differences, in_words, party_of_actor
-from service.reports.plots.lanes import draw_lanes
+from service.language import ENGLISH, Language, translatable
+from service.reports.plots.difference import Differences, differences, in_words
 from service.reports.plots.plot import Plot, trial_name
-from service.reports.plots.sequence import conversation
-from service.reports.plots.style import FAULT
-from service.reports.plots.talk import block_diagram, party_of, sequence_diagram, talks
+from service.reports.plots.talk import talks
 from service.reports.readable import one_line
 from service.reports.view import is_for_staff
-from submissions.diagram import Diagram, DiagramActor, DiagramKind
+from service.reports.words import trial_words
+from submissions.diagram import DiagramKind
 from submissions.diagram_cells import DiagramCell
 
-_HAPPENED = "#8a5a00"
-_KINDS: Mapping[DiagramKind, str] = MappingProxyType({"blockdiag": "block diagram", "seqdiag": "sequence diagram"})
-#: Of a conversation, beside a diagram of it.
-_MOST_EXCHANGES, _MOST_STEPS = 2, 24
+_TITLES: Mapping[DiagramKind, str] = MappingProxyType(
+    {
+        "blockdiag": translatable("Cell %(cell)s: block diagram"),
+        "seqdiag": translatable("Cell %(cell)s: sequence diagram"),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +39,7 @@ class OwnDiagram:
     plots: tuple[Plot, ...]
 
 
-def own_diagrams(grade: Grade, cells: Sequence[DiagramCell]) -> tuple[OwnDiagram, ...]:
+def own_diagrams(grade: Grade, cells: Sequence[DiagramCell], language: Language = ENGLISH) -> tuple[OwnDiagram, ...]:
     """The diagrams of the notebook's ``cells``, from the top.
 
     What happened is that of the first trial in which anything was sent, a visible one where there is one.
@@ -50,45 +47,19 @@ def own_diagrams(grade: Grade, cells: Sequence[DiagramCell]) -> tuple[OwnDiagram
     talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
     talking.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
     if not talking:
-        return tuple(_alone(cell) for cell in cells)
+        return tuple(_alone(cell, language) for cell in cells)
     compared = _closest(grade, cells, talking[0])
     return tuple(
-        _compared(cell, compared[cell.cell], grade, talking[0]) if cell.cell in compared else _alone(cell)
+        _compared(cell, compared[cell.cell], grade, talking[0], language)
+        if cell.cell in compared
+        else _alone(cell, language)
         for cell in cells
     )
 
 
-def draw_own(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
-    """One of the two plots of ``own``."""
-    found = own.differences or Differences()
-    if plot.kind == "own":
-        highlights = Highlights(
-            frozenset(found.drawn_actors), frozenset(found.drawn_arrows), FAULT, "✗", "drawn, did not happen"
-        )
-        return draw_diagram(own.cell.diagram, plot.title, "as the notebook draws it", highlights)
-    trial = grade.trials[plot.subject]
-    subtitle = f"{one_line(trial.scenario, 40)}, trial {trial.index + 1}, as it was observed"
-    actors, arrows = found.happened_actors, found.happened_arrows
-    if own.cell.diagram.kind == "blockdiag":
-        happened = block_diagram(talks(trial.recording))
-    else:
-        happened = sequence_diagram(conversation(trial.recording, _MOST_EXCHANGES, _MOST_STEPS))
-        happened = replace(happened, actors=_in_order(happened.actors, own.cell.diagram.actors))
-        actors = tuple(map(party_of, actors))
-        arrows = tuple((party_of(one), party_of(other)) for one, other in arrows)
-    highlights = Highlights(frozenset(actors), frozenset(arrows), _HAPPENED, "+", "happened, is not drawn")
-    return draw_diagram(happened, plot.title, subtitle, highlights)
-
-
-def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
-    """A diagram of either kind."""
-    draw = draw_blocks if diagram.kind == "blockdiag" else draw_lanes
-    return draw(diagram, title, subtitle, highlights)
-
-
-def title_of_cell(cell: DiagramCell) -> str:
+def title_of_cell(cell: DiagramCell, language: Language = ENGLISH) -> str:
     """What a cell's diagram is called."""
-    return f"Cell {cell.cell}: {_KINDS[cell.diagram.kind]}"
+    return language.say(_TITLES[cell.diagram.kind], cell=cell.cell)
 
 
 def _closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int, Differences]:
@@ -103,33 +74,34 @@ def _closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int
     return dict(best.values())
 
 
-def _in_order(parties: Sequence[DiagramActor], drawn: Sequence[DiagramActor]) -> tuple[DiagramActor, ...]:
-    """Parties in the order in which they are drawn; those that are not come after them."""
-    order = [party_of_actor(actor) for actor in drawn]
-    return tuple(sorted(parties, key=lambda party: order.index(party.name) if party.name in order else len(order)))
+def _alone(cell: DiagramCell, language: Language) -> OwnDiagram:
+    title, caption = title_of_cell(cell, language), language.say("As the notebook draws it.")
+    plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title, caption, _alt(cell, language))
+    return OwnDiagram(cell, None, title, "", (plot,))
 
 
-def _alone(cell: DiagramCell) -> OwnDiagram:
-    plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title_of_cell(cell), "As the notebook draws it.", _alt(cell))
-    return OwnDiagram(cell, None, plot.title, "", (plot,))
-
-
-def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int) -> OwnDiagram:
+def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, language: Language) -> OwnDiagram:
+    say = language.say
     trial = grade.trials[index]
-    title, words, name = title_of_cell(cell), in_words(found), f"cell-{cell.cell}-{trial_name(trial)}"
-    where = f"{one_line(trial.scenario, 60)}, trial {trial.index + 1}"
-    drawn = " ✗: it did not happen." if found.drawn_actors or found.drawn_arrows else ""
-    happened = " +: it is not drawn." if found.happened_actors or found.happened_arrows else ""
+    name = f"cell-{cell.cell}-{trial_name(trial)}"
+    title, words, where = title_of_cell(cell, language), in_words(found, language), trial_words(trial, language)
+    drawn, happened = say("As the notebook draws it."), say("As it was observed in %(trial)s.", trial=where)
+    if found.drawn_actors or found.drawn_arrows:
+        drawn += " " + say("✗: it did not happen.")
+    if found.happened_actors or found.happened_arrows:
+        happened += " " + say("+: it is not drawn.")
+    beside = say("The same of what happened in %(trial)s.", trial=where)
     plots = (
-        Plot(f"own-{name}", "own", index, "", title, f"As the notebook draws it.{drawn}", f"{_alt(cell)} {words}"),
-        Plot(
-            f"happened-{name}", "happened", index, "", "What happened",
-            f"As it was observed in {where}.{happened}", f"The same of what happened in {where}. {words}",
-        ),
-    )  # fmt: skip
+        Plot(f"own-{name}", "own", index, "", title, drawn, f"{_alt(cell, language)} {words}"),
+        Plot(f"happened-{name}", "happened", index, "", say("What happened"), happened, f"{beside} {words}"),
+    )
     return OwnDiagram(cell, found, title, words, plots)
 
 
-def _alt(cell: DiagramCell) -> str:
-    names = ", ".join(one_line(actor.label, 30) for actor in cell.diagram.actors)
-    return f"{title_of_cell(cell)} of {names}, with {len(cell.diagram.arrows)} arrows."
+def _alt(cell: DiagramCell, language: Language) -> str:
+    return language.say(
+        "%(title)s of %(names)s, with %(arrows)s arrows.",
+        title=title_of_cell(cell, language),
+        names=", ".join(one_line(actor.label, 30) for actor in cell.diagram.actors),
+        arrows=len(cell.diagram.arrows),
+    )

@@ -38,10 +38,9 @@ from service.reports.plots.style import (
     axes_at,
     font,
     new_figure,
-    turned,
-    whole,
     write,
 )  # fmt: skip
+from service.reports.readable import turned, whole
 from sim.recorded import robot_of
 from sim.recording import Pose, Recording
 
@@ -56,6 +55,7 @@ _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
 _LEGEND_COLUMNS = 2
 _OFF_THE_FLOOR = "#a3aab1"
 _DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
+
 _BEACON: Mapping[str, Any] = MappingProxyType(
     {"marker": "*", "linestyle": "none", "markersize": 12, "color": RIGHT, "markeredgecolor": INK}
 )

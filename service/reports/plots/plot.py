@@ -13,6 +13,8 @@ from service.grading.grade import TrialResult
 from service.reports.readable import one_line
 from service.reports.view import is_for_staff
 
+#: Of every picture, in each inch.
+DPI = 200
 Kind = Literal[
     "path",
     "sensors",

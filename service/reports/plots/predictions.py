@@ -13,16 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
-from PIL import Image as Pixels
 
 from service.grading.grade import Prediction
+from service.reports.plots.sensor_images import FOCUS, chosen_predictions, focus_image, is_right, sensor_image
 from service.reports.plots.style import FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
 from service.reports.readable import one_line
-from sim.recording import Image
 
-MOST_PREDICTIONS = 12
-#: The part of the 20 x 20 image that lies wholly inside the round sensor: left, upper, right, lower.
-FOCUS = (3, 3, 17, 17)
 _CARD_WIDTH, _CARD_HEIGHT = 1.93, 1.70
 _LINE = 28  # characters that fit under a card
 _SIDE = 0.83  # inches of an image
@@ -43,28 +39,6 @@ def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
     axes.set_xlim(-0.08, WIDTH - 0.12)
     axes.set_ylim(height, -0.06)
     return figure
-
-
-def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
-    """Indices of the images to show, ascending; if there are too many, all wrong ones come first."""
-    order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
-    return tuple(sorted(order[:MOST_PREDICTIONS]))
-
-
-def is_right(prediction: Prediction) -> bool:
-    """Whether the answer was the truth."""
-    return prediction.answer is not None and prediction.answer == prediction.truth
-
-
-def sensor_image(image: Image) -> Pixels.Image:
-    """What the left sensor sent, as an RGB image of ``image.side`` squared."""
-    return Pixels.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
-
-
-def focus_image(image: Image) -> Pixels.Image:
-    """The greyscale crop that a network is shown; sensors of another size than 20 are shown whole."""
-    whole = sensor_image(image).convert("L")
-    return whole.crop(FOCUS) if image.side == 20 else whole
 
 
 def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:

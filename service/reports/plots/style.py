@@ -21,13 +21,13 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
+from service.reports.plots.plot import DPI
 from service.reports.readable import one_line
 
 #: Inches. A phone shows it 390 pixels wide, on which the smallest type is 11 pixels high.
 WIDTH = 3.9
 _SMALLEST = 8.0  # points
 _CHARACTERS = 15.2  # of a subtitle that fit into an inch
-DPI = 200
 _MOST_PIXELS = 6_000_000
 
 INK = "#1c2630"
@@ -108,16 +108,6 @@ def drawable(text: str) -> str:
     """``text`` with every character that the type lacks replaced, so that none is drawn as an empty box."""
     known = _known_characters()
     return "".join(character if character == "\n" or ord(character) in known else "\ufffd" for character in text)
-
-
-def whole(value: float) -> str:
-    """``value`` without decimals, with a true minus sign and never as minus nought."""
-    return str(round(value)).replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
-
-
-def turned(heading: float) -> str:
-    """A heading as whole degrees from 0 to 359, however often the robot has turned round."""
-    return str(round(heading) % 360) if math.isfinite(heading) else "?"
 
 
 def png(figure: Figure) -> bytes:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from service.language import ENGLISH, Language
 from service.reports.plots.sequence import PARTIES, SequenceDiagram, Step
 from service.reports.readable import one_line
-from service.reports.robots import PARTNER_OF, SECOND, robots_of
+from service.reports.robots import PARTNER_OF, SECOND, called, robots_of
 from sim.recording import Call, Recording
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
@@ -72,10 +73,19 @@ def party_of(name: str) -> str:
     return name if name in _NAMED else "network"
 
 
-def talk_words(told: tuple[Talk, ...]) -> str:
+def talk_words(told: tuple[Talk, ...], language: Language = ENGLISH) -> str:
     """Who told whom how often, in a sentence; empty where nobody told anything."""
-    counts = ", ".join(f"{each.source} to {each.target} {_count(each)}" for each in told if each.kind != "return")
-    return f"How often who told whom: {counts}." if counts else ""
+    counts = ", ".join(_told_how_often(each, language) for each in told if each.kind != "return")
+    return language.say("How often who told whom: %(counts)s.", counts=counts) if counts else ""
+
+
+def _told_how_often(talk: Talk, language: Language) -> str:
+    return language.say(
+        "%(source)s to %(target)s %(count)s",
+        source=called(talk.source, language),
+        target=called(talk.target, language),
+        count=_count(talk, language),
+    )
 
 
 def block_diagram(told: tuple[Talk, ...]) -> Diagram:
@@ -125,5 +135,7 @@ def _callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, str]:
     return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})
 
 
-def _count(talk: Talk) -> str:
-    return f"{talk.count}, {talk.lost} lost" if talk.lost else str(talk.count)
+def _count(talk: Talk, language: Language = ENGLISH) -> str:
+    if not talk.lost:
+        return str(talk.count)
+    return language.say("%(count)s, %(lost)s lost", count=talk.count, lost=talk.lost)

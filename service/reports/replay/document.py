@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from service.grading.grade import TrialResult
+from service.language import ENGLISH, Language
 from service.reports.readable import one_line
 from service.reports.replay.over import over_data
 from service.reports.replay.sources import Sources, sources_of
@@ -56,7 +57,10 @@ def replay_of_grade(
     chosen: dict[int, dict[str, Any]] = {}
     left = most_bytes
     for index in order:
-        told = {**trial_data(grade.trials[index], sources, grade.criteria, index), **_over(grade.trials, index, others)}
+        told = {
+            **trial_data(grade.trials[index], sources, grade.criteria, index, view.language),
+            **_over(grade.trials, index, others, view.language),
+        }
         left -= len(packed(told)) if most_bytes < math.inf else 0
         if left < 0 and chosen:
             break
@@ -76,9 +80,9 @@ def replay_of_run(
     own_floors: Mapping[str, Pixels],
     others: OtherTrials = NO_OTHERS,
 ) -> dict[str, Any]:
-    """One run, of which nothing was marked."""
+    """One run, of which nothing was marked, told in English."""
     trial = TrialResult(name, 0, seed, 0, 0, "visible", recording)
-    told = {**trial_data(trial, sources), **_over((trial,), 0, others), "name": one_line(name, 60)}
+    told = {**trial_data(trial, sources), **_over((trial,), 0, others, ENGLISH), "name": one_line(name, 60)}
     return {**_document(name, [(trial, told)], sources, own_floors), "of": 1, "first": 0}
 
 
@@ -87,9 +91,9 @@ def packed(document: Mapping[str, Any]) -> bytes:
     return zlib.compress(json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii"), 6)
 
 
-def _over(trials: Sequence[TrialResult], index: int, others: OtherTrials) -> dict[str, Any]:
+def _over(trials: Sequence[TrialResult], index: int, others: OtherTrials, language: Language) -> dict[str, Any]:
     other = others.trials.get(index)
-    return {} if other is None else {"over": over_data(trials[index], other, others.name)}
+    return {} if other is None else {"over": over_data(trials[index], other, others.name, language)}
 
 
 def _document(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
+from service.language import Language
 from service.reports.readable import one_line
 from service.reports.replay.sources import Sources
 from service.reports.replay.trial import trial_data
@@ -23,9 +24,9 @@ _COLUMNS = frozenset({"x", "y", "heading", "left_position", "right_position"})
 _KEPT = ("verdict", "ended", "seconds", "tick", "messages", "events", "left_out")
 
 
-def over_data(trial: TrialResult, other: TrialResult, name: str) -> dict[str, Any]:
+def over_data(trial: TrialResult, other: TrialResult, name: str, language: Language) -> dict[str, Any]:
     """What is drawn and told of ``other`` beside ``trial``; ``name`` says whose it is."""
-    told = trial_data(other, Sources())
+    told = trial_data(other, Sources(), language=language)
     robots = [{**robot, "columns": _drawn(robot["columns"]), "images": []} for robot in told["robots"]]
     return {
         "name": one_line(name, 60),

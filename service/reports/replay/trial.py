@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from service.grading.grade import CriterionResult, Prediction, TrialResult
-from service.reports.crossing import befell_in_full
+from service.language import ENGLISH, Language
+from service.reports.crossing import befell_in_full, note_words
+from service.reports.faults import place_words
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.replay.columns import told_columns
 from service.reports.replay.sources import Place, Sources
-from service.reports.robots import PARTNER_OF, robots_of
-from service.reports.words import verdict_words
-from sim.recorded import pose_at, robot_of
+from service.reports.robots import PARTNER_OF, answering, robots_of
+from service.reports.words import trial_words, verdict_words
+from sim.recorded import pose_at, printed_alone, robot_of
 from sim.recording import SECOND, Image, Pose, Recording, Verdict
 from sim.robot import LightSensor
 
@@ -30,19 +32,23 @@ _LONGEST_TEXT, _MOST_LINES = 600, 12
 
 
 def trial_data(
-    trial: TrialResult, sources: Sources, criteria: Sequence[CriterionResult] = (), index: int = 0
+    trial: TrialResult,
+    sources: Sources,
+    criteria: Sequence[CriterionResult] = (),
+    index: int = 0,
+    language: Language = ENGLISH,
 ) -> dict[str, Any]:
     """All of a trial but its floor. ``index`` is the one that the evidence of the ``criteria`` knows it by."""
     recording = trial.recording
-    texts, left_out = _events(recording, sources)
-    messages = sorted(_messages(recording, sources), key=lambda message: message["t"])
+    texts, left_out = _events(recording, sources, language)
+    messages = sorted(_messages(recording, sources, language), key=lambda message: message["t"])
     left_out += max(0, len(messages) - _MOST)
     predictions = [each for result in criteria for each in result.predictions if each.trial == index]
     return {
         "trial": index + 1,
-        "name": f"{one_line(trial.scenario, 60)}, trial {trial.index + 1}",
+        "name": trial_words(trial, language),
         "verdict": trial.verdict.value,
-        "ended": verdict_words(trial.verdict).short,
+        "ended": verdict_words(trial.verdict, language).short,
         "seconds": recording.end_t,
         "tick": recording.ticks.length / SECOND,
         "obstacles": recording.obstacles,
@@ -116,16 +122,16 @@ def _pixels(rgba: bytes) -> str:
     return base64.b64encode(np.frombuffer(whole, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
 
 
-def _events(recording: Recording, sources: Sources) -> tuple[list[dict[str, Any]], int]:
+def _events(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
     """What was printed, said, touched and went wrong, by time; and how much of it is left out."""
     events: list[dict[str, Any]] = []
     left_out = 0
     for robot, own in robots_of(recording):
-        is_students = own is recording
+        is_students, printed = own is recording, printed_alone(own)
         kinds: tuple[list[dict[str, Any]], ...] = (
             [
                 _event(line.t, robot, "printed", line.text, sources.wrote(line.text) if is_students else None)
-                for line in own.printed[:_MOST]
+                for line in printed[:_MOST]
             ],
             [
                 _event(line.t, robot, "said", line.text, sources.wrote(line.text, spoken=True) if is_students else None)
@@ -140,13 +146,13 @@ def _events(recording: Recording, sources: Sources) -> tuple[list[dict[str, Any]
                     fault.t,
                     fault.agent or fault.who,
                     "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault",
-                    f"{fault.message} ({fault.place})" if fault.place else fault.message,
+                    f"{fault.message} ({place_words(fault, language)})" if fault.place else fault.message,
                     sources.of_fault(fault),
                 )
                 for fault in own.faults[:_MOST]
             ],
         )
-        for kind, told in zip((own.printed, own.spoken, own.touches, own.faults), kinds, strict=True):
+        for kind, told in zip((printed, own.spoken, own.touches, own.faults), kinds, strict=True):
             left_out += len(kind) - len(told)
             events += told
     return sorted(events, key=lambda event: event["t"]), left_out
@@ -161,25 +167,26 @@ def _placed(place: Place | None) -> dict[str, Any]:
     return {} if place is None else {"line": [place.source, place.line]}
 
 
-def _messages(recording: Recording, sources: Sources) -> Iterator[dict[str, Any]]:
+def _messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
     """Every text that set out, with what the other end got of it and when."""
     for robot, own in robots_of(recording):
-        other = PARTNER_OF[robot] if recording.partner is not None else "responder"
+        responder = answering(own)
+        other = PARTNER_OF[robot] if recording.partner is not None else responder
         for message in own.messages:
             if message.sender == "partner":
                 continue  # it is told as the other robot's
             from_robot = message.sender == "robot"
-            receiver = other if message.to_partner or recording.partner is None else "responder"
+            receiver = other if message.to_partner or recording.partner is None else responder
             told: dict[str, Any] = {
                 "t": message.t,
-                "from": robot if from_robot else "responder",
+                "from": robot if from_robot else responder,
                 "to": receiver if from_robot else robot,
                 "text": message_words(message.text, _LONGEST_TEXT),
                 "arrived": message.delivered,
             }
             if message.arrived_as is not None:
                 told["arrived_as"] = message_words(message.arrived_as, _LONGEST_TEXT)
-            befell = befell_in_full(message)
+            befell = befell_in_full(message, language)
             if befell:
                 told["befell"] = befell
             if from_robot and own is recording:
@@ -193,14 +200,15 @@ def _messages(recording: Recording, sources: Sources) -> Iterator[dict[str, Any]
             "text": message_words(each.text, _LONGEST_TEXT),
             "arrived": None if each.note else each.t,
         }
-        yield {**told, "befell": one_line(each.note, 80)} if each.note else told
+        yield {**told, "befell": note_words(each.note, language)} if each.note else told
 
 
 def _losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
     """Each criterion that the trial failed, with the moment and the place."""
     lost = []
     for result in criteria:
-        for item in result.evidence:
+        # One that is excused has no marks to lose.
+        for item in result.evidence if result.max_marks else ():
             if item.passed or item.trial != index:
                 continue
             t = loss_moment(recording, item.t)

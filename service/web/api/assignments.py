@@ -1,19 +1,22 @@
-"""What a course has for its students: assignments taken from the catalogue, opened and closed."""
+"""What a course has for its students: assignments taken from the catalogue or sent, previewed, opened and closed."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import Depends, Path
+from fastapi import Depends, Path, Query
 from pydantic import BaseModel, Field
 
-from service.store import audit, open_assignments
+from service.store import audit
+from service.store.courses import open_assignments
 from service.store.states import Role
-from service.store.versions import freeze
+from service.web import preparing
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api_uploads import ZIP_BODY, Uploaded
 from service.web.context import Context
 from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.assignment.overview import overview
@@ -31,11 +34,20 @@ class CatalogueShape(Shape):
 
     id: str
     title: str
-    section: str
+    section: str = Field(description="Of the course's materials; empty for what stands in none.")
+    topic: str = Field(description="The number of the part that the section is of.")
+    sentence: str = Field(description="What is to be done, in one sentence of its description.")
     max_marks: float = Field(validation_alias="marks")
     trials: int
 
-    model_config = like(id="shape-recognition", section="Recognition", trials=36, **_EXAMPLE)
+    model_config = like(
+        id="shape-recognition",
+        section="08.5 §5.2.1",
+        topic="08",
+        sentence="Write a program that says the name of the shape.",
+        trials=12,
+        **_EXAMPLE,
+    )
 
 
 class AssignmentShape(Shape):
@@ -67,6 +79,67 @@ class AssignmentAsked(BaseModel):
     assignment: str = Field(min_length=1, max_length=100, examples=["shape-recognition"])
 
 
+class MarkedLineShape(Shape):
+    """One criterion, before anything is marked by it."""
+
+    id: str
+    title: str
+    check: str
+    marks: float
+    visibility: str
+
+
+class ScenarioShape(Shape):
+    """One kind of trial."""
+
+    id: str
+    title: str
+    seconds: float = Field(description="Simulated, at most.")
+    trials: int
+    visibility: str
+
+
+class WholeAssignmentShape(AssignmentShape):
+    """An assignment with what it asks for, hidden criteria and scenarios among it."""
+
+    description: str
+    background: str = Field(description="The floor.")
+    program: str = Field(description="Who has the robot program: student, none, or a given file.")
+    responder: str
+    given: list[str] = Field(description="Files that students are given.")
+    criteria: list[MarkedLineShape]
+    scenarios: list[ScenarioShape]
+    has_reference: bool = Field(description="Whether there is a reference solution to be graded as a preview.")
+
+    model_config = like(
+        id="shape-recognition",
+        version="3f9a1c20",
+        open=True,
+        opened_at="2026-11-02T09:00:00Z",
+        closed_at=None,
+        names_hidden=False,
+        description="The robot stands over one of six shapes ...",
+        background="Simple_Shapes",
+        program="student",
+        responder="student",
+        given=[],
+        criteria=[
+            {"id": "named", "title": "Names the shape", "check": "classification", "marks": 6, "visibility": "visible"}
+        ],
+        scenarios=[{"id": "each-shape", "title": "", "seconds": 10, "trials": 12, "visibility": "visible"}],
+        has_reference=True,
+        **_EXAMPLE,
+    )
+
+
+class PreviewShape(Shape):
+    """The grading of a reference solution; it is the token owner's own, and in no batch."""
+
+    job: str
+
+    model_config = like(job="7xk2v9q4m0ab")
+
+
 class NamesAsked(BaseModel):
     """Whether whoever marks sees whose work it is."""
 
@@ -74,13 +147,18 @@ class NamesAsked(BaseModel):
 
 
 @router.get("/courses/{course_id}/catalogue")
-def list_catalogue(_here: Reads, limit: Limit = 50, after: After = "") -> Listed[CatalogueShape]:
+def list_catalogue(
+    _here: Reads,
+    limit: Limit = 50,
+    after: After = "",
+    q: Annotated[str, Query(max_length=100, description="Words that all have to be in what is said of one.")] = "",
+    topic: Annotated[str, Query(max_length=10, description="The number of a part of the course's materials.")] = "",
+) -> Listed[CatalogueShape]:
     """The assignments that come with Robomark, of which a course can have any."""
     place = place_after(after, str)
-    ids = sorted(each for each in catalogue() if place is None or each > place[0])[: limit + 1]
-    found = page_of(ids, limit, lambda each: [each])
-    shown = [CatalogueShape.model_validate(overview(assignment_folder(each))) for each in found.items]
-    return Listed(items=shown, next=found.next)
+    left = (overview(assignment_folder(each)) for each in catalogue() if place is None or each > place[0])
+    found = [each for each in left if each.says(q) and topic in ("", each.topic)][: limit + 1]
+    return page_of([CatalogueShape.model_validate(each) for each in found], limit, lambda each: [each.id])
 
 
 @router.get("/courses/{course_id}/assignments")
@@ -96,11 +174,51 @@ def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: Af
 @router.post("/courses/{course_id}/assignments", status_code=201)
 def prepare(here: Manages, context: Context, asked: AssignmentAsked) -> AssignmentShape:
     """Take an assignment from the catalogue, not yet open; again, to mark by its newest version from now on."""
-    frozen = freeze(find_in_catalogue(asked.assignment))
-    with context.store.transaction() as session:
-        made = open_assignments.prepare(session, here.course_id, frozen)
-        audit.note(session, here.actor, "prepare", "course", str(here.course_id), assignment=asked.assignment)
-        return AssignmentShape.model_validate(made)
+    found = find_in_catalogue(asked.assignment)
+    return AssignmentShape.model_validate(preparing.prepare(context, here.caller.identity, here.course_id, found))
+
+
+@router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
+def upload(here: Manages, context: Context, sent: Uploaded) -> AssignmentShape:
+    """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview."""
+    made = preparing.prepare_own(context, here.caller.identity, here.course_id, sent)
+    return AssignmentShape.model_validate(made)
+
+
+@router.get("/courses/{course_id}/assignments/{assignment}")
+def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
+    """What an assignment of the course asks for, and whether it is open."""
+    with context.store.reading() as session:
+        line = open_assignments.find(session, here.course_id, assignment)
+        found = open_assignments.load(session, here.course_id, assignment)
+    runs = [trial.scenario.id for trial in found.trials()]
+    told = {
+        "open": line.open,
+        "description": found.description,
+        "background": found.world.background,
+        "program": found.parts.program,
+        "responder": found.parts.responder,
+        "given": sorted(found.given),
+        "criteria": [MarkedLineShape.model_validate(each) for each in found.criteria],
+        "scenarios": [
+            ScenarioShape(
+                id=each.id,
+                title=each.title,
+                seconds=each.seconds,
+                trials=runs.count(each.id),
+                visibility=each.visibility,
+            )
+            for each in found.scenarios
+        ],
+        "has_reference": preparing.reference_of(found) is not None,
+    }
+    return WholeAssignmentShape.model_validate(asdict(line) | told)
+
+
+@router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
+def preview(here: Manages, context: Context, assignment: AssignmentId) -> PreviewShape:
+    """Grade the catalogue's reference solution as a submission of the token's owner, which is in no batch."""
+    return PreviewShape(job=preparing.preview(context, here.caller.identity, here.course_id, assignment))
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/open")

@@ -9,11 +9,12 @@ from fastapi import Depends, Query
 from pydantic import Field
 
 from service.grading.statistics import statistics_of
-from service.store import batch_control, batches, metrics, open_assignments, regrades
-from service.store.marked import marked
+from service.store.batches import batches, publishing
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades.marked import marked
+from service.store.queue import batch_control, metrics
 from service.store.states import Lane, Role
 from service.web.access import RowName, batch_in
-from service.web.api.grades import nameless
 from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
@@ -182,12 +183,12 @@ def submit_batch(
 @router.get("/courses/{course_id}/batches/{batch_id}")
 def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchShape:
     """How far a batch is, and what a class got."""
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
         line = batches.batch(session, batch_id)
         pace = metrics.pace(session, batch_id)
-        hidden = open_assignments.with_names_hidden(session, here.course_id)
-        lines = [nameless(each, hidden) for each in batches.job_lines(session, batch_id)]
+        lines = [each.hidden_by(hidden) for each in batches.job_lines(session, batch_id)]
         statistics = statistics_of(marked(session, lines))
         return WholeBatchShape(
             **BatchShape.model_validate(line).model_dump(),
@@ -196,7 +197,7 @@ def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchSha
             if pace is None
             else PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
             statistics=[StatisticsShape.model_validate(each) for each in statistics],
-            unpublished_regrades=0 if line.regrade_of else regrades.unpublished_regrades(session, batch_id),
+            unpublished_regrades=0 if line.regrade_of else publishing.unpublished_regrades(session, batch_id),
         )
 
 
@@ -204,14 +205,17 @@ def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchSha
 def batch_grades(
     here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[JobShape]:
-    """The submissions of a batch, by student, each with the grade that stands or why it has none."""
+    """The submissions of a batch, each with the grade that stands or why it has none: by student, or in no order.
+
+    Their order tells nothing where names are hidden.
+    """
     place = place_after(after, str)
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
-        found = batches.job_lines(session, batch_id, limit + 1, place[0] if place else None)
-        hidden = open_assignments.with_names_hidden(session, here.course_id)
+        found = batches.some_job_lines(session, batch_id, hidden, limit + 1, place[0] if place else None)
     page = page_of(found, limit, lambda each: [each.id])
-    return Listed(items=[JobShape.model_validate(nameless(each, hidden)) for each in page.items], next=page.next)
+    return Listed(items=[JobShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")

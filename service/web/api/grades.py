@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Set
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Depends, Request
 from fastapi.responses import Response
@@ -16,19 +15,21 @@ from service.report_files import report_alone
 from service.reports.formats.json_output import json_document
 from service.reports.replay.document import replay_of_grade
 from service.reports.view import View, staff_view
-from service.store import batches, intake, open_assignments, results
-from service.store.batches import JobLine
+from service.store.batches import batches, intake
+from service.store.batches.batches import JobLine
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades import results
 from service.store.models import SubmissionRow
 from service.store.states import JobState, Role
 from service.web.access import RowName, RowNumber, job_in, nothing_here, submission_in
 from service.web.api.shapes import GradeShape, JobShape
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import api_router, tagged
+from service.web.api_routes import Described, api_router, tagged
 from service.web.context import Context, WebContext
 
 router = api_router("grades")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Described = dict[int | str, dict[str, Any]]
 HTML: Described = {200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "A page of its own."}}
 ZIP: Described = {
     200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}, "description": "A zip."}
@@ -44,9 +45,10 @@ REPLAY: Described = {
 @router.get("/courses/{course_id}/grades/{job_id}/state")
 def state(here: Reads, context: Context, job_id: RowName) -> JobShape:
     """How far one grading is."""
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         job_in(session, here.course_id, job_id)
-        return JobShape.model_validate(_line(session, here, job_id))
+        return JobShape.model_validate(batches.job_line(session, job_id).hidden_by(hidden))
 
 
 @router.get("/courses/{course_id}/grades/{job_id}", response_model=GradeShape)
@@ -79,13 +81,6 @@ def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
         return packed_answer(session, row)
 
 
-def nameless(line: JobLine, hidden: Set[str]) -> JobLine:
-    """The line as whoever marks sees it, where the names of some assignments' students are hidden."""
-    if line.assignment not in hidden:
-        return line
-    return replace(line, student=f"submission {line.submission_id}", name="", email="", source="")
-
-
 def graded_view(session: Session, line: JobLine) -> View:
     """All of a grade. Raises HTTPException 404 where there is none."""
     if line.state is not JobState.DONE:
@@ -116,14 +111,10 @@ def packed_answer(session: Session, row: SubmissionRow) -> Response:
     return Response(row.packed, media_type="application/zip", headers=headers)
 
 
-def _line(session: Session, here: CallerInCourse, job_id: str) -> JobLine:
-    hidden = open_assignments.with_names_hidden(session, here.course_id)
-    return nameless(batches.job_line(session, job_id), hidden)
-
-
 def _view(context: WebContext, here: CallerInCourse, job_id: str) -> tuple[JobLine, View]:
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         job_in(session, here.course_id, job_id)
-        line = _line(session, here, job_id)
+        line = batches.job_line(session, job_id).hidden_by(hidden)
         view = graded_view(session, line)
     return line, replace(view, grade=replace(view.grade, student=line.student))

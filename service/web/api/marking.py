@@ -10,10 +10,12 @@ from fastapi import Depends, Path, Query
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
-from service.store import appeals, comments, overrides
-from service.store.appeals import LONGEST_TEXT
-from service.store.comments import LONGEST_COMMENT
-from service.store.overrides import LONGEST_REASON
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades import appeals, comments, marking_history, overrides
+from service.store.grades.appeals import LONGEST_TEXT
+from service.store.grades.comments import LONGEST_COMMENT
+from service.store.grades.overrides import LONGEST_REASON
+from service.store.models import Job
 from service.store.states import JobState, Role
 from service.web.access import RowName, RowNumber, job_in, nothing_here, own_submission
 from service.web.api.shapes import Shape, like
@@ -71,11 +73,24 @@ class CommentShape(Shape):
     made_at: datetime
 
 
+class MarkingStepShape(Shape):
+    """One thing that somebody did by hand; empty is what does not apply."""
+
+    at: datetime
+    actor: str
+    action: str
+    criterion: str
+    before: str
+    after: str
+    text: str = Field(description="A reason, a comment, an answer.")
+
+
 class MarkingShape(Shape):
-    """The criteria of a grade as they count, and the comments on it."""
+    """The criteria of a grade as they count, the comments on it, and what was done by hand."""
 
     criteria: list[CriterionMarksShape]
     comments: list[CommentShape]
+    history: list[MarkingStepShape]
 
     model_config = like(
         criteria=[
@@ -95,6 +110,7 @@ class MarkingShape(Shape):
             }
         ],
         comments=[],
+        history=[],
     )
 
 
@@ -119,6 +135,7 @@ class AppealShape(Shape):
     submission_id: int
     who: str
     assignment: str
+    title: str = Field(description="Of the assignment.")
     attempt: int
     job_id: str
     text: str
@@ -131,6 +148,7 @@ class AppealShape(Shape):
         submission_id=3,
         who="ada",
         assignment="shape-recognition",
+        title="Recognise a shape",
         attempt=1,
         job_id="7xk2v9q4m0ab",
         text="The last shape was named, was it not?",
@@ -202,8 +220,9 @@ def list_appeals(
     answered: Annotated[bool, Query(description="Those with an answer, the newest first; else the open ones.")] = False,
 ) -> Listed[AppealShape]:
     """What students ask again: the open ones, the longest waiting first, or the newest answered ones."""
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
-        found = appeals.in_course(session, here.course_id, answered=answered)
+        found = appeals.in_course(session, here.course_id, hidden, answered=answered)
     return Listed(items=[AppealShape.model_validate(each) for each in found])
 
 
@@ -240,7 +259,9 @@ def _graded(session: Session, here: CallerInCourse, job_id: str) -> None:
 
 
 def _marking(session: Session, job_id: str) -> MarkingShape:
-    criteria = [CriterionMarksShape.model_validate(each) for each in overrides.criterion_marks(session, job_id)]
+    steps = marking_history.history(session, session.get_one(Job, job_id).submission_id)
     return MarkingShape(
-        criteria=criteria, comments=[CommentShape.model_validate(each) for each in comments.of_job(session, job_id)]
+        criteria=[CriterionMarksShape.model_validate(each) for each in overrides.criterion_marks(session, job_id)],
+        comments=[CommentShape.model_validate(each) for each in comments.of_job(session, job_id)],
+        history=[MarkingStepShape.model_validate(each) for each in steps],
     )

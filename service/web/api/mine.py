@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import Depends, Query, Request
+from fastapi import Depends, Path, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
-from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
+from service import own_work
+from service.own_work import OwnSubmission
 from service.report_files import report_alone
 from service.reports.view import View, student_view
-from service.store import batches, open_assignments, policies, results
-from service.store.batches import JobLine
-from service.store.models import Job, SubmissionRow
-from service.store.states import JobState, Role, Standing
+from service.store.batches import batches
+from service.store.batches.batches import JobLine
+from service.store.courses import open_assignments, policies
+from service.store.grades import results
+from service.store.queue.queue_places import queue_place
+from service.store.states import JobState, Role
 from service.web.access import RowNumber, enrolment_in, nothing_here, own_submission
 from service.web.api.grades import HTML, REPLAY, ZIP, grade_answer, packed_answer, replay_answer
 from service.web.api.people import LimitsShape
 from service.web.api.shapes import GradeShape, Shape, example_of, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after, tagged
+from service.web.api_routes import After, Described, Limit, Listed, api_router, page_of, place_after, tagged
 from service.web.api_uploads import SENT_BODY, Sent
+from service.web.attachments import attachment
 from service.web.context import Context, WebContext
-from service.web.submitting import submit
+from service.web.submitting import seen_assignment, submit
+from submissions.assignment.task_sheet import TaskSheet, task_sheet
 
 router = api_router("mine")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
 Submits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
+AssignmentId = Annotated[str, Path(min_length=1, max_length=100)]
 PREFIX = "/courses/{course_id}/mine"
+GIVEN: Described = {
+    200: {
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+        "description": "The file.",
+    }
+}
 
 
 class OpenShape(Shape):
@@ -41,6 +54,8 @@ class OpenShape(Shape):
     max_marks: float
     open: bool = Field(description="Whether it may be submitted to.")
     limits: LimitsShape = Field(description="What holds for the token's owner.")
+    attempts_left: int | None = Field(description="Null where there is no limit.")
+    days_left: int = Field(description="Until the due date, the last one counted; 0 where there is none.")
 
     model_config = like(
         id="shape-recognition",
@@ -48,7 +63,17 @@ class OpenShape(Shape):
         max_marks=12,
         open=True,
         limits=example_of(LimitsShape),
+        attempts_left=4,
+        days_left=3,
     )
+
+
+class PlaceShape(Shape):
+    """How many come before a submission, and how long it is to its marks; null where nothing tells how long."""
+
+    before: int
+    seconds: float | None
+    workers: int = Field(description="That live.")
 
 
 class SubmissionShape(Shape):
@@ -60,10 +85,16 @@ class SubmissionShape(Shape):
     source: str = Field(description="The name that it came under.")
     submitted_at: datetime
     days_late: int
-    over: str | None = Field(description="The limit that it was over: staff see it, and it counts by their leave.")
-    job: str | None
-    state: JobState | None
+    over: str | None = Field(
+        validation_alias="staff_only",
+        description="The limit that it was over: staff see it, and it counts by their leave.",
+    )
+    job: str = Field(validation_alias="job_id")
+    state: JobState
     progress: float = Field(description="Of the grading, from 0 to 1.")
+    place: PlaceShape | None = Field(description="In the queue; null once nothing is to come.", default=None)
+    marks: float | None = Field(description="As far as they may be seen now; null while there are none.")
+    max_marks: float | None
     published: bool = Field(description="Whether the grade is released; until then it may lack what is kept back.")
 
     model_config = like(
@@ -77,7 +108,49 @@ class SubmissionShape(Shape):
         job="7xk2v9q4m0ab",
         state="running",
         progress=0.4,
+        place={"before": 0, "seconds": 2.5, "workers": 1},
+        marks=None,
+        max_marks=None,
         published=False,
+    )
+
+
+class CriterionAskedShape(Shape):
+    """One marked line that students see beforehand."""
+
+    title: str
+    marks: float
+
+
+class TaskSheetShape(Shape):
+    """What an assignment asks of students; `more_marks` are for what is marked and not told."""
+
+    id: str
+    title: str
+    section: str
+    description: str
+    asked: list[str] = Field(description="Files, by name.")
+    notebook: bool = Field(description="Whether one notebook will do for all that is asked.")
+    criteria: list[CriterionAskedShape]
+    max_marks: float
+    more_marks: float
+    background: str = Field(description="The floor.")
+    seconds: float | None = Field(description="Simulated, of the longest trial that is shown.")
+    given: list[str] = Field(description="Files that are given.")
+
+    model_config = like(
+        id="shape-recognition",
+        title="Shape recognition",
+        section="08.5 §5.2.1",
+        description="The robot stands over one of six shapes ...",
+        asked=["robot.py", "responder.py"],
+        notebook=True,
+        criteria=[{"title": "Names the shape", "marks": 6}],
+        max_marks=6,
+        more_marks=6,
+        background="Simple_Shapes",
+        seconds=10,
+        given=[],
     )
 
 
@@ -87,18 +160,40 @@ def list_open(here: Reads, context: Context, limit: Limit = 50, after: After = "
     place = place_after(after, str)
     with context.store.reading() as session:
         enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-        shown = [
-            OpenShape(
-                id=each.assignment,
-                title=each.title,
-                max_marks=float(each.max_marks),
-                open=each.open,
-                limits=LimitsShape.model_validate(policies.limits(session, enrolment.id, each.assignment)),
-            )
-            for each in open_assignments.of_course(session, here.course_id)
-            if each.opened_at is not None and (place is None or each.assignment > place[0])
-        ]
+        shown = []
+        for each in open_assignments.of_course(session, here.course_id):
+            if each.opened_at is not None and (place is None or each.assignment > place[0]):
+                left = own_work.allowance(session, enrolment.id, each.assignment)
+                shown.append(
+                    OpenShape(
+                        id=each.assignment,
+                        title=each.title,
+                        max_marks=float(each.max_marks),
+                        open=each.open,
+                        limits=LimitsShape.model_validate(left.limits),
+                        attempts_left=left.attempts_left,
+                        days_left=left.days_left,
+                    )
+                )
     return page_of(shown[: limit + 1], limit, lambda each: [each.id])
+
+
+@router.get(PREFIX + "/assignments/{assignment}")
+def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> TaskSheetShape:
+    """What an assignment asks for, of those that were opened or that the token's owner has submitted to."""
+    sheet = _sheet(context, here, assignment)
+    criteria = [CriterionAskedShape(title=title, marks=float(marks)) for title, marks in sheet.criteria]
+    told = {field.name: getattr(sheet, field.name) for field in fields(sheet)}
+    return TaskSheetShape.model_validate(told | {"criteria": criteria, "given": sorted(sheet.given)})
+
+
+@router.get(PREFIX + "/assignments/{assignment}/given/{file}", responses=GIVEN, response_class=Response)
+def given_file(here: Reads, context: Context, assignment: AssignmentId, file: str) -> Response:
+    """A file that the assignment gives its students."""
+    sheet = _sheet(context, here, assignment)
+    if file not in sheet.given:
+        raise nothing_here()
+    return attachment(sheet.given[file], file)
 
 
 @router.post(PREFIX + "/submissions", status_code=201, openapi_extra=SENT_BODY)
@@ -110,10 +205,9 @@ def submit_one(
 ) -> SubmissionShape:
     """Submit: a robot program, a responder, a notebook, or a zip with them; each a part `files` of the form."""
     identity = here.caller.identity
-    accepted = submit(context, identity, here.course_id, assignment, sent)
+    accepted = submit(context, identity, here.course_id, assignment, sent, even_in_part=True)
     with context.store.reading() as session:
-        submission_id = session.get_one(Job, accepted.job_id).submission_id
-        return _shown(session, own_submission(session, identity, here.course_id, submission_id))
+        return _shown(session, _own(session, here, accepted.submission_id))
 
 
 @router.get(PREFIX + "/submissions")
@@ -122,18 +216,15 @@ def list_submissions(here: Reads, context: Context, limit: Limit = 50, after: Af
     place = place_after(after, int)
     with context.store.reading() as session:
         enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-        query = select(SubmissionRow).where(SubmissionRow.enrolment_id == enrolment.id)
-        if place is not None:
-            query = query.where(SubmissionRow.id < place[0])
-        rows = session.scalars(query.order_by(SubmissionRow.id.desc()).limit(limit + 1)).all()
-        return page_of([_shown(session, row) for row in rows], limit, lambda each: [each.id])
+        found = own_work.own_submissions_before(session, enrolment.id, place[0] if place else None, limit + 1)
+        return page_of([_shown(session, each) for each in found], limit, lambda each: [each.id])
 
 
 @router.get(PREFIX + "/submissions/{submission_id}")
 def one_submission(here: Reads, context: Context, submission_id: RowNumber) -> SubmissionShape:
     """One submission, and how far it is."""
     with context.store.reading() as session:
-        return _shown(session, own_submission(session, here.caller.identity, here.course_id, submission_id))
+        return _shown(session, _own(session, here, submission_id))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/grade", response_model=GradeShape)
@@ -164,33 +255,29 @@ def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
         return packed_answer(session, own_submission(session, here.caller.identity, here.course_id, submission_id))
 
 
-def _standing(submission_id: int) -> Select[Job]:
-    """The grading that counts."""
-    return select(Job).where(Job.submission_id == submission_id, Job.standing == Standing.STANDS).limit(1)
+def _own(session: Session, here: CallerInCourse, submission_id: int) -> OwnSubmission:
+    enrolment = enrolment_in(session, here.caller.identity, here.course_id)
+    found = own_work.own_submission(session, enrolment.id, submission_id)
+    if found is None:
+        raise nothing_here()
+    return found
 
 
-def _shown(session: Session, row: SubmissionRow) -> SubmissionShape:
-    job = session.scalar(_standing(row.id))
-    return SubmissionShape(
-        id=row.id,
-        assignment=row.assignment,
-        attempt=row.attempt,
-        source=row.source,
-        submitted_at=row.submitted_at or row.created_at,
-        days_late=row.days_late,
-        over=row.staff_only,
-        job=None if job is None else job.id,
-        state=None if job is None else job.state,
-        progress=0.0 if job is None else job.progress,
-        published=job is not None and job.published_at is not None,
-    )
+def _shown(session: Session, found: OwnSubmission) -> SubmissionShape:
+    shape = SubmissionShape.model_validate(found)
+    place = PlaceShape.model_validate(queue_place(session, found.job_id)) if found.waits else None
+    return shape.model_copy(update={"over": found.staff_only or None, "place": place})
+
+
+def _sheet(context: WebContext, here: CallerInCourse, assignment: str) -> TaskSheet:
+    with context.store.reading() as session:
+        return task_sheet(seen_assignment(session, here.caller.identity, here.course_id, assignment))
 
 
 def _view(context: WebContext, here: CallerInCourse, submission_id: int) -> tuple[JobLine, View]:
     with context.store.reading() as session:
-        row = own_submission(session, here.caller.identity, here.course_id, submission_id)
-        job = session.scalar(_standing(row.id))
-        if job is None or job.state is not JobState.DONE or job.suspect is not None or row.staff_only is not None:
+        found = _own(session, here, submission_id)
+        if not found.shown:
             raise nothing_here()
-        view = student_view(results.load(session, job.id), policies.released(session, job.id))
-        return batches.job_line(session, job.id), view
+        view = student_view(results.load(session, found.job_id), policies.released(session, found.job_id))
+        return batches.job_line(session, found.job_id), view

@@ -9,17 +9,21 @@ from fastapi import Depends
 from pydantic import BaseModel, Field
 
 from service.doctor import examine_service
-from service.store import batch_control, dead_letters, workers
-from service.store.metrics import collect
+from service.store import audit
 from service.store.models import Batch
+from service.store.people import people, sign_in_links
+from service.store.queue import batch_control, dead_letters, tryouts, workers
+from service.store.queue.metrics import collect
 from service.store.states import JobState, Lane
 from service.version import GRADER_VERSION
 from service.web.access import nothing_here
 from service.web.api.batches import RetriedShape
-from service.web.api.shapes import Shape, like
+from service.web.api.shapes import Shape, example_of, like
+from service.web.api.sign_in_links import LinkShape, link_shape
 from service.web.api_access import Caller, operating
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context
+from submissions.people import Student
 
 router = api_router("operator")
 Reads = Annotated[Caller, Depends(operating("read"))]
@@ -33,6 +37,14 @@ class LaneShape(Shape):
     queued: int
     running: int
     oldest_seconds: float = Field(description="How long the oldest job that could be claimed has waited.")
+
+
+class TryoutLaneShape(Shape):
+    """How many programs are tried, which have a lane of their own."""
+
+    queued: int
+    running: int
+    oldest_seconds: float = Field(description="How long the oldest that waits has waited.")
 
 
 class FindingShape(Shape):
@@ -50,6 +62,7 @@ class ServiceShape(Shape):
     ready: bool
     lanes: list[LaneShape]
     findings: list[FindingShape]
+    tryouts: TryoutLaneShape
     dead: int = Field(description="Jobs that could not be graded.")
     paused_batches: int
 
@@ -58,6 +71,7 @@ class ServiceShape(Shape):
         ready=True,
         lanes=[{"lane": "batch", "queued": 12, "running": 2, "oldest_seconds": 3.5}],
         findings=[{"what": "database", "well": True, "sentence": "answers"}],
+        tryouts={"queued": 0, "running": 1, "oldest_seconds": 0.0},
         dead=0,
         paused_batches=0,
     )
@@ -119,6 +133,35 @@ class RetryAsked(BaseModel):
     batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="None: of all batches.")
 
 
+class NamedCourseShape(Shape):
+    """A course of the installation, and how many are in it."""
+
+    id: int
+    name: str
+    instructors: int
+    students: int
+
+    model_config = like(id=1, name="TM129", instructors=2, students=180)
+
+
+class InstructorAsked(BaseModel):
+    """Somebody who is to instruct a course, which is made where there is none of the name."""
+
+    course: str = Field(min_length=1, max_length=100, pattern=r"\S", examples=["TM129"])
+    id: str = Field(min_length=1, max_length=100, pattern=r"\S", examples=["grace"])
+    name: str = Field("", max_length=200, examples=["Grace Hopper"])
+
+
+class NewInstructorShape(Shape):
+    """An instructor, and the link that signs them in; it is told this once."""
+
+    id: str
+    course: int
+    link: LinkShape
+
+    model_config = like(id="grace", course=1, link=example_of(LinkShape))
+
+
 @router.get("/operator")
 def service(_operator: Reads, context: Context) -> ServiceShape:
     """How the service is: what waits, and whether all that grading needs is well."""
@@ -126,6 +169,7 @@ def service(_operator: Reads, context: Context) -> ServiceShape:
     with context.store.reading() as session:
         found = collect(session)
         dead = dead_letters.count(session)
+        tried = tryouts.lane(session)
     return ServiceShape(
         version=GRADER_VERSION,
         ready=all(finding.well for finding in findings),
@@ -139,6 +183,7 @@ def service(_operator: Reads, context: Context) -> ServiceShape:
             for lane in Lane
         ],
         findings=[FindingShape.model_validate(finding) for finding in findings],
+        tryouts=TryoutLaneShape.model_validate(tried),
         dead=dead,
         paused_batches=found.paused_batches,
     )
@@ -167,6 +212,25 @@ def list_workers(_operator: Reads, context: Context, limit: Limit = 50, after: A
         if place is None or each.worker.name > place[0]
     ]
     return page_of(shown[: limit + 1], limit, lambda each: [each.name])
+
+
+@router.get("/operator/courses")
+def list_courses(_operator: Reads, context: Context) -> Listed[NamedCourseShape]:
+    """All courses, by name."""
+    with context.store.reading() as session:
+        return Listed(items=[NamedCourseShape.model_validate(each) for each in people.courses(session)])
+
+
+@router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
+def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) -> NewInstructorShape:
+    """Make an instructor, and the course where there is none of that name, with a link that signs them in once."""
+    who = Student(asked.id.strip(), asked.name.strip())
+    with context.store.transaction() as session:
+        member = people.make_instructor(session, asked.course.strip(), who)
+        audit.note(session, operator.actor, "add", "person", str(member.person_id), role=member.role.value)
+        secret = sign_in_links.make_link(session, member.person_id, operator.actor)
+        course = people.find_course(session, asked.course.strip())
+    return NewInstructorShape(id=member.id, course=course, link=link_shape(context, secret))
 
 
 @router.get("/operator/dead")

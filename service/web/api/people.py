@@ -1,27 +1,30 @@
-"""Who is in a course, and the links that sign them in; what students may do when."""
+"""Who is in a course, and what students may do when; links that sign them in are told elsewhere."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import Depends, Path
+from fastapi import Depends, Path, Query
+from fastapi.responses import Response
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
-from service.store import audit, credentials, people, policies
-from service.store.credentials import LINK_LIFETIME
+from service.store import audit
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import PolicyLimits
+from service.store.courses.versions import check_assignment
 from service.store.engine import now
+from service.store.grades import own_gradings
 from service.store.models import Course
-from service.store.policies import PolicyLimits
-from service.store.states import CredentialKind, Role
-from service.store.students import Students
-from service.store.versions import check_assignment
+from service.store.people import people
+from service.store.people.students import Students
+from service.store.states import JobState, Role
 from service.web.access import RowNumber, member_in
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context
-from sim.errors import UsageError
 from submissions.people import Student
 
 router = api_router("people")
@@ -50,6 +53,48 @@ class MemberShape(Shape):
     model_config = like(enrolment=7, id="ada", name="Ada Lovelace", email="ada@example.org", role="student")
 
 
+class GradingShape(Shape):
+    """The grade that stands of a submission."""
+
+    job_id: str
+    assignment: str
+    attempt: int
+    state: JobState
+    marks: float | None
+    max_marks: float | None
+    queued_at: datetime
+    published_at: datetime | None
+
+
+class ExtensionShape(Shape):
+    """What a student is allowed beyond the policy."""
+
+    assignment: str = Field(description="Empty: every one.")
+    due_at: datetime | None
+    more_attempts: int
+
+    model_config = like(assignment="shape-recognition", due_at="2026-12-07T17:00:00Z", more_attempts=1)
+
+
+class StudentShape(MemberShape):
+    """A student with their newest submissions."""
+
+    gradings: list[GradingShape] = Field(description="The newest first.")
+    some_hidden: bool = Field(description="Whether there are assignments whose submissions are shown without names.")
+    extensions: list[ExtensionShape]
+
+    model_config = like(
+        enrolment=7,
+        id="ada",
+        name="Ada Lovelace",
+        email="ada@example.org",
+        role="student",
+        gradings=[],
+        some_hidden=False,
+        extensions=[],
+    )
+
+
 class StudentAsked(BaseModel):
     """A student to be enrolled, or told anew of."""
 
@@ -70,15 +115,6 @@ class EnrolledShape(Shape):
     students: int
 
     model_config = like(students=1)
-
-
-class LinkShape(Shape):
-    """A link that signs somebody in once; it is told this once."""
-
-    path: str
-    url: str | None = Field(description="Where ROBOMARK_PUBLIC_URL says how browsers reach the server.")
-
-    model_config = like(path="/sign-in/rml_...", url="https://robomark.example.org/sign-in/rml_...")
 
 
 class PolicyShape(Shape):
@@ -142,18 +178,20 @@ def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
     return EnrolledShape(students=len(asked.students))
 
 
-@router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
-def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
-    """A new link that signs a student of the course in once; instructors have theirs from whoever runs it all."""
-    with context.store.transaction() as session:
+@router.get("/courses/{course_id}/people/{enrolment_id}")
+def one_student(here: Reads, context: Context, enrolment_id: RowNumber) -> StudentShape:
+    """A student, what they submitted as far as names are not hidden, and what they are allowed beyond the policy."""
+    with context.store.reading() as session:
         row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        if people.is_more_than(session, row):
-            raise UsageError("this person is in other courses, too, and signs in by whoever runs Robomark")
-        secret = credentials.issue(session, row.person_id, CredentialKind.LINK, LINK_LIFETIME)
-        audit.note(session, here.actor, "link", "person", str(row.person_id))
-    path = f"/sign-in/{secret}"
-    public = context.settings.public_url
-    return LinkShape(path=path, url=f"{public}{path}" if public else None)
+        hidden = open_assignments.with_names_hidden(session, here.course_id)
+        gradings = own_gradings.newest(session, enrolment_id)
+        allowed = policies.extensions(session, here.course_id)
+        told = {
+            "gradings": [each for each in gradings if each.assignment not in hidden],
+            "some_hidden": bool(hidden),
+            "extensions": [each for each in allowed if each.enrolment_id == row.id],
+        }
+        return StudentShape.model_validate(asdict(people.member_of(session, row)) | told)
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/limits/{assignment}")
@@ -201,6 +239,17 @@ def set_policy(here: Manages, context: Context, asked: PolicyAsked) -> PolicySha
         detail = asked.model_dump(mode="json")
         audit.note(session, here.actor, "policy", "course", str(here.course_id), **detail)
     return _policy(asked.assignment, allowed)
+
+
+@router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)
+def drop_policy(
+    here: Manages, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
+) -> None:
+    """Let an assignment have what holds for all, in place of a policy of its own."""
+    with context.store.transaction() as session:
+        policies.drop_policy(session, here.course_id, assignment)
+        detail = {"assignment": assignment, "dropped": True}
+        audit.note(session, here.actor, "policy", "course", str(here.course_id), **detail)
 
 
 def _policy(assignment: str, allowed: PolicyLimits) -> PolicyShape:

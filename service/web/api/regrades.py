@@ -13,10 +13,10 @@ from starlette.exceptions import HTTPException
 
 from service.batch_export import ExportedFile, export_file
 from service.reports.formats import FORMATS
-from service.store import batches, open_assignments, regrades
+from service.store.batches import batches, publishing, regrades
+from service.store.courses.hidden_names import hidden_names_of
 from service.store.states import JobState, Lane, Role, Standing
-from service.web.access import RowName, batch_in
-from service.web.api.grades import nameless
+from service.web.access import RowName, batch_in, job_in
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
@@ -58,6 +58,14 @@ class RegradedShape(Shape):
     unfinished: int
 
     model_config = like(batch_id="4pd83mzs7k1h", jobs=20, other_assignment=0, unfinished=0)
+
+
+class RegradedOneShape(Shape):
+    """The grading that may take the place of the grade."""
+
+    job: str
+
+    model_config = like(job="4pd83mzs7k1h")
 
 
 class CriterionChangeShape(Shape):
@@ -137,11 +145,11 @@ def changes(
 ) -> Listed[ChangeShape]:
     """What a batch of regrades changes, by student; nothing for a batch that is none."""
     place = place_after(after, str)
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
         found = regrades.changes(session, batch_id)
-        hidden = open_assignments.with_names_hidden(session, here.course_id)
-        shown = {line.id: nameless(line, hidden).student for line in batches.job_lines(session, batch_id)}
+        shown = {line.id: line.hidden_by(hidden).student for line in batches.job_lines(session, batch_id)}
     ids = [each.job_id for each in found]
     start = 0 if place is None else ids.index(place[0]) + 1 if place[0] in ids else len(ids)
     page = page_of(found[start : start + limit + 1], limit, lambda each: [each.job_id])
@@ -155,7 +163,28 @@ def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAske
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
     anyway = asked is not None and asked.anyway
-    return PublishedShape.model_validate(regrades.publish(context.store, batch_id, actor=here.actor, anyway=anyway))
+    return PublishedShape.model_validate(publishing.publish(context.store, batch_id, actor=here.actor, anyway=anyway))
+
+
+@router.post("/courses/{course_id}/grades/{job_id}/publish")
+def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
+    """Let the newest grade of this submission stand, and release it to its student."""
+    with context.store.reading() as session:
+        job_in(session, here.course_id, job_id)
+    anyway = asked is not None and asked.anyway
+    return PublishedShape.model_validate(publishing.publish_one(context.store, job_id, actor=here.actor, anyway=anyway))
+
+
+@router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
+def regrade_one(here: Marks, context: Context, job_id: RowName, asked: RegradeAsked | None = None) -> RegradedOneShape:
+    """Grade this submission again; the old grade stands until somebody publishes."""
+    with context.store.reading() as session:
+        job_in(session, here.course_id, job_id)
+        changed = assignment_of(session, here.course_id, asked.assignment) if asked and asked.assignment else None
+    most = context.settings.max_attempts
+    made = regrades.regrade_one(context.store, job_id, changed, max_attempts=most, actor=here.actor)
+    context.notifier.grade(Lane.INTERACTIVE)
+    return RegradedOneShape(job=made)
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE, response_class=Response)

@@ -36,6 +36,8 @@ BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
         "states": {"done": 18, "running": 2},
         "refusals": [{"source": "bob", "sentence": "bob: holds no robot program.", "assignment": "shape-recognition"}],
         "regrade_of": None,
+        "web_assignment": None,
+        "takes_in": False,
     }
 )
 
@@ -125,6 +127,8 @@ class BatchShape(Shape):
     states: dict[JobState, int]
     refusals: list[RefusalShape]
     regrade_of: str | None = Field(description="The batch whose submissions these are.")
+    web_assignment: str | None = Field(description="The assignment that students submitted these to on the web.")
+    takes_in: bool = Field(description="More may come: the assignment is open.")
 
     model_config = like(**BATCH_EXAMPLE)
 

@@ -9,8 +9,8 @@ from fastapi import Depends
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from service.store import webhooks
 from service.store.outbox import WebhookEvent
+from service.store.people import webhooks
 from service.store.states import Role
 from service.web.access import RowName, nothing_here
 from service.web.api.shapes import Shape, like

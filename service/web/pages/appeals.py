@@ -7,8 +7,10 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.store import appeals
-from service.store.appeals import LONGEST_TEXT
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades import appeals
+from service.store.grades.appeals import LONGEST_TEXT
 from service.web.access import Instructing, Studying, own_submission
 from service.web.context import Context
 from service.web.rendering import page
@@ -20,9 +22,10 @@ Text = Annotated[str, Form()]
 @router.get("/appeals")
 def asked(request: Request, here: Instructing, context: Context) -> Response:
     """What students ask, the open ones first."""
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
-        still_open = appeals.in_course(session, here.course_id, answered=False)
-        answered = appeals.in_course(session, here.course_id, answered=True)
+        still_open = appeals.in_course(session, here.course_id, hidden, answered=False)
+        answered = appeals.in_course(session, here.course_id, hidden, answered=True)
     return page(
         request, here.reader, "appeals.html", here=here, open=still_open, answered=answered, longest=LONGEST_TEXT
     )
@@ -43,12 +46,14 @@ def appeal(request: Request, here: Studying, context: Context, submission_id: in
         submission = own_submission(session, here.reader.identity, here.course_id, submission_id)
         earlier = appeals.of_submission(session, submission_id)
         may = appeals.may_appeal(session, submission_id)
+        prepared = {each.assignment: each.title for each in open_assignments.of_course(session, here.course_id)}
     return page(
         request,
         here.reader,
         "appeal.html",
         here=here,
         submission=submission,
+        title=prepared.get(submission.assignment, submission.assignment),
         appeals=earlier,
         may=may and all(each.answered_at is not None for each in earlier),
         longest=LONGEST_TEXT,

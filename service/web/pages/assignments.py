@@ -1,6 +1,6 @@
 """The assignments of a course for its instructors: taken from the catalogue or uploaded, previewed, opened and closed.
 
-What an assignment's folder may hold is ``submissions.assignment``'s to say.
+How one is taken in is ``web/preparing.py``'s.
 """
 
 from __future__ import annotations
@@ -8,70 +8,84 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Request, UploadFile
+from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi import Path as InPath
 from fastapi.responses import RedirectResponse, Response
 from sqlalchemy.orm import Session
 
-from service.store import audit, intake, open_assignments, own_gradings, policies
-from service.store.models import Enrolment
-from service.store.policies import PolicyLimits
-from service.store.states import Lane
-from service.store.versions import check_assignment, freeze
+from service.store import audit
+from service.store.courses import open_assignments, policies
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.courses.policies import PolicyLimits
+from service.store.courses.versions import check_assignment
+from service.store.grades import own_gradings
+from service.web import preparing
 from service.web.access import InCourse, Instructing, enrolment_in
+from service.web.attachments import attachment
 from service.web.context import Context, WebContext
+from service.web.kept_uploads import file_name
 from service.web.moments import written_moment
 from service.web.rendering import page
-from sim.errors import AssignmentError, UsageError
-from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXAMPLES
-from submissions.assignment.folder import FILE_NAME, REFERENCE, assignment_folder, catalogue
-from submissions.assignment.overview import overview
-from submissions.assignment.reader import find_in_catalogue, read_assignment
-from submissions.bundle import read_submission
-from submissions.grading_request import GradingRequest
-from submissions.people import Student
+from sim.errors import UsageError
+from submissions.assignment.export import write_new
+from submissions.assignment.folder import FILE_NAME, catalogue
+from submissions.assignment.reader import find_in_catalogue
 from submissions.raw_files import SentFile
-from submissions.unzipping import unzip
 
 router = APIRouter(prefix="/courses/{course_id}")
+Done = Annotated[str, Query(max_length=20)]
 AssignmentId = Annotated[str, InPath(pattern="^[a-z0-9][a-z0-9_-]*$", max_length=80)]
-_MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
 
 
 @router.get("/assignments")
-def list_assignments(request: Request, here: Instructing, context: Context) -> Response:
+def list_assignments(request: Request, here: Instructing, context: Context, done: Done = "") -> Response:
     """What the course has prepared and opened, and two ways to another."""
-    return _list(request, here, context)
+    return _list(request, here, context, done=done)
 
 
 @router.post("/assignments")
 def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
     """Take an assignment from the catalogue, as it is now."""
-    return _prepared(here, context, find_in_catalogue(assignment))
+    return _to(here, preparing.prepare(context, here.reader.identity, here.course_id, find_in_catalogue(assignment)))
 
 
 @router.post("/assignments/uploads")
 def upload(request: Request, here: Instructing, context: Context, file: Annotated[UploadFile, File()]) -> Response:
     """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview."""
+    sent = SentFile(file.filename or "", file.file)
     try:
-        with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as name:
-            folder = _unpacked(SentFile(file.filename or "", file.file), Path(name))
-            found = read_assignment(folder)
-            reference = folder / EXAMPLES / REFERENCE
-            answer = _prepared(here, context, found)
-            if reference.is_dir():
-                _preview(here, context, found, reference)
-    except (UsageError, AssignmentError) as error:
+        if not sent.flat_name.lower().endswith(".zip"):
+            raise UsageError(f"expected a .zip of an assignment's folder, with its {FILE_NAME}")
+        with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
+            path = Path(folder) / file_name(sent)
+            with path.open("xb") as sink:
+                shutil.copyfileobj(sent.stream, sink)
+            return _to(here, preparing.prepare_own(context, here.reader.identity, here.course_id, path))
+    except UsageError as error:
         return _list(request, here, context, refused=str(error).splitlines(), status_code=422)
-    return answer
+
+
+@router.get("/assignments/uploads")
+def to_list(here: Instructing) -> Response:
+    """Nothing but the way back, for whoever comes to the address that takes uploads."""
+    return RedirectResponse(_path(here, ""), 303)
+
+
+@router.get("/assignments/uploads/my-assignment.zip")
+def commented_example(here: Instructing) -> Response:
+    """The folder of an assignment with comments in it, to be changed and uploaded."""
+    with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
+        write_new(Path(folder) / "zip" / "my-assignment")
+        zipped = shutil.make_archive(f"{folder}/made", "zip", f"{folder}/zip")
+        return attachment(Path(zipped).read_bytes(), "my-assignment.zip", "application/zip")
 
 
 @router.get("/assignments/{assignment}")
-def show(request: Request, here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def show(request: Request, here: Instructing, context: Context, assignment: AssignmentId, done: Done = "") -> Response:
     """What an assignment asks for, whether it is open, and what holds for it."""
     with context.store.reading() as session:
         line = open_assignments.find(session, here.course_id, assignment)
@@ -92,8 +106,10 @@ def show(request: Request, here: Instructing, context: Context, assignment: Assi
         own_policy=allowed.get(assignment),
         policy=allowed.get(assignment) or allowed.get("") or PolicyLimits(),
         previews=previews,
-        has_reference=_reference(found) is not None,
+        has_reference=preparing.reference_of(found) is not None,
         changed=newest != line.version,
+        done=done,
+        at=datetime.now(UTC),
     )
 
 
@@ -118,18 +134,14 @@ def hide_names(
         open_assignments.hide_names(session, here.course_id, assignment, hidden)
         told = {"assignment": assignment, "hidden": hidden}
         audit.note(session, here.actor, "names", "course", str(here.course_id), **told)
-    return _to(here, assignment)
+    return RedirectResponse(_path(here, assignment), 303)
 
 
 @router.post("/assignments/{assignment}/preview")
 def preview(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Grade the catalogue's reference solution as a submission of one's own."""
-    with context.store.reading() as session:
-        found = open_assignments.load(session, here.course_id, assignment)
-    reference = _reference(found)
-    if reference is None:
-        raise UsageError(f"there is no reference solution of this version of {assignment}; upload its folder again")
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{_preview(here, context, found, reference)}", 303)
+    job_id = preparing.preview(context, here.reader.identity, here.course_id, assignment)
+    return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
 
 
 @router.post("/policy")
@@ -151,7 +163,16 @@ def set_policy(
         policies.set_policy(session, here.course_id, assignment, allowed)
         told = {"assignment": assignment, "due": due or None, "late_days": late_days, "attempts": allowed.attempts}
         audit.note(session, here.actor, "policy", "course", str(here.course_id), **told)
-    return _to(here, assignment)
+    return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
+
+
+@router.post("/assignments/{assignment}/no-policy")
+def drop_policy(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+    """Let the assignment have what holds for all, in place of a policy of its own."""
+    with context.store.transaction() as session:
+        policies.drop_policy(session, here.course_id, assignment)
+        audit.note(session, here.actor, "policy", "course", str(here.course_id), assignment=assignment, dropped=True)
+    return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
 
 
 def _list(
@@ -159,13 +180,13 @@ def _list(
     here: InCourse,
     context: WebContext,
     *,
+    done: str = "",
     refused: list[str] | None = None,
     status_code: int = 200,
 ) -> Response:
     with context.store.reading() as session:
         prepared = open_assignments.of_course(session, here.course_id)
         allowed = policies.policies(session, here.course_id)
-    own = {each.assignment for each in prepared}
     return page(
         request,
         here.reader,
@@ -173,16 +194,21 @@ def _list(
         status_code=status_code,
         here=here,
         prepared=prepared,
-        catalogue=[overview(assignment_folder(each)) for each in catalogue() if each not in own],
+        catalogue=len(catalogue()),
         policies=allowed,
         policy=allowed.get("") or PolicyLimits(),
         refused=refused or [],
+        done=done,
+        at=datetime.now(UTC),
     )
 
 
-def _to(here: InCourse, assignment: str) -> Response:
-    path = f"/courses/{here.course_id}/assignments"
-    return RedirectResponse(f"{path}/{assignment}" if assignment else path, 303)
+def _to(here: InCourse, made: CourseAssignment) -> Response:
+    return RedirectResponse(_path(here, made.assignment), 303)
+
+
+def _path(here: InCourse, assignment: str) -> str:
+    return f"/courses/{here.course_id}/assignments{f'/{assignment}' if assignment else ''}"
 
 
 def _changed(
@@ -191,52 +217,4 @@ def _changed(
     with context.store.transaction() as session:
         change(session, here.course_id, assignment)
         audit.note(session, here.actor, action, "course", str(here.course_id), assignment=assignment)
-    return _to(here, assignment)
-
-
-def _prepared(here: InCourse, context: WebContext, found: Assignment) -> Response:
-    frozen = freeze(found)
-    with context.store.transaction() as session:
-        open_assignments.prepare(session, here.course_id, frozen)
-        told = {"assignment": found.id, "version": found.version}
-        audit.note(session, here.actor, "prepare", "course", str(here.course_id), **told)
-    return _to(here, found.id)
-
-
-def _unpacked(sent: SentFile, folder: Path) -> Path:
-    """The folder of the assignment in a zip: the zip's own, or the only one in it."""
-    if not sent.flat_name.lower().endswith(".zip"):
-        raise UsageError(f"expected a .zip of an assignment's folder, with its {FILE_NAME}")
-    path = folder / "upload.zip"
-    with path.open("xb") as sink:
-        shutil.copyfileobj(sent.stream, sink)
-    inside = folder / "assignment"
-    inside.mkdir()
-    unzip(path, inside, _MOST_ENTRIES, _MOST_BYTES)
-    found = [path for path in inside.iterdir() if path.name != "__MACOSX"]
-    return found[0] if len(found) == 1 and found[0].is_dir() else inside
-
-
-def _reference(found: Assignment) -> Path | None:
-    """The catalogue's reference solution, where the course marks by the catalogue's version."""
-    if found.id not in catalogue() or find_in_catalogue(found.id).version != found.version:
-        return None
-    folder = assignment_folder(found.id) / EXAMPLES / REFERENCE
-    return folder if folder.is_dir() else None
-
-
-def _preview(here: InCourse, context: WebContext, found: Assignment, reference: Path) -> str:
-    """Grade a reference solution as the instructor's own; the id of its job."""
-    with context.store.reading() as session:
-        own: Enrolment = enrolment_in(session, here.reader.identity, here.course_id)
-        student = Student(own.written)
-    submission = read_submission(reference, student=student.id, asked=found.parts)
-    accepted = intake.accept(
-        context.store,
-        GradingRequest(submission, found, REFERENCE, whose=student),
-        course=here.course,
-        max_attempts=context.settings.max_attempts,
-    )
-    if accepted.copied_from is None:
-        context.notifier.grade(Lane.INTERACTIVE)
-    return accepted.job_id
+    return RedirectResponse(_path(here, assignment), 303)

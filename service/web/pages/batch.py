@@ -12,19 +12,22 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
+from service.language import translatable
 from service.reports.formats import FORMATS
 from service.reports.words import verdict_words
-from service.store import audit, batch_control, batch_table, batches, metrics, regrades
-from service.store.batch_table import SORTS, STATES, TableAsked, TableLine
-from service.store.batches import BatchLine
-from service.store.hidden_names import hidden_names
+from service.store import audit
+from service.store.batches import batch_table, batches, publishing, regrades
+from service.store.batches.batch_table import SORTS, STATES, TableAsked, TableLine
+from service.store.batches.batches import BatchLine
+from service.store.batches.overview import PASS_SHARE, missing, overview
+from service.store.courses.hidden_names import hidden_names
 from service.store.installation import secret_of
-from service.store.overview import PASS_SHARE, overview
+from service.store.queue import batch_control, metrics
 from service.store.states import BatchState, JobState, Lane
 from service.web.access import InCourse, Instructing, RowName, batch_in
 from service.web.batch_uploads import assignment_of
 from service.web.context import Context, WebContext
-from service.web.language import translatable
+from service.web.language import language_of
 from service.web.rendering import page
 from sim.recording import Verdict
 
@@ -88,7 +91,7 @@ def submissions(
         asked=asked,
         remarked=remarked,
         columns=_columns(lines),
-        verdicts={each.value: verdict_words(each).short for each in Verdict},
+        verdicts={each.value: verdict_words(each, language_of(request)).short for each in Verdict},
         entry=next((each for each in shown["history"] if each.action == done in _ACTIONS), None),
         formats=sorted(name for name, each in FORMATS.items() if each.filled_in is None),
     )
@@ -119,12 +122,15 @@ def show_overview(
     lines: list[TableLine] = shown["lines"]
     with context.store.reading() as session:
         classes = overview(session, here.course_id, lines, Decimal(at_least) / 100)
+        asked = shown["batch"].web_assignment if not classes else None
+        nobody = missing(session, here.course_id, asked) if asked else ()
     return page(
         request,
         here.reader,
         "batch_overview.html",
         **shown,
         classes=classes,
+        missing=nobody,
         at_least=at_least,
         by_id={line.id: line for line in lines if line.id},
         job_of={(line.assignment, line.student): line.id for line in lines if line.id},
@@ -183,13 +189,22 @@ def retry(here: Instructing, context: Context, batch_id: RowName) -> Response:
     return _back(here, batch_id, "retry")
 
 
+@router.get("/publish")
+def before_publishing(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
+    """What publishing would release to how many, and what it would hold back."""
+    shown = _batch(here, context, batch_id)
+    with context.store.reading() as session:
+        publication = publishing.would_publish(session, batch_id)
+    return page(request, here.reader, "batch_publish.html", **shown, publication=publication)
+
+
 @router.post("/publish")
 def publish(
     here: Instructing, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Let the newest grades of a batch stand, and release them to the students."""
     _look_for(here, context, batch_id)
-    regrades.publish(context.store, batch_id, actor=here.actor, anyway=anyway)
+    publishing.publish(context.store, batch_id, actor=here.actor, anyway=anyway)
     return _back(here, batch_id, "publish")
 
 
@@ -228,7 +243,7 @@ def _batch(here: InCourse, context: WebContext, batch_id: str) -> dict[str, Any]
         line = batches.batch(session, batch_id)
         hidden = hidden_names(session, here.course_id, secret)
         lines = batch_table.table_lines(session, batch_id, line.refusals, hidden)
-        waiting = 0 if line.regrade_of is not None else regrades.unpublished_regrades(session, batch_id)
+        waiting = 0 if line.regrade_of is not None else publishing.unpublished_regrades(session, batch_id)
         history = audit.entries(session, "batch", batch_id)
     graded = [each for each in lines if each.state == JobState.DONE and each.staff_only is None]
     return {

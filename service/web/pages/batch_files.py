@@ -5,6 +5,7 @@ What a format writes is ``service.reports``'; names are in it, whether or not th
 
 from __future__ import annotations
 
+import codecs
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Query, UploadFile
@@ -17,6 +18,7 @@ from service.web.context import Context, WebContext
 from sim.errors import UsageError
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
+_TABLES = ("csv", "csv-long")
 _WORKSHEET = "moodle-worksheet"
 _LARGEST_WORKSHEET = 10 * 2**20
 
@@ -58,4 +60,6 @@ def _file(
     with context.store.reading() as session:
         batch_in(session, here.course_id, batch_id)
     made = export_file(context.store, batch_id, form, published=published, given=given)
-    return attachment(made.data, made.name, made.media_type)
+    # Excel takes a table for UTF-8 only where it begins so; Moodle has its own.
+    mark = codecs.BOM_UTF8 if form in _TABLES else b""
+    return attachment(mark + made.data, made.name, made.media_type)

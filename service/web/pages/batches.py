@@ -5,16 +5,23 @@ What is done with one batch is ``batch.py``'s; what an upload may hold is ``subm
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi.responses import RedirectResponse, Response
+from starlette.exceptions import HTTPException
 
-from service.store import audit, batches, open_assignments
+from service.language import translatable
+from service.store import audit
+from service.store.batches import batches, preflight
+from service.store.courses import open_assignments
+from service.store.installation import secret_of
 from service.store.models import Batch
-from service.web.access import InCourse, Instructing, nothing_here
+from service.store.people import people
+from service.web.access import InCourse, Instructing
 from service.web.batch_uploads import read_upload, take_in
 from service.web.context import Context, WebContext
 from service.web.kept_uploads import ExpectedSubmission, KeptUpload, KeptUploads
@@ -22,8 +29,11 @@ from service.web.rendering import page
 from sim.errors import UsageError
 from submissions.assignment.folder import catalogue
 from submissions.batch_folder import BatchContents
+from submissions.bundle import empty_parts, missing_part
+from submissions.grading_request import GradingRequest
 from submissions.people import read_people
 from submissions.raw_files import SentFile, shown
+from submissions.submission import PART_FILES
 
 router = APIRouter(prefix="/courses/{course_id}/batches")
 _A_PAGE = 30
@@ -59,24 +69,31 @@ def upload(
     except UsageError as error:
         kept_uploads.remove(begun)
         return _list(request, here, context, refused=str(error), status_code=422)
-    expected = tuple(
-        ExpectedSubmission(
-            each.submission.student,
-            each.student.name if each.student.name != each.student.id else "",
-            each.assignment.title,
-            each.source,
-        )
-        for each in checked.grading_requests
-    )
+    expected = _expected(context, here, checked.grading_requests)
     kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
     return RedirectResponse(f"/courses/{here.course_id}/batches/uploads/{laid.id}", 303)
 
 
 @router.get("/uploads/{upload_id}")
-def preflight(request: Request, here: Instructing, context: Context, upload_id: UploadId) -> Response:
+def look_first(request: Request, here: Instructing, context: Context, upload_id: UploadId) -> Response:
     """What of an upload would be taken in, and what not and why."""
     found = _find(context, here, upload_id)
-    return page(request, here.reader, "upload.html", here=here, upload=found, known=None)
+    missing: dict[str, list[str]] = {}
+    for each in found.expected:
+        if each.missing:
+            missing.setdefault(each.missing, []).append(each.student)
+    return page(
+        request,
+        here.reader,
+        "upload.html",
+        here=here,
+        upload=found,
+        known=None,
+        missing=missing,
+        strangers=[each.student for each in found.expected if not each.enrolled],
+        known_before=sum(each.known for each in found.expected),
+        copied=sum(each.copied for each in found.expected),
+    )
 
 
 @router.post("/uploads/{upload_id}/confirm")
@@ -128,7 +145,40 @@ def _list(
         prepared=prepared,
         catalogue=[each for each in catalogue() if each not in own],
         refused=refused,
+        waiting=KeptUploads(context.settings.home).waiting(here.reader.identity.person_id, here.course_id),
     )
+
+
+def _expected(
+    context: WebContext, here: InCourse, grading_requests: Sequence[GradingRequest]
+) -> tuple[ExpectedSubmission, ...]:
+    secret = secret_of(context.store).sha256
+    with context.store.reading() as session:
+        foreseen = preflight.foresee(session, here.course_id, grading_requests, secret)
+        names = {each.id: each.name for each in people.members(session, here.course_id)}
+    found = []
+    for each, ahead in zip(grading_requests, foreseen, strict=True):
+        part = missing_part(each.submission, each.assignment.parts)
+        found.append(
+            ExpectedSubmission(
+                each.submission.student,
+                _name(each, names),
+                each.assignment.title,
+                each.source,
+                PART_FILES[part] if part is not None else "",
+                ahead.enrolled,
+                ahead.known,
+                ahead.copied,
+                next(iter(empty_parts(each.submission)), ""),
+            )
+        )
+    return tuple(found)
+
+
+def _name(asked: GradingRequest, names: Mapping[str, str]) -> str:
+    """Who submitted, where that is more than the id: as the batch has it, else as the course knows them."""
+    name = asked.student.name if asked.student.name != asked.student.id else ""
+    return name or names.get(asked.submission.student, "")
 
 
 def _sent(files: list[UploadFile]) -> list[SentFile]:
@@ -142,10 +192,8 @@ def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], p
         raise UsageError("nothing was sent, expected a .zip, or a file for each student")
     suffixes = {Path(file.flat_name).suffix.lower() for file in files}
     if not suffixes <= set(_SINGLE):
-        wrong = min(suffixes - set(_SINGLE))
-        raise UsageError(
-            f"a file that ends in {shown(wrong) or 'nothing'} was sent, expected a .zip, or a .py, .ipynb or .zip each"
-        )
+        wrong = next(file.flat_name for file in files if Path(file.flat_name).suffix.lower() not in _SINGLE)
+        raise UsageError(f"{shown(wrong)} was sent, expected a .zip, or a .py, .ipynb or .zip for each student")
     names = kept_uploads.lay(begun, files, "batch")
     one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVES)
     table = kept_uploads.lay(begun, people, "people") if people else [""]
@@ -167,5 +215,5 @@ def _find(context: WebContext, here: InCourse, upload_id: str) -> KeptUpload:
     kept_uploads = KeptUploads(context.settings.home)
     found = kept_uploads.find(upload_id, here.reader.identity.person_id, here.course_id)
     if found is None:
-        raise nothing_here()
+        raise HTTPException(404, translatable("This upload is not there: it was taken in, discarded, or is a day old."))
     return found

@@ -14,14 +14,16 @@ from fastapi.responses import RedirectResponse, Response
 from service.report_files import report_body
 from service.reports.html import ReportParts
 from service.reports.view import staff_view
-from service.store import audit, batch_table, batches, regrades, results
-from service.store.hidden_names import HiddenNames, hidden_names
-from service.store.installation import secret_of
-from service.store.models import Job
+from service.store import audit
+from service.store.batches import batches, publishing, regrades
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades import own_gradings, results
 from service.store.states import JobState, Lane
 from service.web.access import InCourse, Instructing, RowName, job_in
 from service.web.batch_uploads import assignment_of
 from service.web.context import Context, WebContext
+from service.web.language import language_of
+from service.web.neighbours import neighbours
 from service.web.rendering import page, wants_part
 
 router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}")
@@ -30,21 +32,22 @@ router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}")
 @router.get("")
 def grade(request: Request, here: Instructing, context: Context, job_id: RowName, done: str = "") -> Response:
     """The report of one submission; while it is graded, how far that is."""
-    secret = secret_of(context.store)
+    hidden = hidden_names_of(context.store, here.course_id)
     with context.store.reading() as session:
         row = job_in(session, here.course_id, job_id)
-        hidden = hidden_names(session, here.course_id, secret)
         whole = batches.job_line(session, job_id)
-        line = hidden.line(whole)
+        line = whole.hidden_by(hidden)
         change = regrades.change(session, job_id)
         gradings = regrades.gradings(session, row.submission_id)
+        attempts = own_gradings.newest(session, row.enrolment_id, line.assignment)
         graded = results.load(session, job_id) if line.state is JobState.DONE else None
         history = audit.entries(session, "job", job_id)
     if wants_part(request) and line.ended:
         return Response(headers={"hx-refresh": "true"})
     report: ReportParts | None = None
     if graded is not None:
-        report = report_body(context.store, whole, staff_view(replace(graded, student=line.student)))
+        view = staff_view(replace(graded, student=line.student), language_of(request))
+        report = report_body(context.store, whole, view)
     return page(
         request,
         here.reader,
@@ -55,8 +58,9 @@ def grade(request: Request, here: Instructing, context: Context, job_id: RowName
         report=report,
         change=change,
         gradings=gradings,
+        attempts=attempts,
         history=list(reversed(history)),
-        beside=_beside(context, here, row, hidden),
+        beside=neighbours(context.store, row, hidden),
         batch_id=row.batch_id,
         told=next((entry for entry in reversed(history) if entry.action == done == "publish"), None),
     )
@@ -66,7 +70,7 @@ def grade(request: Request, here: Instructing, context: Context, job_id: RowName
 def publish(here: Instructing, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False) -> Response:
     """Let the newest grade of this submission stand, and release it to its student."""
     _look_for(here, context, job_id)
-    regrades.publish_one(context.store, job_id, actor=here.actor, anyway=anyway)
+    publishing.publish_one(context.store, job_id, actor=here.actor, anyway=anyway)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}?done=publish", 303)
 
 
@@ -87,16 +91,3 @@ def regrade(
 def _look_for(here: InCourse, context: WebContext, job_id: str) -> None:
     with context.store.reading() as session:
         job_in(session, here.course_id, job_id)
-
-
-def _beside(context: WebContext, here: InCourse, row: Job, hidden: HiddenNames) -> dict[str, str]:
-    """The ids of the grades before and after this one in the table of its batch."""
-    if row.batch_id is None:
-        return {}
-    with context.store.reading() as session:
-        ids = [line.id for line in batch_table.table_lines(session, row.batch_id, (), hidden)]
-    if row.id not in ids:
-        return {}
-    place = ids.index(row.id)
-    found = {"before": ids[place - 1] if place else "", "after": ids[place + 1] if place + 1 < len(ids) else ""}
-    return {name: own for name, own in found.items() if own}

@@ -14,8 +14,9 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.lti import launch
 from service.lti.keys import public_keys, signing_key
-from service.store import audit, credentials, lti
-from service.store.credentials import SESSION_LIFETIME
+from service.store import audit
+from service.store.people import credentials, lti
+from service.store.people.credentials import SESSION_LIFETIME
 from service.store.states import CredentialKind
 from service.web.context import Context, WebContext
 from service.web.pages.home import course_path

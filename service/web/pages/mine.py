@@ -5,29 +5,30 @@ What came of a submission is ``own_submission.py``'s.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Annotated
 
 from fastapi import APIRouter, File, Form, Request, UploadFile
 from fastapi.responses import RedirectResponse, Response
-from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException
 
 from service import own_work
 from service.own_work import OwnSubmission
 from service.reports.readable import flowing
-from service.store import intake, open_assignments
+from service.store.courses import open_assignments
+from service.store.queue import tryouts
 from service.trying import tryout_assignment
 from service.web.access import InCourse, Studying, enrolment_in, nothing_here
 from service.web.attachments import attachment
 from service.web.context import Context, WebContext
 from service.web.errors import sentence_of
+from service.web.language import language_of
+from service.web.refusing import said_in
 from service.web.rendering import page
-from service.web.submitting import submit
+from service.web.submitting import LacksPart, seen_assignment, submit
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
 from submissions.raw_files import SentFile
 
@@ -45,7 +46,8 @@ class _Refused:
     sentence: str
     status: int
     texts: Sequence[str]
-    headers: dict[str, str]
+    headers: Mapping[str, str] = field(default_factory=dict)
+    lacks_part: bool = False
 
 
 @router.get("/courses/{course_id}/mine")
@@ -65,19 +67,29 @@ def own_assignment(request: Request, here: Studying, context: Context, assignmen
 
 @router.post("/courses/{course_id}/mine/{assignment}")
 def submit_own(
-    request: Request, here: Studying, context: Context, assignment: str, files: Files = (), texts: Texts = ()
+    request: Request,
+    here: Studying,
+    context: Context,
+    assignment: str,
+    files: Files = (),
+    texts: Texts = (),
+    even_in_part: Annotated[bool, Form()] = False,
 ) -> Response:
     """Take in what was chosen and typed, and go where it is waited for."""
     with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here, assignment))
+        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
     try:
-        accepted = submit(context, here.reader.identity, here.course_id, assignment, sent_files(sheet, files, texts))
+        sent = sent_files(sheet, files, texts)
+        accepted = submit(context, here.reader.identity, here.course_id, assignment, sent, even_in_part=even_in_part)
     except UsageError as error:
-        return _shown(request, here, context, assignment, _Refused(sentence_of(error), 422, texts, {}))
+        sentence = sentence_of(error, language_of(request))
+        refused = _Refused(sentence, 422, texts, lacks_part=isinstance(error, LacksPart))
+        return _shown(request, here, context, assignment, refused)
     except HTTPException as error:
         if error.status_code != 429:
             raise
-        refused = _Refused(str(error.detail), 429, texts, dict(error.headers or {}))
+        sentence = language_of(request).tell(said_in(error))
+        refused = _Refused(sentence, 429, texts, dict(error.headers or {}))
         return _shown(request, here, context, assignment, refused)
     return RedirectResponse(f"/courses/{here.course_id}/mine/submissions/{accepted.submission_id}", 303)
 
@@ -86,32 +98,27 @@ def submit_own(
 def given_file(here: Studying, context: Context, assignment: str, file: str) -> Response:
     """A file that the assignment gives its students."""
     with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here, assignment))
+        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
     if file not in sheet.given:
         raise nothing_here()
     return attachment(sheet.given[file], file)
 
 
-def seen_assignment(session: Session, here: InCourse, assignment: str) -> Assignment:
-    """An assignment that a student may see: it was opened, or they have submitted to it."""
-    prepared = {each.assignment: each for each in open_assignments.of_course(session, here.course_id)}.get(assignment)
-    if prepared is not None and prepared.open:
-        return open_assignments.load(session, here.course_id, assignment)
-    enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-    submitted = own_work.own_submissions(session, enrolment_id, assignment)
-    if not submitted:
-        raise nothing_here()
-    return intake.load_assignment(session, submitted[0].job_id)
-
-
 def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[str]) -> list[SentFile]:
-    """What a form carried: the files chosen, and each text under the name of the file that it stands for."""
+    """What a form carried: the files chosen, and each text under the name of the file that it stands for.
+
+    Raises UsageError where one was chosen and typed.
+    """
     chosen = [SentFile(each.filename, each.file) for each in files if each.filename]
     typed = [
         SentFile(name, BytesIO(text.replace("\r\n", "\n").encode()))
         for name, text in zip(sheet.asked, texts, strict=False)
         if text.strip()
     ]
+    names = {each.flat_name.lower() for each in chosen}
+    for each in typed:
+        if each.flat_name in names:
+            raise UsageError("%(name)s was chosen as a file and typed as well; keep one of them.", name=each.flat_name)
     return [*chosen, *typed]
 
 
@@ -128,11 +135,13 @@ def _shown(
     request: Request, here: InCourse, context: WebContext, assignment: str, refused: _Refused | None
 ) -> Response:
     with context.store.reading() as session:
-        seen = seen_assignment(session, here, assignment)
+        seen = seen_assignment(session, here.reader.identity, here.course_id, assignment)
         sheet = task_sheet(seen)
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
         attempts = own_work.own_submissions(session, enrolment_id, assignment)
+        counting = own_work.counting_submission(session, enrolment_id, assignment)
         allowance = own_work.allowance(session, enrolment_id, assignment)
+        has_tried = tryouts.newest(session, enrolment_id, assignment) is not None
         prepared = open_assignments.of_course(session, here.course_id)
     is_open = any(each.assignment == assignment and each.open for each in prepared)
     shown = page(
@@ -144,10 +153,12 @@ def _shown(
         sheet=sheet,
         description=flowing(sheet.description),
         attempts=attempts,
+        counting=counting,
         curve=curve(attempts),
         allowance=allowance,
         is_open=is_open,
         can_try=is_open and tryout_assignment(seen) is not None,
+        has_tried=has_tried,
         refused=refused,
     )
     shown.headers.update(refused.headers if refused else {})

@@ -11,17 +11,26 @@ from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.doctor import examine_service
-from service.store import audit, batch_control, credentials, dead_letters, people, workers
-from service.store.credentials import LINK_LIFETIME
-from service.store.metrics import collect
-from service.store.states import CredentialKind, JobState, Lane
+from service.language import translatable
+from service.store import audit
+from service.store.people import people, sign_in_links
+from service.store.queue import batch_control, dead_letters, tryouts, workers
+from service.store.queue.metrics import collect
+from service.store.states import JobState, Lane
 from service.version import GRADER_VERSION
 from service.web.access import Operating
 from service.web.context import Context, WebContext
+from service.web.made_links import LinkWord, made_link, new_word, secret_word
 from service.web.rendering import page, wants_part
+from sim.errors import UsageError
 from submissions.people import Student
 
 router = APIRouter()
+_LANES = {
+    Lane.INTERACTIVE: translatable("interactive: single submissions, that somebody waits for"),
+    Lane.BATCH: translatable("batch: whole classes"),
+}
+_TRYOUTS = translatable("tryouts: programs that are run and not marked")
 
 
 @router.get("/operator")
@@ -42,31 +51,30 @@ def retry(reader: Operating, context: Context, batch_id: Annotated[str, Form(max
 
 
 @router.get("/operator/courses")
-def courses(request: Request, reader: Operating, context: Context) -> Response:
-    """The courses, and a form for an instructor of one."""
+def courses(request: Request, reader: Operating, context: Context, link: LinkWord = "") -> Response:
+    """The courses, a form for an instructor of one, and the link that was made for the newest."""
     with context.store.reading() as session:
-        return page(request, reader, "operator_courses.html", courses=people.courses(session), link="", who="")
+        made = made_link(session, request, context, reader, link)
+        return page(request, reader, "operator_courses.html", courses=people.courses(session), made=made)
 
 
 @router.post("/operator/courses")
 def add_instructor(
-    request: Request,
     reader: Operating,
     context: Context,
     course: Annotated[str, Form(min_length=1, max_length=100)],
     who: Annotated[str, Form(min_length=1, max_length=100)],
     name: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
-    """Make an instructor, and the course where there is none of that name; their link is shown this once."""
+    """Make an instructor, and the course where there is none of that name; their link is shown to whoever made it."""
+    if not course.strip() or not who.strip():
+        raise UsageError("a course and its instructor need a name that can be seen")
+    word = new_word()
     with context.store.transaction() as session:
         member = people.make_instructor(session, course.strip(), Student(who.strip(), name.strip()))
-        secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
         audit.note(session, reader.actor, "add", "person", str(member.person_id), role=member.role.value)
-        listed = people.courses(session)
-    start = context.settings.public_url or str(request.base_url).rstrip("/")
-    return page(
-        request, reader, "operator_courses.html", courses=listed, link=f"{start}/sign-in/{secret}", who=member.id
-    )
+        sign_in_links.make_link(session, member.person_id, reader.actor, word=secret_word(reader, word))
+    return RedirectResponse(f"/operator/courses?link={word}", 303)
 
 
 def _state(context: WebContext) -> dict[str, Any]:
@@ -76,15 +84,17 @@ def _state(context: WebContext) -> dict[str, Any]:
         quarantined = {each.worker: each for each in workers.in_quarantine(session)}
         dead = dead_letters.dead_letters(session)
         count = dead_letters.count(session)
+        tried = tryouts.lane(session)
     lanes = [
         (
-            lane.value,
+            _LANES[lane],
             metrics.jobs.get((lane, JobState.QUEUED), 0),
             metrics.jobs.get((lane, JobState.RUNNING), 0),
             round(metrics.oldest_seconds.get(lane, 0.0)),
         )
         for lane in Lane
     ]
+    lanes.append((_TRYOUTS, tried.queued, tried.running, round(tried.oldest_seconds)))
     return {
         "findings": findings,
         "lanes": lanes,

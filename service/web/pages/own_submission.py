@@ -12,12 +12,15 @@ from sqlalchemy import select
 from service import own_work
 from service.report_files import report_body
 from service.reports.view import student_view
-from service.store import appeals, batches, policies, results
+from service.store.batches import batches
+from service.store.courses import open_assignments, policies
+from service.store.grades import appeals, results
 from service.store.models import SubmissionRow
-from service.store.queue_places import queue_place
+from service.store.queue.queue_places import queue_place
 from service.web.access import RowNumber, Studying, enrolment_in, nothing_here
 from service.web.attachments import attachment
 from service.web.context import Context
+from service.web.language import language_of
 from service.web.pages.mine import curve
 from service.web.rendering import page, wants_part
 
@@ -38,12 +41,15 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
                 return Response(headers={"hx-refresh": "true"})
             return page(request, here.reader, "own_progress.html", here=here, found=found, place=place)
         attempts = own_work.own_submissions(session, enrolment_id, found.assignment)
+        counting = own_work.counting_submission(session, enrolment_id, found.assignment)
         allowance = own_work.allowance(session, enrolment_id, found.assignment)
+        prepared = open_assignments.of_course(session, here.course_id)
         asked = appeals.of_submission(session, submission_id)
         view = line = None
         if found.shown:
             line = batches.job_line(session, found.job_id)
-            view = student_view(results.load(session, found.job_id), policies.released(session, found.job_id))
+            released = policies.released(session, found.job_id)
+            view = student_view(results.load(session, found.job_id), released, language_of(request))
     return page(
         request,
         here.reader,
@@ -52,6 +58,8 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
         found=found,
         place=place,
         attempts=attempts,
+        counting=counting,
+        is_open=any(each.assignment == found.assignment and each.open for each in prepared),
         curve=curve(attempts),
         allowance=allowance,
         appeals=asked,

@@ -7,13 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.lti import services
-from service.lti.passing_back import send_marks
-from service.store import audit, lti, open_assignments
+from service.lti import course_services
+from service.store import audit
+from service.store.courses import open_assignments
+from service.store.people import lti
 from service.web.access import Instructing, Operating
 from service.web.context import Context
 from service.web.rendering import page
-from sim.errors import UsageError
 
 router = APIRouter()
 Address = Annotated[str, Form(min_length=1, max_length=1000)]
@@ -41,9 +41,6 @@ def register(
     keys_url: Address,
 ) -> Response:
     """Register a platform, or change one of the same issuer and client."""
-    for what, url in (("login", authorization_url), ("token", token_url), ("keys", keys_url)):
-        if not url.startswith(("https://", "http://")):
-            raise UsageError(f"the {what} address is {url!r}, expected one that begins with https://")
     listed = [each for each in deployments.replace(",", " ").split() if each]
     with context.store.transaction() as session:
         platform_id = lti.register(session, name, issuer, client_id, listed, authorization_url, token_url, keys_url)
@@ -60,20 +57,9 @@ def course_platform(request: Request, here: Instructing, context: Context) -> Re
 @router.post("/courses/{course_id}/platform/members")
 def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
     """Enrol everybody whom the platform has in the course."""
-    with context.store.reading() as session:
-        link = _link(lti.course_link(session, here.course_id))
-    found = services.members(context.store, link)
-    with context.store.transaction() as session:
-        refused = []
-        for each in found:
-            try:
-                with session.begin_nested():
-                    lti.enrol(session, link.platform, here.course_id, each.subject, each.student, each.role)
-            except UsageError as error:
-                refused.append(str(error))
-        count = len(found) - len(refused)
-        audit.note(session, here.actor, "enrol", "course", str(here.course_id), members=count)
-    told = f"{count} of the platform's members are in the course."
+    enrolled = course_services.enrol_members(context.store, here.course_id, here.actor)
+    told = f"{enrolled.members} of the platform's members are in the course."
+    refused = enrolled.refused
     return _course_page(request, here, context, f"{told} {len(refused)} not: {refused[0]}." if refused else told)
 
 
@@ -82,11 +68,7 @@ def pass_back(
     request: Request, here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=200)]
 ) -> Response:
     """Send the published marks of an assignment to the platform's gradebook."""
-    with context.store.reading() as session:
-        link = _link(lti.course_link(session, here.course_id))
-    sent = send_marks(context.store, link, here.course_id, assignment)
-    with context.store.transaction() as session:
-        audit.note(session, here.actor, "pass_back", "course", str(here.course_id), assignment=assignment, sent=sent)
+    sent = course_services.pass_back(context.store, here.course_id, assignment, here.actor)
     return _course_page(request, here, context, f"{sent} published marks were sent.")
 
 
@@ -95,9 +77,3 @@ def _course_page(request: Request, here: Instructing, context: Context, told: st
         link = lti.course_link(session, here.course_id)
         assignments = open_assignments.of_course(session, here.course_id)
     return page(request, here.reader, "course_platform.html", here=here, link=link, assignments=assignments, told=told)
-
-
-def _link(link: lti.CourseLink | None) -> lti.CourseLink:
-    if link is None:
-        raise UsageError("this course is launched from no learning platform")
-    return link

@@ -9,17 +9,18 @@ from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
-from service.store import credentials
-from service.store.credentials import SESSION_LIFETIME
+from service.language import languages, translatable
+from service.store.people import credentials
+from service.store.people.credentials import SESSION_LIFETIME
 from service.store.states import CredentialKind
 from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
 from service.web.context import Context, WebContext
 from service.web.language import COOKIE as LANGUAGE_COOKIE
-from service.web.language import languages, translatable
 from service.web.rendering import page
 
 router = APIRouter()
 _REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
+_SIGNED_IN = translatable("This link does not count, or not any more; but you are signed in.")
 
 
 @router.get("/sign-in")
@@ -33,11 +34,12 @@ def link_page(request: Request, reader: MaybeReader, context: Context, link: str
     """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
     context.limits.failed_sign_ins.check(_address(request))
     with context.store.reading() as session:
-        name = credentials.owner(session, link)
-    if name is None:
+        owner = credentials.owner(session, link)
+    if owner is None:
         context.limits.failed_sign_ins.spend(_address(request))
-        return page(request, reader, "sign_in.html", status_code=410, target="/", refused=_REFUSED)
-    return page(request, reader, "sign_in_link.html", link=link, name=name)
+        refused = _REFUSED if reader is None else _SIGNED_IN
+        return page(request, reader, "sign_in.html", status_code=410, target="/", refused=refused)
+    return page(request, reader, "sign_in_link.html", link=link, name=owner.name)
 
 
 @router.post("/sign-in")
@@ -85,7 +87,7 @@ def choose_language(
 ) -> Response:
     """Show the pages in this language from now on, in this browser."""
     if code not in languages():
-        raise HTTPException(422, "There are no pages in this language.")
+        raise HTTPException(422, translatable("There are no pages in this language."))
     answer = RedirectResponse(inside(target), 303)
     answer.set_cookie(
         LANGUAGE_COOKIE, code, max_age=365 * 86_400, httponly=True, samesite="lax", secure=_secure(context)

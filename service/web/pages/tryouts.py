@@ -9,14 +9,16 @@ from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
 from service.reports.html import replay_section
-from service.store import tryouts
+from service.store.queue import tryouts
 from service.trying import tryout_assignment
 from service.web.access import InCourse, Studying, enrolment_in
 from service.web.context import Context, WebContext
 from service.web.errors import sentence_of
-from service.web.pages.mine import Files, Texts, seen_assignment, sent_files
+from service.web.language import language_of
+from service.web.pages.mine import Files, Texts, sent_files
+from service.web.refusing import said_in
 from service.web.rendering import page, wants_part
-from service.web.submitting import try_out
+from service.web.submitting import seen_assignment, try_out
 from sim.errors import UsageError
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
 from submissions.packed import unpack_submission
@@ -45,15 +47,16 @@ def try_own(
 ) -> Response:
     """Let what was chosen and typed be run."""
     with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here, assignment))
+        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
     try:
         try_out(context, here.reader.identity, here.course_id, assignment, sent_files(sheet, files, texts))
     except UsageError as error:
-        return _shown(request, here, context, assignment, 422, sentence_of(error), texts)
+        return _shown(request, here, context, assignment, 422, sentence_of(error, language_of(request)), texts)
     except HTTPException as error:
         if error.status_code != 429:
             raise
-        return _shown(request, here, context, assignment, 429, str(error.detail), texts, error.headers)
+        sentence = language_of(request).tell(said_in(error))
+        return _shown(request, here, context, assignment, 429, sentence, texts, error.headers)
     return RedirectResponse(str(request.url.path), 303)
 
 
@@ -69,7 +72,7 @@ def _shown(
 ) -> Response:
     with context.store.reading() as session:
         enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        seen = seen_assignment(session, here, assignment)
+        seen = seen_assignment(session, here.reader.identity, here.course_id, assignment)
         newest = tryouts.newest(session, enrolment_id, assignment)
         line = tryouts.line(session, enrolment_id, newest) if newest else None
         replay = tryouts.replay_of(session, newest) if newest else None
@@ -84,7 +87,7 @@ def _shown(
         sheet=sheet,
         seconds=once.scenarios[0].seconds if once else None,
         line=line,
-        replay=replay_section(replay) if replay else None,
+        replay=replay_section(replay, language_of(request)) if replay else None,
         refused=refused,
         texts=list(typed) or (_texts(sheet, tried) if tried else []),
     )

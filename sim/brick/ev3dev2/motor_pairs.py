@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from brick_link import link
 from ev3dev2.single_motor import LargeMotor, Motor, not_negative
 from ev3dev2.speeds import Speed, whole
 
@@ -90,8 +91,8 @@ class MoveTank(MotorSet):
             self._block()
 
     def _move(self, left: int, right: int) -> None:
-        self.left_motor._tell(speed_sp=left, command="run-forever")
-        self.right_motor._tell(speed_sp=right, command="run-forever")
+        link.run_forever(self.left_motor.address, left)
+        link.run_forever(self.right_motor.address, right)
 
     def _block(self) -> None:
         # One motor after the other, as in the original: the second has often stopped by then, and the

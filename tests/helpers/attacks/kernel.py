@@ -93,7 +93,7 @@ def _succeeds(number):
 
 @attack(UNTRIED)
 def type_into_a_terminal():
-    return any(libc.ioctl(fd, TIOCSTI, b"x") == 0 for fd in range(4))
+    return any(libc.ioctl(fd, TIOCSTI, b"x") == 0 for fd in range(5))
 
 
 @attack(UNTRIED)
@@ -103,7 +103,7 @@ def type_into_a_terminal_with_a_high_half():
 
 @attack(UNTRIED)
 def take_a_terminal():
-    return any(libc.ioctl(fd, request, 1) == 0 for fd in range(4) for request in (TIOCLINUX, TIOCSCTTY))
+    return any(libc.ioctl(fd, request, 1) == 0 for fd in range(5) for request in (TIOCLINUX, TIOCSCTTY))
 
 
 @attack(UNTRIED)

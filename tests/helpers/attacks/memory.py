@@ -102,9 +102,9 @@ def _read(address, size):
 
 @attack(UNTRIED)
 def find_stray_descriptors():
-    """Nothing but the null device three times and the wire."""
+    """Nothing but the null device three times and the wire's two ends."""
     found = []
-    for fd in range(4, 1200):
+    for fd in range(5, 1200):
         try:
             fcntl.fcntl(fd, fcntl.F_GETFD)
             found.append(fd)
@@ -131,8 +131,8 @@ def find_the_zygotes_control_socket():
 
 @attack(UNTRIED)
 def read_what_is_still_in_the_wire():
-    os.set_blocking(3, False)
+    os.set_blocking(4, False)
     try:
-        return os.read(3, 65536)
+        return os.read(4, 65536)
     except BlockingIOError:
         return False

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import array
+import ctypes
+import fcntl
 import os
 import socket
 import struct
@@ -99,22 +101,29 @@ def make_a_pair_of_sockets():
     return socket.socketpair()
 
 
-@attack(SECCOMP)
+@attack(UNTRIED)
 def pass_a_descriptor_on_the_wire():
-    """The worker reads with recv, so it would arrive nowhere; but it must not be sent either."""
+    """Nothing but bytes goes through a pipe."""
     with socket.socket(fileno=os.dup(3)) as wire:
         rights = array.array("i", [1]).tobytes()
         return wire.sendmsg([b"\n"], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, rights)])
 
 
-@attack(SECCOMP)
+@attack(UNTRIED)
 def ask_who_is_at_the_other_end():
     return call("getsockopt", 3, socket.SOL_SOCKET, socket.SO_PEERCRED, space(12), struct.pack("=i", 12)) == 0
 
 
 @attack(SECCOMP)
 def change_the_buffers_of_the_wire():
-    return call("setsockopt", 3, socket.SOL_SOCKET, socket.SO_RCVBUF, struct.pack("=i", 4096), 4) == 0
+    return fcntl.fcntl(3, fcntl.F_SETPIPE_SZ, 4096)
+
+
+@attack(SECCOMP)
+def send_memory_that_can_still_change():
+    page = space(16)
+    vector = struct.pack("=QQ", ctypes.addressof(page), len(page))
+    return call("vmsplice", 3, vector, 0, 0) == 0
 
 
 @attack(UNTRIED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -91,7 +92,7 @@ ABUSES = [
         stopping_itself="import os, signal\nos.kill(os.getpid(), signal.SIGSTOP)",
         ignoring_all_signals=_IGNORE + _WAIT_FOR_EVER,
         blocking_all_signals="import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, range(1, 65))\n" + _WAIT_FOR_EVER,
-        reading_the_workers_replies="import os\nwhile True: os.read(3, 1000)",
+        reading_the_workers_replies="import os\nwhile True: os.read(4, 1000)",
     ),
     *_abuses(
         (Verdict.PROGRAM_ERROR,),
@@ -258,3 +259,14 @@ def test_answers_count_as_output(abused: TrialRunner) -> None:
     recording = run_program(abused, program, responder="def responder(text): return 'x' * 5000", output_bytes=100_000)
     assert recording.verdict is Verdict.OUTPUT_LIMIT
     assert sum(len(message.text) for message in recording.messages) < 200_000
+
+
+def test_signals_that_the_worker_ignores_end_a_program_all_the_same() -> None:
+    """As those do that a shell starts in its background."""
+    before = signal.signal(signal.SIGQUIT, signal.SIG_IGN)
+    try:
+        with TrialRunner() as ignoring:
+            recording = run_program(ignoring, "import os, signal\nos.kill(os.getpid(), signal.SIGQUIT)")
+    finally:
+        signal.signal(signal.SIGQUIT, before)
+    assert recording.verdict is Verdict.PROGRAM_ERROR

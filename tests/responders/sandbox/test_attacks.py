@@ -195,6 +195,11 @@ def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "ro
         return remembered(sandboxes, role, attack, {"readable": str(more), "links": str(tree / "links")})
 
 
+def _leaves_nothing(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "robot") -> bool:
+    """Whether it comes to nothing in one of two goes: what is anybody's guess falls apart by chance once in 462."""
+    return any(_remembered(attack, sandbox, tree, role).startswith("blocked") for _ in range(2))
+
+
 @pytest.mark.parametrize(
     ("setting", "role"),
     [ENCLOSED[0], *(pytest.param(*each, marks=pytest.mark.long) for each in ENCLOSED[1:])],
@@ -202,15 +207,13 @@ def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "ro
 )
 @pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
 def test_a_trial_leaves_nothing_for_another(attack: Attack, setting: str, role: Role, tree: Path) -> None:
-    outcome = _remembered(attack, SETTINGS[setting], tree, role)
-    assert outcome.startswith("blocked"), outcome
+    assert _leaves_nothing(attack, SETTINGS[setting], tree, role)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
 def test_a_trial_inside_bubblewrap_leaves_nothing_for_another(attack: Attack, wrapped: Sandboxes, tree: Path) -> None:
-    outcome = _remembered(attack, SETTINGS["bubblewrap"], tree)
-    assert outcome.startswith("blocked"), outcome
+    assert _leaves_nothing(attack, SETTINGS["bubblewrap"], tree)
 
 
 @pytest.mark.long
@@ -221,8 +224,7 @@ def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
     attack: Attack, tree: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", SYSTEM_PYTHON)
-    outcome = _remembered(attack, SETTINGS["full"], tree)
-    assert outcome.startswith("blocked"), outcome
+    assert _leaves_nothing(attack, SETTINGS["full"], tree)
 
 
 @pytest.mark.parametrize(
@@ -239,25 +241,27 @@ def test_a_trial_of_a_user_of_its_own_leaves_nothing_for_another(
     ],
 )
 def test_without_its_layer_a_trial_leaves_something(attack: Attack, setting: str, tree: Path) -> None:
+    _assert_leaves_something(attack, SETTINGS[setting], tree)
+
+
+def _assert_leaves_something(attack: Attack, sandbox: Isolation, tree: Path) -> None:
     # Whatever else the machine reads and forgets may drown a bit; one clear reading shows that the way is open.
     outcomes = []
     for _ in range(5):
-        outcomes.append(_remembered(attack, SETTINGS[setting], tree))
+        outcomes.append(_remembered(attack, sandbox, tree))
         if outcomes[-1].startswith("LEAK"):
             return
     raise AssertionError(outcomes)
 
 
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a file system that numbers files on and on")
-@pytest.mark.parametrize(("skipped", "outcome"), [(private_folders._SKIPPED, "blocked"), (1, "LEAK")])
-def test_numbers_are_left_out_where_they_go_on(
-    skipped: int, outcome: str, tree: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_numbers_are_left_out_where_they_go_on(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sandbox stops nobody from making a few files; only that the next number is anybody's guess helps."""
     attack = next(attack for attack in MEMORIES if attack.name == "number_of_own_files")
     monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
-    monkeypatch.setattr(private_folders, "_SKIPPED", skipped)
-    assert _remembered(attack, SETTINGS["full"], tree).startswith(outcome)
+    assert _leaves_nothing(attack, SETTINGS["full"], tree)
+    monkeypatch.setattr(private_folders, "_SKIPPED", 1)
+    _assert_leaves_something(attack, SETTINGS["full"], tree)
 
 
 def test_there_are_enough_attacks_of_every_kind() -> None:

@@ -164,7 +164,7 @@ def test_without_a_doorkeeper_the_sandbox_stands_and_the_reason_is_told() -> Non
 
 def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
     hidden = replace(echo(), scenarios=tuple(replace(each, visibility="hidden") for each in echo().scenarios))
-    with TrialRunner(Isolation(doorkeeper=False)) as runner:
+    with TrialRunner(Sandboxes(Isolation(doorkeeper=False))) as runner:
         assert grade(_SUBMISSION, echo(), runner=runner).trials
         with pytest.raises(
             HostError, match=r"^a trial could leave something for the next, so nothing hidden is graded"

@@ -27,8 +27,8 @@ from responders.sandbox.control_group import ControlGroup
 from service.queue.broker import EmbeddedBroker
 from service.queue.processes import end_processes
 from service.settings import Settings
-from service.store import workers
 from service.store.engine import open_store
+from service.store.queue import workers
 from sim.errors import HostError
 
 HYBRID = "4:memory:/elsewhere\n1:cpu:/\n0::"
@@ -200,6 +200,7 @@ _BEGIN = """
 import json, logging, os, sys
 from pathlib import Path
 from responders.sandbox import control_group
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -212,7 +213,7 @@ slot = here.parent / f"robomark-slot-{os.getpid()}"
 ECHO = "def responder(text): return text\\n"
 BUSY = "print('PY::a')\\nsum(range(10**7))"
 def runner(memory_mb=1536):
-    return TrialRunner(group=control_group.for_this_process(memory_mb))
+    return TrialRunner(Sandboxes(group=control_group.for_this_process(memory_mb)))
 """
 
 

@@ -39,7 +39,7 @@ folder, landlock, seccomp, changes = sys.argv[2], int(sys.argv[3]), int(sys.argv
 lockdown.drop_capabilities()
 lockdown.forbid_new_privileges()
 if landlock:
-    lockdown.restrict_files(lockdown.Grants((folder,)), landlock)
+    lockdown.restrict_files(lockdown.reading_rules(lockdown.Grants((folder,))), landlock)
 if seccomp:
     lockdown.restrict_system_calls()
 for name, change in changes.items():

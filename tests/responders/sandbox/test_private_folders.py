@@ -121,3 +121,16 @@ def test_folders_that_nobody_asked_for_are_closed_without_a_trace(tmp_path: Path
     folders.close()
     folders.close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_number_of_a_trials_first_file_is_anybodys_guess(tmp_path: Path) -> None:
+    folders = PrivateFolders()
+    numbers = set()
+    for _ in range(20):
+        with folders.one() as trial:
+            own = trial / "own"
+            own.touch()
+            numbers.add(own.stat().st_ino)
+    folders.close()
+    assert len(numbers) > 5
+    assert list(tmp_path.iterdir()) == []

@@ -66,7 +66,7 @@ def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
 def test_a_trial_is_the_same_inside_bubblewrap_and_out() -> None:
     program = "from random import random\nfor _ in range(3): print(f'PY::{random()}')"
     responder = "import os, numpy as np\ndef responder(text): return f'{np.random.rand()} {sorted(os.environ)}'"
-    with TrialRunner() as inside, TrialRunner(Isolation(bubblewrap=False)) as outside:
+    with TrialRunner() as inside, TrialRunner(Sandboxes(Isolation(bubblewrap=False))) as outside:
         one, other = (run_program(runner, program, responder=responder) for runner in (inside, outside))
     assert one.sha256 == other.sha256
     assert [message.text for message in one.messages] == [message.text for message in other.messages]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from filter_machine import AARCH64, I386, X86_64, decide, listed
-from responders.sandbox.inside.system_calls import ALLOWED, PATHS, asking, program
+from responders.sandbox.inside.system_calls import ALLOWED, PATHS, asking, instructions, packed, program
 
 PID = 54321
 FILTER = program(PID)
@@ -139,3 +139,8 @@ def test_whoever_names_a_path_has_to_ask() -> None:
     asked = {CALLS[number][0] for number in range(601) if decide(asking(), number) == "ask"}
     assert asked == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATHS}
     assert {decide(asking(), number) for number in range(601) if number not in PATHS} == {"allow"}
+
+
+@pytest.mark.parametrize("pid", [1, 255, 256, 65_535, PID, 4_194_304])
+def test_a_filter_that_was_made_ready_is_that_of_its_process(pid: int) -> None:
+    assert program(pid) == packed(instructions(pid))

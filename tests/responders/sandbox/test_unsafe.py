@@ -12,7 +12,7 @@ from builders import settings_in
 from command import robomark
 from processes import robomark as robomark_meanwhile
 from processes import until
-from service.queue.worker import worker_lives
+from service.queue.alive import worker_lives
 from submissions.assignment.examples import examples
 
 _STAMP = "process limits only"

@@ -56,6 +56,18 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
     return home, ended, reports
 
 
+def test_a_batch_is_of_the_course_that_is_named_and_listed_there(tmp_path: Path) -> None:
+    folder = tmp_path / "class"
+    shutil.copytree(examples("echo-responder") / "flawed", folder / "ada")
+    home = tmp_path / "home"
+    ended = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--course", "night", "--json")
+    batch = json.loads(ended.out)["batch"]
+    assert batch in robomark(home, "batch", "list", "--course", "night").out
+    assert batch in robomark(home, "batch", "list").out
+    other = robomark(home, "batch", "list", "--course", "day")
+    assert (other.status, "there is no course 'day'" in other.err) == (2, True)
+
+
 def _batch_id(ended: Ended) -> str:
     found = re.search(r"batch (\w{12}): 2 queued", ended.out)
     assert found is not None, ended
@@ -99,13 +111,14 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     home, ended, _ = graded
     found = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
     assert found is not None
-    shown = robomark(home, "show", found[1], "--output", tmp_path / "out", "--replay", tmp_path / "replay.json")
+    files = ("--output", tmp_path / "out", "--replay", tmp_path / "replay.json")
+    shown = robomark(home, "show", found[1], *files, "--language", "de")
     assert shown.status == 0
-    assert "10" in shown.out
+    assert "Full marks" in shown.out
     images = sorted((tmp_path / "out").glob("*.png"))
     assert images
     assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
-    assert (tmp_path / "out" / "reference.html").exists()
+    assert "Volle Punktzahl" in (tmp_path / "out" / "reference.html").read_text()
     replay = json.loads((tmp_path / "replay.json").read_text())
     assert len(replay["trials"]) == replay["of"] > 0
     assert [source["name"] for source in replay["sources"]] == ["robot.py", "responder.py"]

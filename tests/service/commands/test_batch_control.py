@@ -15,17 +15,17 @@ from rich.console import Console
 from sqlalchemy import select, update
 from test_batch_commands import Ended, robomark
 
-from builders import grading_request, settings_in
+from builders import asked_already, grading_request, settings_in
 from service.commands.batch.waiting import Waiting
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.reports.formats import FORMATS
 from service.reports.written import file_stem
-from service.store import batch_control
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.intake import accept_batch
 from service.store.models import CriterionResultRow, Job, TrialRow
+from service.store.queue import batch_control
 from service.store.states import JobState, Lane
 from submissions.assignment.examples import examples
 
@@ -43,7 +43,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]
     rows = ["student;file;assignment", "=1/2 🤖;reference;", "bob;flawed;", "eve;nowhere.zip;"]
     rows += ["bob;flawed;", "mia;broken.zip;", "kim;reference;no-such-thing"]
     roster.write_text("\n".join(rows) + "\n", encoding="utf-8-sig")
-    home = tmp_path_factory.mktemp("home")
+    home = asked_already(tmp_path_factory.mktemp("home"))
     return home, roster, robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
 
 
@@ -119,7 +119,7 @@ def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path:
 
 
 def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
-    settings = settings_in(tmp_path, concurrency=1)
+    settings = settings_in(asked_already(tmp_path), concurrency=1)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         notifier = Notifier(make_celery(services.settings), store, services.settings)
 

@@ -13,10 +13,11 @@ from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request
 from command import robomark
 from service.settings import Settings
-from service.store import jobs, results
+from service.store.batches.intake import accept_new
 from service.store.engine import open_store
+from service.store.grades import results
 from service.store.installation import secret_of
-from service.store.intake import accept_new
+from service.store.queue import jobs
 
 
 def _graded_batch(settings: Settings) -> str:

@@ -19,12 +19,14 @@ from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
-from service.store import appeals, comments, jobs, open_assignments, overrides, results
+from service.store.batches.intake import accept_batch
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
 from service.store.engine import now, open_store
+from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import secret_of
-from service.store.intake import accept_batch
 from service.store.models import Job
-from service.store.versions import freeze
+from service.store.queue import jobs
 from submissions.assignment.examples import examples
 from submissions.people import Refusal, Student
 
@@ -51,7 +53,7 @@ SHOWING = {
     "batch regrade BATCH": "batch regraded",
     "batch publish BATCH": "batch published",
     "batch publish-one GRADE": "grade published",
-    "batch overview BATCH": "batch classes refusals",
+    "batch overview BATCH": "batch classes missing refusals",
     "assignments list": "assignments",
     "assignments show echo-responder": (
         "id title section description version marks background robot program responder given criteria scenarios"

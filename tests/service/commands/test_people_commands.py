@@ -16,9 +16,9 @@ from test_batch_commands import robomark
 
 from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from service.settings import Settings
-from service.store import workers
 from service.store.engine import open_store
-from service.store.workers import WorkerDescription
+from service.store.queue import workers
+from service.store.queue.workers import WorkerDescription
 from submissions.assignment.examples import examples
 
 ECHO = "echo-responder"

@@ -18,10 +18,12 @@ from responders.code import Code
 from service.commands.batch.similar import similar
 from service.report_files import write_batch
 from service.reports.formats import FORMATS
-from service.store import batches, jobs, results
+from service.store.batches import batches
+from service.store.batches.intake import accept_batch
+from service.store.batches.similarities import similarities
 from service.store.engine import Store
-from service.store.intake import accept_batch
-from service.store.similarities import similarities
+from service.store.grades import results
+from service.store.queue import jobs
 from sim.errors import UsageError
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment

@@ -15,6 +15,8 @@ import pytest
 from paths import ROOT
 
 _NOBODY = 65534
+#: Commands that were run in this process before may have left a stricter one.
+_READABLE_FOR_OTHERS = 0o022
 #: That of the tests, and the system's.
 _PYTHONS = (Path(sys.executable).resolve(), Path("/usr/bin/python3.11"))
 
@@ -34,14 +36,14 @@ def installed() -> Iterator[Path]:
 
 def _install(folder: Path) -> Path:
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True, umask=_READABLE_FOR_OTHERS)
     (wheel,) = folder.glob("*.whl")
     environment = folder / "environment"
     python = next((each for each in _PYTHONS if _open_to_others(each)), _PYTHONS[0])
-    subprocess.run([python, "-m", "venv", environment], check=True)
+    subprocess.run([python, "-m", "venv", environment], check=True, umask=_READABLE_FOR_OTHERS)
     pip = [environment / "bin" / "python", "-m", "pip", "install", "--quiet"]
-    subprocess.run([*pip, "--require-hashes", "-r", ROOT / "deploy" / "requirements.lock"], check=True)
-    subprocess.run([*pip, "--no-deps", wheel], check=True)
+    for what in (["--require-hashes", "-r", ROOT / "deploy" / "requirements.lock"], ["--no-deps", wheel]):
+        subprocess.run([*pip, *what], check=True, umask=_READABLE_FOR_OTHERS)
     return environment / "bin" / "robomark"
 
 

@@ -21,7 +21,7 @@ from service.reports.formats.json_output import json_document
 from service.reports.page import page_of
 from service.reports.plots.sequence import Step, conversation
 from service.reports.view import staff_view
-from service.store.recordings import from_bytes, keep, to_bytes
+from service.store.grades.recordings import from_bytes, keep, to_bytes
 from sim.errors import UsageError
 from sim.recording import AgentMessage, AgentOutput, Verdict
 from submissions.assignment.definition import Assignment

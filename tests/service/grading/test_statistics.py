@@ -31,7 +31,7 @@ def test_a_class_of_four() -> None:
     ]
     assert [(cause.sentence, cause.students) for cause in found.causes] == [
         ("lost marks for: Does b", ("ada", "bob")),
-        ("ended as cpu_limit", ("cyd",)),
+        ("computed for too long", ("cyd",)),
         ("lost marks for: Does a", ("ada",)),
     ]
 
@@ -46,6 +46,14 @@ def test_each_assignment_by_itself_and_nothing_of_none() -> None:
 def test_a_fault_that_cost_no_marks_is_no_cause() -> None:
     (found,) = statistics_of([_marked("ada", 4, 4, verdict="time_limit")])
     assert found.causes == ()
+
+
+def test_who_was_still_running_at_the_end_lost_marks_for_criteria_too() -> None:
+    (found,) = statistics_of([_marked("ada", 4, 0, verdict="time_limit")])
+    assert [(cause.sentence, cause.criterion) for cause in found.causes] == [
+        ("lost marks for: Does b", "Does b"),
+        ("still running at the end", ""),
+    ]
 
 
 def test_of_a_grade_the_criteria_that_were_judged_count() -> None:

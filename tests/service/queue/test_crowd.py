@@ -27,8 +27,8 @@ from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.queue.processes import end_processes
 from service.settings import Settings
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.intake import accept_batch
 from service.store.models import Enrolment, Job
 from service.store.states import UNFINISHED, JobState, Lane
 from sim.recording import Verdict

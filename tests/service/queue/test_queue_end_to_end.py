@@ -27,11 +27,14 @@ from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.reports.plots.drawn import plots_of
 from service.settings import Settings
-from service.store import artifacts, batch_control, batches, results
+from service.store import artifacts
+from service.store.batches import batches
+from service.store.batches.intake import accept_batch, load_grading_request
 from service.store.engine import Store, open_store
+from service.store.grades import results
 from service.store.installation import secret_of
-from service.store.intake import accept_batch, load_grading_request
 from service.store.models import CriterionResultRow, Job, TrialRow
+from service.store.queue import batch_control
 from service.store.states import JobState, Lane, PlotState
 from submissions.assignment.examples import examples
 from submissions.batch_folder import read_batch

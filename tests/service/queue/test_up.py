@@ -20,12 +20,12 @@ from benchmarks.harness.process_tree import command_line, descendants
 from builders import accept_one, grading_request, settings_in
 from processes import COMMAND, alive, robomark, until
 from service.command_line import main
+from service.queue.alive import worker_lives
 from service.queue.broker import broker_answers
-from service.queue.worker import worker_lives
 from service.settings import Settings
 from service.store import phases
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.intake import accept_batch
 from service.store.models import Job
 from service.store.states import JobState, PlotState
 from service.web.listening import listen
@@ -133,7 +133,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         with store.reading() as session:
             left = [session.get_one(Job, each.job_id) for each in spinning.jobs]
             assert {(job.state, job.attempt) for job in left} <= {(JobState.QUEUED, 0), (JobState.DONE, 1)}
-    locks = {"broker.lock", "up.lock", "worker.lock", "gate.lock", "slots.lock"}
+    locks = {"broker.lock", "up.lock", "worker.lock", "gate.lock", "slots.lock", "right-answer.lock"}
     left_there = {path.name for path in (settings.home / "run").iterdir()}
     # What the self-test found right here is for the next start.
     assert {name for name in left_there if not name.startswith("right-answer-")} <= locks
@@ -186,6 +186,7 @@ def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
             "database": True,
             "broker": False,
             "workers": False,
+            "queue": True,
             "sandbox": False,
         }
         assert _metrics(address)["robomark_workers",] == 0

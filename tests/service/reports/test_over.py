@@ -180,5 +180,5 @@ def test_hostile_names_and_texts_are_visible_and_capped() -> None:
     told = json.dumps(over, ensure_ascii=False)
     assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(told)
     assert len(over["name"]) <= 60
-    assert over["left_out"] == 3002 - 2000
+    assert over["left_out"] == 3001 - 2000
     assert over["parted"] is None

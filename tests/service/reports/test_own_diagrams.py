@@ -17,7 +17,8 @@ from service.reports.html import report
 from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import Differences, differences, in_words
 from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.own_diagrams import draw_diagram, draw_own, own_diagrams
+from service.reports.plots.drawn_diagrams import draw_diagram, draw_own
+from service.reports.plots.own_diagrams import own_diagrams
 from service.reports.plots.style import png
 from service.reports.plots.talk import Talk, block_diagram, talks
 from service.reports.view import staff_view, student_view

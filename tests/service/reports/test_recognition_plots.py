@@ -16,8 +16,10 @@ from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, 
 from service.reports.html import report
 from service.reports.plots.confusion import draw_confusion
 from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.misread import draw_misread, misread
-from service.reports.plots.track import along_the_way, draw_track, taken, tracks, worst_track
+from service.reports.plots.misread import draw_misread
+from service.reports.plots.sensor_images import misread
+from service.reports.plots.taken import taken, tracks, worst_track
+from service.reports.plots.track import along_the_way, draw_track
 from service.reports.view import student_view
 from sim.floors import floor
 from sim.recording import Image, Pose

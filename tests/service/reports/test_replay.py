@@ -20,9 +20,10 @@ from service.grading.grade import Evidence, Grade
 from service.reports.html import replay_page, report
 from service.reports.replay.document import packed, replay_of_grade, replay_of_run
 from service.reports.replay.sources import Place, Sources, sources_of, sources_of_files
+from service.reports.transcript import transcript
 from service.reports.view import staff_view, student_view
 from service.reports.written import write_replay
-from sim.recording import COLUMNS, Fault, Message, Recording, Verdict
+from sim.recording import COLUMNS, Fault, Line, Message, Recording, Verdict
 from submissions.submission import Cell, Notebook, Submission
 
 KIB = 1024
@@ -98,6 +99,28 @@ def test_staff_alone_learn_what_our_own_code_stumbled_over() -> None:
     assert "SECRET" not in json.dumps(run(recording))
 
 
+def test_a_stand_in_is_not_told_as_a_responder_and_what_is_said_is_told_once() -> None:
+    asked = Message(1.0, "robot", "PY::0", 1.0)
+    answer = Message(1.0, "responder", "pingpong PY::0", 1.0, reply_to=0)
+    recording = replace(
+        build.line_follower_recording(3),
+        messages=(asked, answer),
+        printed=(Line(1.0, "PY::0"), Line(1.5, "there")),
+        spoken=(Line(1.5, "there"),),
+    )
+    (told,) = run(recording)["trials"]
+    assert [(each["from"], each["to"]) for each in told["messages"]] == [("robot", "simulator"), ("simulator", "robot")]
+    assert [(each["kind"], each["text"]) for each in told["events"]] == [("printed", "PY::0"), ("said", "there")]
+    assert transcript(recording) == [
+        (1.0, "PY::0"),
+        (1.0, "(answer of the simulator) pingpong PY::0"),
+        (1.5, "(says) there"),
+    ]
+    answered = replace(recording, messages=(asked, replace(answer, text="circle")))
+    assert run(answered)["trials"][0]["messages"][1]["from"] == "responder"
+    assert (1.0, "(answer) circle") in transcript(answered)
+
+
 def test_each_lost_criterion_has_its_moment_and_place_and_a_link_to_it() -> None:
     grade = build.line_follower_grade()
     page = report(student_view(grade), {})
@@ -105,7 +128,7 @@ def test_each_lost_criterion_has_its_moment_and_place_and_a_link_to_it() -> None
     assert [(loss["title"], loss["t"], loss["pose"]) for loss in lost] == [
         ("Stays near the line", 4.0, [560.0, 690.0, 100.0])
     ]
-    assert 'href="#trial=2&amp;t=4.000">Watch it at 4.00 s' in page
+    assert 'href="#trial=2&amp;t=4.000">Watch trial 2 at 4.00 s' in page
     never = replace(grade.criteria[0], evidence=(Evidence(0, False, "", None, None),))
     (loss,) = replay_of_grade(student_view(replace(grade, criteria=(never,))))["trials"][0]["lost"]
     end = grade.trials[0].recording.end
@@ -196,7 +219,7 @@ def test_hostile_texts_are_visible_and_capped() -> None:
     assert "\\\\u202eevil" in told
     assert "WWWW… (199," in told
     assert data_of(page)["sources"][0]["more"] == 9001 - 3000
-    assert data_of(page)["trials"][0]["left_out"] == 3002 - 2000
+    assert data_of(page)["trials"][0]["left_out"] == 3001 - 2000
     assert len(packed(data_of(page))) < 100_000
 
 

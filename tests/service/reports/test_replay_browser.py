@@ -15,9 +15,11 @@ from playwright.sync_api import Browser, Page, expect
 import report_builders as build
 from browsing import DESKTOP, PHONE, OpenPage, chromium, opened
 from replays import long_recording, parting_grade, poisoned
+from service.language import ENGLISH, language_called
 from service.reports.html import replay_page, report
 from service.reports.replay.document import replay_of_grade
 from service.reports.replay.over import parted
+from service.reports.replay.words import replay_words
 from service.reports.view import BEFORE_PUBLICATION, other_trials, student_view
 from sim.floors import floor
 from sim.recording import Recording
@@ -135,7 +137,7 @@ def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report:
     recording = build.line_follower_grade().trials[1].recording
     with opened(browser, line_report, **DESKTOP) as found:
         page = found.page
-        page.get_by_role("link", name="Watch it at 4.00 s").focus()
+        page.get_by_role("link", name="Watch trial 2 at 4.00 s").focus()
         page.keyboard.press("Enter")
         expect(page.locator(".moment")).to_be_focused()
         assert now(page) == pytest.approx(4)
@@ -154,6 +156,32 @@ def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report:
         assert told is not None
         assert told.startswith("4.00 of 10.00 s; x ")
         assert_quiet(found, line_report)
+
+
+def test_in_german_nothing_is_said_in_english(browser: Browser, tmp_path: Path) -> None:
+    german = language_called("de")
+    file = tmp_path / "report.html"
+    file.write_text(report(student_view(build.line_follower_grade(), language=german), {}, build.faulty_submission()))
+    spoken, english = replay_words(german)["sentences"], replay_words(ENGLISH)["sentences"]
+    with opened(browser, file, **DESKTOP) as found:
+        page = found.page
+        page.get_by_role("link", name="Lauf 2 bei 4.00 s ansehen").press("Enter")
+        expect(page.locator(".moment")).to_be_focused()
+        page.get_by_text(spoken["allAsTable"]).click()
+        expect(page.get_by_role("columnheader", name=spoken["cameOfIt"])).to_be_visible()
+        told = page.locator(".moment").get_attribute("aria-valuetext")
+        assert told is not None
+        assert told.startswith("4.00 von 10.00 s; x ")
+        assert "Richtung" in told
+        assert "Roboter: berührt" in page.locator(".happened li").first.inner_text()
+        for name in ("play", "pause"):
+            button = page.get_by_role("button", name=spoken[name])
+            expect(button).to_be_visible()
+            button.click()
+        shown = page.locator("section.replay").inner_text()
+        ours = {words for key, words in english.items() if words != spoken[key] and len(words) > 8 and "%" not in words}
+        assert {words for words in ours if words in shown} == set()
+        assert_quiet(found, file)
 
 
 def test_the_slider_is_moved_by_touch(browser: Browser, line_report: Path) -> None:
@@ -187,6 +215,19 @@ def test_playing_ends_at_the_end_and_starts_again(browser: Browser, line_report:
         assert now(page) < 9
         page.locator(".play").click()
         assert page.locator(".play").inner_text() == "Play"
+
+
+def test_the_link_to_the_moment_follows_while_it_plays(browser: Browser, line_report: Path) -> None:
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
+        found.page.get_by_role("button", name="Play").click()
+        link = found.page.get_by_role("link", name="Link to this moment")
+        expect(link).not_to_have_attribute("href", "#trial=1&t=0")
+        found.page.wait_for_function(
+            "() => { const shown = document.querySelector('.moment').valueAsNumber;"
+            " const link = document.querySelector('.choices a').hash; return shown > 0.2"
+            " && Math.abs(new URLSearchParams(link.slice(1)).get('t') - shown) < 0.1; }"
+        )
+        assert_quiet(found, line_report)
 
 
 def test_with_reduced_motion_it_plays_in_stills(browser: Browser, line_report: Path) -> None:

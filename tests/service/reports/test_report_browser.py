@@ -14,7 +14,7 @@ import report_builders as build
 from browsing import DESKTOP, PHONE, chromium, opened
 from service.reports.html import report
 from service.reports.plots.drawn import draw_all
-from service.reports.plots.style import DPI
+from service.reports.plots.plot import DPI
 from service.reports.view import student_view
 
 pytestmark = pytest.mark.long

@@ -10,10 +10,11 @@ from html.parser import HTMLParser
 import pytest
 
 import report_builders as build
-from service.grading.grade import Grade
+from service.grading.grade import Grade, SetByHand
 from service.reports.html import BatchRow, batch_index, report, report_parts, report_script, report_style
 from service.reports.page import page_of, timeline
 from service.reports.plots.drawn import draw_all, plots_of
+from service.reports.replay.document import replay_of_grade
 from service.reports.view import staff_view, student_view
 from sim.recording import Fault, Verdict
 
@@ -26,7 +27,7 @@ TAGS = {
 ATTRIBUTES = {
     "lang", "charset", "http-equiv", "content", "name", "class", "scope", "role", "aria-label", "aria-hidden",
     "viewbox", "preserveaspectratio", "width", "height", "src", "alt", "href", "id", "type",
-    "colspan", "tabindex",
+    "colspan", "tabindex", "data-before",
 }  # fmt: skip
 VOID = {"meta", "img", "rect", "wbr"}
 
@@ -213,7 +214,7 @@ def test_time_that_was_up_is_told_and_not_called_wrong() -> None:
 def test_timelines_are_capped_and_say_so() -> None:
     entries = timeline(build.hostile_grade().trials[0].recording)
     assert len(entries) == 56
-    assert [entry.text for entry in entries if not entry.t] == ["2,950 more entries are not shown"]
+    assert [entry.text for entry in entries if not entry.t] == ["2,949 more entries are not shown"]
 
 
 def test_messages_name_images_and_losses() -> None:
@@ -251,3 +252,13 @@ def test_batch_index_links_and_escapes() -> None:
     assert "0 / 8" in reader.text
     assert "not graded" in reader.text
     assert "3 of 4 graded" in reader.text
+
+
+def test_an_excused_criterion_is_neither_won_nor_lost() -> None:
+    grade = build.line_follower_grade()
+    said = SetByHand(Decimal(0), grade.criteria[0].max_marks, "The floor was wet.", excused=True)
+    first = replace(grade.criteria[0], marks=Decimal(0), max_marks=Decimal(0), set_by_hand=said)
+    view = student_view(replace(grade, criteria=(first, *grade.criteria[1:])))
+    assert page_of(view).criteria[0].state == "excused"
+    lost = [loss["title"] for trial in replay_of_grade(view)["trials"] for loss in trial["lost"]]
+    assert first.title not in lost

@@ -15,12 +15,13 @@ from service.reports.page import page_of
 from service.reports.plots.confusion import confusion_table, draw_confusion
 from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.own_diagrams import draw_diagram
+from service.reports.plots.drawn_diagrams import draw_diagram
 from service.reports.plots.path import draw_path
-from service.reports.plots.predictions import chosen_predictions, focus_image, sensor_image
+from service.reports.plots.plot import DPI
 from service.reports.plots.sensor import draw_sensors, panels_of, strips_of
+from service.reports.plots.sensor_images import chosen_predictions, focus_image, sensor_image
 from service.reports.plots.sequence import Gap, Step, conversation
-from service.reports.plots.style import DPI, WIDTH
+from service.reports.plots.style import WIDTH
 from service.reports.plots.talk import sequence_diagram
 from service.reports.view import staff_view
 from sim.recording import Call, Message, Pose, Recording

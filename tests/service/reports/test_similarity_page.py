@@ -6,7 +6,9 @@ import dataclasses
 import json
 import typing
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 from test_report_html import ATTRIBUTES, TAGS, Reader
 
 import report_builders
@@ -87,5 +89,5 @@ def _within(kind: object) -> set[type]:
         waiting += typing.get_args(each)
         if isinstance(each, type) and dataclasses.is_dataclass(each) and each not in found:
             found.add(each)
-            waiting += typing.get_type_hints(each).values()
+            waiting += typing.get_type_hints(each, localns={"NDArray": NDArray, "np": np}).values()
     return found

@@ -17,7 +17,7 @@ from service.reports.plots.drawn import draw_all, plots_of
 from service.reports.plots.sequence import Step, conversation
 from service.reports.trace import trace
 from service.reports.view import staff_view
-from service.store.recordings import from_bytes, keep, to_bytes
+from service.store.grades.recordings import from_bytes, keep, to_bytes
 from sim.recording import Recording, Verdict
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment

@@ -166,3 +166,19 @@ def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: p
     sources += [source_of("eve", "robot.py", program(3)), source_of("ivy", "robot.py", f"{program(4)}\n{program(5)}")]
     found = compare(sources, [])
     assert (len(found.alike), found.not_compared) == (2, 2)
+
+
+def test_a_file_that_groups_share_is_named_however_many_copied_it() -> None:
+    """Five programs of six students each, of which too much is common for any pair to have enough of its own."""
+    shared = program(0, 12)
+    sources = [
+        source_of(f"s{number:02}", "robot.py", f"{shared}\n{program(number % 5, 3)}\n# no {number}")
+        for number in range(30)
+    ]
+    found = compare(sources, ())
+    assert found.alike == ()
+    assert found.same == tuple(tuple(f"s{number:02}" for number in range(first, 30, 5)) for first in range(5))
+    assert found.too_short == ()
+    assert compare(sources, (shared, *(program(number, 3) for number in range(5)))).same == ()
+    everybody = [source_of(f"s{number}", "robot.py", shared) for number in range(9)]
+    assert compare(everybody, ()).same == ()

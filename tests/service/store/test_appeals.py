@@ -7,13 +7,19 @@ from sqlalchemy import update
 
 import report_builders
 from builders import grading_request
-from service.store import appeals, audit, jobs, open_assignments, results
-from service.store.appeals import LONGEST_TEXT
+from service.store import audit
+from service.store.batches.intake import accept_batch
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import HiddenNames, hidden_names_of
+from service.store.courses.versions import freeze
 from service.store.engine import Store
-from service.store.intake import accept_batch
+from service.store.grades import appeals, results
+from service.store.grades.appeals import LONGEST_TEXT
 from service.store.models import SubmissionRow
-from service.store.versions import freeze
+from service.store.queue import jobs
 from sim.errors import UsageError
+
+NONE_HIDDEN = HiddenNames(frozenset(), b"")
 
 
 def _submitted(store: Store) -> None:
@@ -47,17 +53,17 @@ def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
     with pytest.raises(UsageError, match="you have asked already"):
         _ask(store, "And why?")
     with store.reading() as session:
-        (line,) = appeals.in_course(session, 1, answered=False)
+        (line,) = appeals.in_course(session, 1, NONE_HIDDEN, answered=False)
     assert (line.who, line.text, line.answer) == ("ada", "Why?\nLine 3 prints it.", None)
     _answer(store, first)
     with pytest.raises(UsageError, match="is answered already"):
         _answer(store, first, "Really.")
     second = _ask(store, "And why?")
     with store.reading() as session:
-        assert [each.id for each in appeals.in_course(session, 1, answered=False)] == [second]
-        (answered,) = appeals.in_course(session, 1, answered=True)
+        assert [each.id for each in appeals.in_course(session, 1, NONE_HIDDEN, answered=False)] == [second]
+        (answered,) = appeals.in_course(session, 1, NONE_HIDDEN, answered=True)
         assert [each.id for each in appeals.of_submission(session, 1)] == [second, first]
-        assert appeals.in_course(session, 2, answered=False) == []
+        assert appeals.in_course(session, 2, NONE_HIDDEN, answered=False) == []
         (entry,) = audit.entries(session, "submission", "1")
     assert (answered.answer, answered.answered_by) == ("Because.", "grace")
     assert (entry.actor, entry.action, entry.detail) == ("grace", "answer appeal", {"appeal": first})
@@ -93,5 +99,8 @@ def test_who_asks_is_not_named_while_names_are_hidden(store: Store) -> None:
     with store.transaction() as session:
         open_assignments.prepare(session, 1, freeze(grading_request("ada").assignment))
         open_assignments.hide_names(session, 1, "echo-responder", True)
+    hidden = hidden_names_of(store, 1)
     with store.reading() as session:
-        assert [each.who for each in appeals.in_course(session, 1, answered=False)] == ["submission 1"]
+        (line,) = appeals.in_course(session, 1, hidden, answered=False)
+    assert line.who == hidden.called("echo-responder", "ada")
+    assert line.who.startswith("Participant ")

@@ -15,11 +15,12 @@ from sqlalchemy import select
 import report_builders
 import service
 from builders import grading_request
-from service.store import batch_control, jobs, results
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
-from service.store.intake import accept_batch
-from service.store.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
+from service.store.grades import results
 from service.store.models import Job, SubmissionRow
+from service.store.queue import batch_control, jobs
+from service.store.queue.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
 from service.store.states import JobState
 from sim.errors import HostError
 
@@ -200,7 +201,7 @@ def test_a_write_of_a_state_would_be_found(written: str) -> None:
 
 
 #: The one module that writes them, and the one of tryouts, which are no jobs and have states of their own.
-_WITH_STATES = ("store/jobs.py", "store/tryouts.py")
+_WITH_STATES = ("store/queue/jobs.py", "store/queue/tryouts.py")
 
 
 def test_nothing_else_writes_the_state_of_a_job() -> None:

@@ -11,9 +11,13 @@ from sqlalchemy import select, update
 
 import report_builders
 from builders import accept_one, grading_request
-from service.store import batch_control, credentials, intake, jobs, outbox, people, regrades, replies, results, webhooks
+from service.store import outbox, replies
+from service.store.batches import intake, publishing
 from service.store.engine import Store
+from service.store.grades import results
 from service.store.models import Course
+from service.store.people import credentials, people, webhooks
+from service.store.queue import batch_control, jobs
 from service.store.states import CredentialKind
 from service.store.web_tables import Delivery
 from sim.errors import UsageError
@@ -58,7 +62,7 @@ def test_a_batch_is_told_of_job_by_job_and_once_when_it_is_finished(store: Store
         ("batch.finished", None),
     ]
     assert told(store)[-1][1] == {"batch": batch, "states": {"done": 2}}
-    regrades.publish(store, batch, actor="grace")
+    publishing.publish(store, batch, actor="grace")
     assert told(store)[-1] == ("grades.published", {"batch": batch, "published": 2})
 
 

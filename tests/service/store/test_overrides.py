@@ -24,12 +24,15 @@ from service.report_files import report_body
 from service.reports.formats import FORMATS
 from service.reports.formats.json_output import json_document
 from service.reports.view import staff_view, student_view
-from service.store import audit, batches, comments, jobs, marking_history, overrides, regrades, results
+from service.store import audit
+from service.store.batches import batches, publishing, regrades
+from service.store.batches.intake import accept, accept_batch
 from service.store.engine import Store
+from service.store.grades import comments, marking_history, overrides, results
+from service.store.grades.marked import marked
 from service.store.installation import secret_of
-from service.store.intake import accept, accept_batch
-from service.store.marked import marked
 from service.store.models import Job
+from service.store.queue import jobs
 from sim.errors import UsageError
 
 #: 5 of 6 for the first criterion, 2 of 2 for the second.
@@ -157,7 +160,7 @@ def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> Non
         (change,) = regrades.changes(session, again.batch_id or "")
     assert (change.before, change.after) == (8, Decimal("7.5"))
     assert [each.title for each in change.criteria] == [aloud.title]
-    regrades.publish(store, batch, actor="staff")
+    publishing.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(7.5, 8)}
     # What is set goes for the earlier grade and the later one, whichever it was set in.
     _change(store, job_id, _withdraw(SHAPE))
@@ -170,7 +173,7 @@ def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives
     regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
     shape, aloud = GRADE.criteria
     _grade_all(store, replace(GRADE, criteria=(replace(shape, marks=Decimal(1), max_marks=Decimal(4)), aloud)))
-    regrades.publish(store, batch, actor="staff")
+    publishing.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(6, 6)}
 
 
@@ -203,7 +206,7 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
     shape, aloud = GRADE.criteria
     unjudged = replace(shape, marks=Decimal(0), unjudged="too long", message="This could not be judged; staff look.")
     batch, job_id = _graded(store, replace(GRADE, criteria=(unjudged, aloud)))
-    assert regrades.publish(store, batch, actor="staff").unjudged == 1
+    assert publishing.publish(store, batch, actor="staff").unjudged == 1
     _change(store, job_id, _set(SHAPE, "5"))
     assert set(_totals(store, batch).values()) == {(7, 8)}
     with store.reading() as session:
@@ -211,7 +214,7 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
         told = staff_view(results.load(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
     assert told.message == "Set by hand to 5: seen again."
-    assert regrades.publish(store, batch, actor="staff").published == 1
+    assert publishing.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
         assert batches.job_line(session, job_id).unjudged == 1

@@ -9,13 +9,14 @@ from sqlalchemy import update
 
 import report_builders
 from builders import accept_one, grading_request
-from service.store import batch_control, jobs, results, workers
+from service.store.batches.intake import accept, accept_batch
 from service.store.engine import Store
-from service.store.intake import accept, accept_batch
+from service.store.grades import results
 from service.store.models import Job
-from service.store.queue_places import QueuePlace, queue_place
+from service.store.queue import batch_control, jobs, workers
+from service.store.queue.queue_places import QueuePlace, queue_place
+from service.store.queue.workers import WorkerDescription
 from service.store.states import Lane
-from service.store.workers import WorkerDescription
 
 
 def _place(store: Store, job_id: str) -> QueuePlace:

@@ -13,11 +13,14 @@ from builders import comparable, echo, grading_request
 from responders.sandbox.meter import JobLimits, Spent
 from service.commands.batch.tables import remarks
 from service.grading.grade import Cost, Grade
-from service.store import artifacts, batches, jobs, metrics, plots, results, self_tests
+from service.store import artifacts
+from service.store.batches import batches
+from service.store.batches.intake import Accepted, accept, accept_batch
 from service.store.engine import Store
+from service.store.grades import plots, results
 from service.store.installation import secret_of
-from service.store.intake import Accepted, accept, accept_batch
 from service.store.models import Job
+from service.store.queue import jobs, metrics, self_tests
 from service.store.states import JobState, PlotState, Standing
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest

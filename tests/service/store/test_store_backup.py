@@ -14,13 +14,15 @@ import report_builders
 from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request, settings_in
 from service.settings import Settings
-from service.store import appeals, comments, jobs, overrides, regrades, results
 from service.store.backup import back_up, restore
+from service.store.batches import regrades
+from service.store.batches.intake import accept_batch, accept_new
 from service.store.engine import Store, open_engine, open_store
+from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import secret_of
-from service.store.intake import accept_batch, accept_new
 from service.store.models import Artifact, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.purge import Purged, purge
+from service.store.queue import jobs
 from service.store.states import JobState
 from service.store.web_tables import METADATA, Appeal, Comment, Override
 from sim.errors import HostError, UsageError

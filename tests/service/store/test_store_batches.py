@@ -8,11 +8,16 @@ import pytest
 from sqlalchemy import func, select
 
 from builders import echo, grading_request
-from service.store import batch_control, batches, jobs
+from service.store.batches import batches
+from service.store.batches.batches import JobLine
+from service.store.batches.intake import accept, accept_batch, accept_new
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.courses.versions import freeze
 from service.store.engine import Store
-from service.store.intake import accept_batch, accept_new
-from service.store.lease_reaper import wanting_notices
 from service.store.models import Batch, Job, SubmissionRow
+from service.store.queue import batch_control, jobs
+from service.store.queue.lease_reaper import wanting_notices
 from service.store.states import BatchState, JobState, Lane
 from sim.errors import UsageError
 from submissions.grading_request import GradingRequest
@@ -36,6 +41,46 @@ def _states(store: Store) -> list[tuple[int, JobState]]:
     query = select(SubmissionRow.attempt, Job.state).join(Job, Job.submission_id == SubmissionRow.id)
     with store.reading() as session:
         return [(attempt, state) for attempt, state in session.execute(query.order_by(SubmissionRow.id))]
+
+
+def test_a_batch_of_the_web_has_each_student_once_and_an_uploaded_one_says_nothing_of_it(store: Store) -> None:
+    uploaded = _take(store, grading_request("ada"))
+    with store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.open_for_students(session, 1, echo().id)
+        web = open_assignments.find(session, 1, echo().id).batch_id
+        open_assignments.close(session, 1, echo().id)
+        open_assignments.open_for_students(session, 1, echo().id)
+        assert open_assignments.find(session, 1, echo().id).batch_id == web
+    assert web is not None
+    for program in ("print(1)\n", "print(2)\n"):
+        accept(store, grading_request("ada", program), max_attempts=2, batch_id=web)
+    with store.reading() as session:
+        lines = {line.id: line for line in batches.list_batches(session)}
+        assert [line.attempt for line in batches.job_lines(session, web)] == [3]
+    assert (lines[web].jobs, lines[web].states) == (1, {JobState.QUEUED: 1})
+    assert (lines[web].web_assignment, lines[web].takes_in) == (echo().id, True)
+    assert (lines[uploaded].web_assignment, lines[uploaded].takes_in) == (None, False)
+    assert lines[uploaded].states == {JobState.CANCELLED: 1}
+
+
+@pytest.mark.parametrize("hidden", [True, False], ids=["names hidden", "names shown"])
+def test_lines_in_pages_miss_and_double_nothing_and_their_order_tells_no_hidden_name(
+    store: Store, hidden: bool
+) -> None:
+    batch_id = _take(store, *(grading_request(f"s{number}", f"print({number})\n") for number in range(8)))
+    with store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.hide_names(session, 1, echo().id, hidden)
+    names = hidden_names_of(store, 1)
+    found: list[JobLine] = []
+    with store.reading() as session:
+        while page := batches.some_job_lines(session, batch_id, names, 3, found[-1].id if found else None):
+            found += page
+    assert len({line.id for line in found}) == len(found) == 8
+    ordered = [line.id if hidden else line.student for line in found]
+    assert ordered == sorted(ordered)
+    assert all(line.student.startswith("Participant ") == hidden for line in found)
 
 
 def test_the_same_batch_again_changes_nothing(store: Store) -> None:

@@ -14,11 +14,16 @@ import report_builders
 from builders import accept_one, comparable
 from responders.sandbox.meter import JobLimits, Spent
 from service.grading.grade import Cost, Grade
-from service.store import artifacts, jobs, results
+from service.reports.formats.json_output import json_document
+from service.reports.formats.text import plain_text
+from service.reports.view import staff_view
+from service.store import artifacts
+from service.store.batches.intake import load_grading_request
 from service.store.columns import storable
 from service.store.engine import Store
-from service.store.intake import load_grading_request
+from service.store.grades import results
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow
+from service.store.queue import jobs
 from sim.errors import HostError, UsageError
 from sim.recording import Line
 
@@ -50,9 +55,11 @@ def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -
     grade = make()
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = results.load(session, job_id)
+        back, words = results.load(session, job_id), results.load_words(session, job_id)
     assert comparable(back) == comparable(grade)
     assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
+    assert json_document(staff_view(words)) == json_document(staff_view(back))
+    assert plain_text(staff_view(words)) == plain_text(staff_view(back))
 
 
 def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> None:
@@ -105,8 +112,8 @@ def test_marks_keep_their_places(store: Store) -> None:
 
 
 def test_a_flood_of_images_is_cut_and_the_marks_stay(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.store.recordings.GRADE_BYTES", 1)
-    monkeypatch.setattr("service.store.recordings.SMALLEST_CAP", 1_000)
+    monkeypatch.setattr("service.store.grades.recordings.GRADE_BYTES", 1)
+    monkeypatch.setattr("service.store.grades.recordings.SMALLEST_CAP", 1_000)
     grade = report_builders.shape_grade()
     job_id = _stored(store, grade)
     with store.reading() as session:

@@ -14,13 +14,15 @@ import report_builders
 from builders import accept_one, grading_request, settings_in
 from command import FORKING
 from service.settings import Settings
-from service.store import batch_control, batches, jobs, plots, results
+from service.store.batches import batches
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.intake import accept_batch
-from service.store.jobs import Claim, Fenced, Retry
-from service.store.lease_reaper import note_notices, requeue_lost, wanting_notices
+from service.store.grades import plots, results
 from service.store.models import Batch, CriterionResultRow, Job, SubmissionRow, TrialRow
-from service.store.scheduling import BATCH_EVERY
+from service.store.queue import batch_control, jobs
+from service.store.queue.jobs import Claim, Fenced, Retry
+from service.store.queue.lease_reaper import note_notices, requeue_lost, wanting_notices
+from service.store.queue.scheduling import BATCH_EVERY
 from service.store.states import BatchState, JobState, Lane, PlotState
 from submissions.people import Refusal
 

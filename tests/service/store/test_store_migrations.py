@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
+from functools import partial
 from pathlib import Path
 
 import pytest
 from alembic import command
 from alembic.script import ScriptDirectory
-from sqlalchemy import func, inspect, select, text
+from sqlalchemy import func, insert, inspect, select, text
 
 import report_builders
 from builders import accept_one
 from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
-from service.store import artifacts, batches, intake, jobs, results
+from service.store import artifacts, recorded_schema
+from service.store.batches import batches, intake
+from service.store.courses import open_assignments
 from service.store.engine import open_engine, open_store
-from service.store.migrate import configuration
+from service.store.grades import results
+from service.store.migrate import configuration, migrate
 from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
-from service.store.revision import current_revision, newest_revision
+from service.store.queue import jobs
+from service.store.revision import current_revision, newest_revision, revision_of
 from service.store.states import JobState, Standing
-from service.store.web_tables import METADATA
+from service.store.web_tables import METADATA, OpenAssignment
 from sim.errors import HostError
 from submissions.people import Refusal
 
@@ -33,6 +39,10 @@ def _open(settings: Settings) -> None:
 
 
 def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> None:
+    engine = open_engine(service_settings.database)
+    with engine.begin() as connection:
+        migrate(connection)
+    engine.dispose()
     with open_store(service_settings) as store:
         assert current_revision(store.engine) == newest_revision()
         assert set(inspect(store.engine).get_table_names()) == {*METADATA.tables, "alembic_version"}
@@ -40,6 +50,27 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
             known = configuration(connection)
             command.check(known)
             assert ScriptDirectory.from_config(known).get_current_head() == newest_revision()
+
+
+def _lines_of(statement: str) -> list[str]:
+    """They in one order, as Alembic has none for foreign keys, without what releases of SQLite write differently."""
+    return sorted(re.sub(r'[\s",]', "", line) for line in statement.splitlines())
+
+
+def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
+    told = []
+    for name, lay in (("laid", partial(recorded_schema.lay, revision=newest_revision())), ("migrated", migrate)):
+        engine = open_engine(f"sqlite:///{tmp_path / name}.db")
+        with engine.begin() as connection:
+            assert recorded_schema.can_be_laid(connection)
+            lay(connection)
+            schema = [_lines_of(statement) for statement in recorded_schema.statements_of(connection)]
+            rows = {table.name: connection.execute(select(table)).mappings().all() for table in METADATA.sorted_tables}
+            (installation,) = rows.pop("installation")
+            told.append((schema, rows, len(installation["secret"]), revision_of(connection)))
+            assert not recorded_schema.can_be_laid(connection)
+        engine.dispose()
+    assert told[0] == told[1], "python -m service.store.recorded_schema writes down anew what the migrations make"
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:
@@ -104,6 +135,29 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
     with open_store(service_settings) as store, store.reading() as session:
         reasons = session.scalars(select(Job.error).where(Job.state == JobState.CANCELLED)).all()
     assert reasons == ["superseded by a newer submission"]
+
+
+def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
+    service_settings: Settings, tmp_path: Path
+) -> None:
+    engine = lay_first_release(service_settings.database, tmp_path)
+    with engine.begin() as connection:
+        command.upgrade(configuration(connection), "0012")
+        connection.execute(text("UPDATE job SET batch_id = NULL"))
+        connection.execute(text("UPDATE submission SET batch_id = NULL"))
+        (name,) = set(connection.scalars(text("SELECT assignment FROM submission")))
+        of_one = {"course_id": 1, "assignment_version_id": 1, "names_hidden": False}
+        for assignment, opened_at in ((name, datetime(2000, 1, 1, tzinfo=UTC)), ("never", None)):
+            row = of_one | {"assignment": assignment, "opened_at": opened_at}
+            connection.execute(insert(OpenAssignment.__table__).values(row))
+    engine.dispose()
+    with open_store(service_settings) as store, store.reading() as session:
+        assert open_assignments.find(session, 1, "never").batch_id is None
+        batch_id = open_assignments.find(session, 1, name).batch_id
+        assert batch_id is not None
+        assert {line.student for line in batches.job_lines(session, batch_id)} == {"ada", "Bob 🤖", "eve"}
+        assert batches.batch(session, batch_id).web_assignment == name
+        assert session.scalar(select(func.count()).where(Job.batch_id.is_(None))) == 0
 
 
 @pytest.mark.parametrize("revision", ["0002", "0001", "base"])

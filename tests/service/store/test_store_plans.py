@@ -10,9 +10,9 @@ from sqlalchemy import event
 from sqlalchemy.orm import Session
 
 from builders import accept_one, opened, settings_in
-from service.store import batches
+from service.store.batches import batches
 from service.store.engine import Store, now
-from service.store.scheduling import next_job
+from service.store.queue.scheduling import next_job
 
 
 @pytest.fixture

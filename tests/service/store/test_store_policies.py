@@ -10,13 +10,16 @@ from sqlalchemy import select
 
 import report_builders
 from builders import grading_request
-from service.store import batches, jobs, policies, regrades, results
+from service.store.batches import batches, publishing
+from service.store.batches.intake import Accepted, accept, accept_batch, accept_new
+from service.store.courses import policies
+from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
-from service.store.intake import Accepted, accept, accept_batch, accept_new
+from service.store.grades import results
 from service.store.models import Job, SubmissionRow
-from service.store.policies import PolicyLimits
+from service.store.people.students import Students, course_of
+from service.store.queue import jobs
 from service.store.states import JobState, Lane
-from service.store.students import Students, course_of
 from sim.recording import Verdict
 from submissions.people import Student
 
@@ -100,7 +103,7 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
         (line,) = batches.job_lines(session, batch)
         assert (line.marks, line.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
         assert session.get_one(Job, first.job_id).state is JobState.DONE
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(0, 0, 0, 0, 1, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(0, 0, 0, 0, 1, 0)
 
 
 @pytest.mark.parametrize(
@@ -184,5 +187,5 @@ def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_publis
     with store.reading() as session:
         batch = session.scalars(select(Job.batch_id)).one()
     assert batch is not None
-    regrades.publish(store, batch, actor="staff")
+    publishing.publish(store, batch, actor="staff")
     assert released() == {"visible", "after_due_date", "after_published"}

@@ -9,9 +9,11 @@ from decimal import Decimal
 import report_builders
 from builders import echo, grading_request
 from service.grading.grade import CriterionResult, Evidence, Measure
-from service.store import batches, jobs, rankings, results
+from service.store.batches import batches, rankings
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store
-from service.store.intake import accept_batch
+from service.store.grades import results
+from service.store.queue import jobs
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 

@@ -12,8 +12,9 @@ import pytest
 
 import report_builders
 from service.grading.grade import Grade
-from service.store.recordings import RecordingError, from_bytes, keep, to_bytes
-from service.store.versions import assignment_from_bytes, assignment_to_bytes
+from service.store.courses.versions import assignment_from_bytes, assignment_to_bytes
+from service.store.grades.recorded_words import RecordingError, words_from_bytes
+from service.store.grades.recordings import from_bytes, keep, to_bytes
 from sim.recording import COLUMNS, Line, Message, Recording, Ticks
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment
@@ -48,6 +49,17 @@ def _assert_same(one: Recording, other: Recording) -> None:
 def test_a_recording_comes_back_as_it_was(name: str) -> None:
     for recording in _recordings(GRADES[name]()):
         _assert_same(recording, from_bytes(to_bytes(recording)))
+        beside = replace(recording, partner=recording)
+        read = words_from_bytes(to_bytes(beside))
+        assert read.partner is not None
+        assert _words(read) == _words(beside)
+        assert _words(read.partner) == _words(recording)
+
+
+def _words(recording: Recording) -> list[object]:
+    images = tuple(replace(image, left=b"", right=b"") for image in recording.images)
+    own = replace(recording, images=images, partner=None)
+    return [getattr(own, field.name) for field in fields(Recording) if field.name != "ticks"]
 
 
 def test_odd_values_come_back_as_they_were() -> None:
@@ -72,7 +84,7 @@ def test_a_recording_that_is_older_than_a_column_is_read(monkeypatch: pytest.Mon
     recording = report_builders.line_follower_recording(40)
     older = tuple(column for column in COLUMNS if column.name not in ("gyro", "right_sums"))
     with monkeypatch.context() as then:
-        then.setattr("service.store.recordings.COLUMNS", older)
+        then.setattr("service.store.grades.recordings.COLUMNS", older)
         data = to_bytes(recording)
     ticks = from_bytes(data).ticks
     assert np.isnan(ticks.gyro).all()
@@ -102,8 +114,9 @@ def test_a_minute_of_driving_takes_less_than_half_of_its_raw_size() -> None:
     ids=["empty", "text", "compressed text", "pickle"],
 )
 def test_other_bytes_are_refused(data: bytes) -> None:
-    with pytest.raises(RecordingError):
-        from_bytes(data)
+    for read in (from_bytes, words_from_bytes):
+        with pytest.raises(RecordingError):
+            read(data)
 
 
 def test_a_cut_recording_is_refused() -> None:

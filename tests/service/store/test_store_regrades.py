@@ -14,10 +14,13 @@ import report_builders
 from builders import echo, grading_request
 from service.commands.batch.words import unjudged_words
 from service.grading.grade import Grade
-from service.store import audit, batch_control, batches, jobs, regrades, results
+from service.store import audit
+from service.store.batches import batches, publishing, regrades
+from service.store.batches.intake import accept_batch, accept_new
 from service.store.engine import Store
-from service.store.intake import accept_batch, accept_new
+from service.store.grades import results
 from service.store.models import Batch, Job
+from service.store.queue import batch_control, jobs
 from service.store.states import JobState, Standing
 from sim.errors import UsageError
 
@@ -65,13 +68,13 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
     batch = _batch(store, "ada", "bob")
     _grade_all(store)
     before = _standing(store, batch)
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 0, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(2, 0, 0, 0, 0, 0)
     again = _regrade(store, batch, _better(GRADE), changed=True)
     assert _standing(store, batch) == before
     with store.reading() as session:
-        assert regrades.unpublished_regrades(session, batch) == 2
+        assert publishing.unpublished_regrades(session, batch) == 2
         assert batches.batch(session, again).regrade_of == batch
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(2, 2, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(2, 2, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert set(after.values()).isdisjoint(before.values())
     with store.reading() as session:
@@ -82,14 +85,14 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
             assert results.load(session, job_id).marks == GRADE.marks
         actions = [entry.action for entry in audit.entries(session, "batch", batch)]
     assert actions == ["publish", "regrade", "publish"]
-    assert regrades.publish(store, batch, actor="staff").published == 0
+    assert publishing.publish(store, batch, actor="staff").published == 0
 
 
 def test_a_regrade_can_be_published_by_its_own_batch_too(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
     again = _regrade(store, batch)
-    regrades.publish(store, again, actor="staff")
+    publishing.publish(store, again, actor="staff")
     (line,) = _standing(store, batch).values()
     with store.reading() as session:
         assert session.get_one(Job, line).batch_id == again
@@ -112,13 +115,13 @@ def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
     (left,) = [line for line in lines if line.unjudged]
     assert unjudged_words(lines).startswith("1 submission has criteria that could not be judged")
     assert f": {left.student};" in unjudged_words(lines)
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 0, 0, 0, 0, 1)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 0, 0, 0, 0, 1)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is None
-    assert regrades.publish(store, batch, actor="staff", anyway=True) == regrades.Published(1, 0, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff", anyway=True) == publishing.Published(1, 0, 0, 0, 0, 0)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is not None
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(0, 0, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(0, 0, 0, 0, 0, 0)
 
 
 def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: Store) -> None:
@@ -126,10 +129,10 @@ def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: S
     _grade_all(store)
     before = _standing(store, batch)
     _regrade(store, batch, _unjudged(GRADE))
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 0, 0, 0, 0, 1)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 0, 0, 0, 0, 1)
     assert _standing(store, batch) == before
     _regrade(store, batch, _better(GRADE))
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
     assert len(_standing(store, batch)) == 1
     assert _standing(store, batch) != before
 
@@ -139,7 +142,7 @@ def test_a_whole_regrade_takes_the_place_of_what_could_not_be_judged(store: Stor
     _grade_all(store, _unjudged(GRADE))
     before = _standing(store, batch)
     _regrade(store, batch)
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert len(after) == 1
     assert after != before
@@ -152,7 +155,7 @@ def test_of_several_regrades_the_newest_stands(store: Store) -> None:
     _grade_all(store)
     _regrade(store, batch)
     newest = _regrade(store, batch, _better(GRADE))
-    regrades.publish(store, batch, actor="staff")
+    publishing.publish(store, batch, actor="staff")
     with store.reading() as session:
         standing = session.execute(select(Job.batch_id, Job.standing).order_by(Job.queued_at)).all()
     assert [state for _, state in standing] == [Standing.KEPT, Standing.KEPT, Standing.STANDS]
@@ -214,7 +217,7 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
     made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
     assert (made.jobs, made.other_assignment, made.unfinished) == (2, 0, 1)
     with pytest.raises(UsageError, match="there is no batch"):
-        regrades.publish(store, "nowhere", actor="staff")
+        publishing.publish(store, "nowhere", actor="staff")
 
 
 def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
@@ -225,7 +228,7 @@ def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
     (change,) = _changes(store, _regrade(store, batch, changed=True))
     assert (change.before, change.after) == (None, GRADE.marks)
     assert "had no grade" in change.reason
-    assert regrades.publish(store, batch, actor="staff") == regrades.Published(1, 1, 0, 0, 0, 0)
+    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
 
 
 def test_a_newer_submission_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
@@ -255,7 +258,7 @@ def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: S
     before = _standing(store, batch)
     made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
     batch_control.cancel(store, made.batch_id, actor="staff")
-    assert regrades.publish(store, batch, actor="staff").replaced == 0
+    assert publishing.publish(store, batch, actor="staff").replaced == 0
     assert _standing(store, batch) == before
     with store.reading() as session:
         names = session.scalars(select(Batch.name).order_by(Batch.created_at)).all()

@@ -12,11 +12,13 @@ from builders import accept_one
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store import jobs, metrics, phases, plots, results, workers
+from service.store import phases
 from service.store.engine import Store
-from service.store.jobs import Retry
-from service.store.lease_reaper import requeue_lost, wanting_notices
+from service.store.grades import plots, results
 from service.store.models import Heartbeat, Job
+from service.store.queue import jobs, metrics, workers
+from service.store.queue.jobs import Retry
+from service.store.queue.lease_reaper import requeue_lost, wanting_notices
 from service.store.states import JobState, Lane
 
 HOUR = timedelta(hours=1)

@@ -15,12 +15,17 @@ from sqlalchemy.orm import Session
 
 import report_builders
 from builders import grading_request
-from service.store import audit, credentials, intake, jobs, policies, results
+from service.store import audit
+from service.store.batches import intake
+from service.store.courses import policies
 from service.store.engine import Store
+from service.store.grades import results
 from service.store.models import Enrolment, Job, Person, SubmissionRow
+from service.store.people import credentials
+from service.store.people.students import course_of
 from service.store.purge import erase_student, purge
+from service.store.queue import jobs
 from service.store.states import CredentialKind, Role
-from service.store.students import course_of
 from service.store.web_tables import (
     METADATA,
     Appeal,

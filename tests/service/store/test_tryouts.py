@@ -8,12 +8,12 @@ import pytest
 from sqlalchemy import func, select, update
 
 from builders import echo, grading_request
-from service.store import tryouts
+from service.store.courses.versions import assignment_from_bytes, freeze, keep
 from service.store.engine import Store, now
+from service.store.people.students import Students, course_of
+from service.store.queue import tryouts
+from service.store.queue.tryouts import MOST_AN_HOUR, TryoutLine
 from service.store.states import TryoutState
-from service.store.students import Students, course_of
-from service.store.tryouts import MOST_AN_HOUR, TryoutLine
-from service.store.versions import assignment_from_bytes, freeze, keep
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
 from submissions.packed import pack_submission

@@ -80,6 +80,15 @@ def test_every_route_is_in_a_table(signed: tuple[Web, Signed]) -> None:
     assert _routes(signed[0]) == set(ROUTES)
 
 
+def test_programs_can_do_all_that_pages_do() -> None:
+    served = {"/static/{name}", "/health/live", "/health/ready", "/metrics", "/api/openapi.json"}
+    pages = {route for route in ROUTES if API not in route and route.partition(" ")[2] not in served}
+    told = tomllib.loads((DATA / "page_to_api.toml").read_text())
+    assert pages == set(told)
+    does = {route.replace(API, "/", 1) for route in ROUTES if API in route}
+    assert {each for each in told.values() if not each.startswith("none: ")} <= does
+
+
 @pytest.mark.parametrize("route", sorted(ROUTES))
 def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
     _, asked = signed

@@ -19,12 +19,18 @@ from starlette.testclient import TestClient
 
 import report_builders
 from builders import echo, grading_request
-from service.store import intake, jobs, open_assignments, people, replies, results
-from service.store.credentials import identify
+from service.store import replies
+from service.store.batches import intake
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.courses.versions import freeze
+from service.store.grades import results
+from service.store.people import people
+from service.store.people.credentials import identify
+from service.store.queue import jobs
 from service.store.states import CredentialKind
-from service.store.versions import freeze
 from service.web.security import LARGEST_BODY
-from web import COURSE, Web, web_in
+from web import COURSE, Web, submit, web_in
 
 EVERYTHING = ("read", "submit", "mark", "manage")
 HERE = "/api/v1/courses/1"
@@ -219,7 +225,9 @@ def test_where_names_are_hidden_nobody_is_named(web: Web, grace: Program) -> Non
     shown = [grace.ask("GET", path).text for path in (f"/batches/{batch}/grades", f"/batches/{batch}")]
     shown += [grace.ask("GET", f"/grades/{job}{part}").text for part in ("", "/state", "/report", "/replay")]
     assert [text for text in shown if re.search(r"\bada\b", text, re.IGNORECASE)] == []
-    assert "submission 1" in shown[0]
+    called = hidden_names_of(web.store, 1).called("echo-responder", "ada")
+    assert called.startswith("Participant ")
+    assert called in shown[0]
     assert grace.ask("GET", "/submissions/1/files").status_code == 404
 
 
@@ -275,3 +283,16 @@ def test_the_description_is_whole_and_its_examples_fit_it(web: Web) -> None:
     } - {""}
     without = {name for name in answered if not schemas[name].get("examples") and not name.startswith("Listed_")}
     assert without == set()
+
+
+def test_a_token_made_on_the_page_is_one_and_stays_to_be_copied_until_it_is_used(web: Web) -> None:
+    browser = web.browser(web.instructor())
+    for _ in range(2):
+        made = submit(browser, "/account/tokens", {"name": "script", "scopes": "read", "word": "once"})
+        shown = browser.get(made.headers["location"]).text
+        assert shown.count('<th scope="row">script</th>') == 1
+    (secret,) = set(re.findall(r"rmt_[\w-]+", shown))
+    others = web.browser(web.instructor("mallory")).get(made.headers["location"]).text
+    assert "rmt_" not in others
+    assert Program(web.browser(), {"authorization": f"Bearer {secret}"}).ask("GET", "/batches").status_code == 200
+    assert "rmt_" not in browser.get(made.headers["location"]).text

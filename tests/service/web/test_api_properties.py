@@ -15,8 +15,8 @@ from schemathesis.generation import GenerationMode
 from schemathesis.specs.openapi import checks
 
 from builders import echo
-from service.store import open_assignments
-from service.store.versions import freeze
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
 from web import Web, web_in
 from web_world import make_world
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -21,11 +22,18 @@ import report_builders
 from builders import echo, grading_request
 from report_builders import HOSTILE
 from service.reports.formats import FORMATS
-from service.store import audit, intake, jobs, open_assignments, people, policies, results
-from service.store.models import Batch, Enrolment, Job, SubmissionRow
+from service.store import audit
+from service.store.batches import intake
+from service.store.courses import open_assignments, policies
+from service.store.courses.versions import freeze
+from service.store.grades import result_cache, results
+from service.store.installation import secret_of
+from service.store.models import Batch, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.people import people
+from service.store.queue import jobs
 from service.store.states import BatchState, JobState, Role, Standing
-from service.store.versions import freeze
-from submissions.assignment.folder import assignment_folder
+from service.version import grader_sha256
+from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.people import Refusal, Student
 from web import COURSE, Web, submit, web_in
 
@@ -114,6 +122,26 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
     assert "Nothing of it is new" in words(again.text)
 
 
+def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, grace: TestClient) -> None:
+    web.student("ada")
+    web.student("bob")
+    submit(grace, f"{sent(grace, a_class('ada'))}/confirm")
+    grade_all(web)
+    secret = secret_of(web.store).sha256
+    with web.store.transaction() as session:
+        job = session.query(Job).one()
+        job.sandbox = "seccomp, Landlock"
+        job.cache_key = result_cache.cache_key(session, job.id, grader_sha256(), secret)
+        for trial in session.query(TrialRow):
+            trial.verdict = "finished"
+    alike = {f"{who}/{name}": f"{text}# ada\n" for who in ("ada", "bob") for name, text in ECHO.items()}
+    shown = words(grace.get(sent(grace, zipped(alike | {"eve/robot.py": "print(1)\n"}))).text)
+    assert "1 has no responder.py, and what needs it has no marks: eve" in shown
+    assert "1 is not in the course yet, and will be: eve" in shown
+    assert "1 was submitted before just so" in shown
+    assert "1 is identical to one that is graded" in shown
+
+
 def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -> None:
     parts = [("files", (f"{who}.zip", zipped(ECHO | {"note.txt": who}))) for who in ("ada", "bob")]
     people = ("people", ("class.csv", b"id,name\nada,Ada Lovelace\n"))
@@ -131,8 +159,8 @@ def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -
         ("week.zip", b"no zip at all", "cannot be unpacked"),
         ("week.zip", zipped({"../../evil/robot.py": "x"}), "outside"),
         ("week.zip", zipped(ECHO), "one submission"),
-        ("week.tar.gz", b"x", "a file that ends in .gz"),
-        ("week.csv", b"student,file\nada,/etc/passwd\n", "a file that ends in .csv"),
+        ("week.tar.gz", b"x", "week.tar.gz was sent"),
+        ("week.csv", b"student,file\nada,/etc/passwd\n", "week.csv was sent"),
     ],
 )
 def test_what_is_no_batch_is_refused_in_a_sentence_and_not_kept(
@@ -156,6 +184,7 @@ def test_an_upload_is_its_senders_alone_and_few_are_kept(web: Web, grace: TestCl
     assert submit(grace, f"{places[4]}/discard").status_code == 303
     assert grace.get(places[4]).status_code == 404
     assert len(list((web.settings.home / "uploads").iterdir())) == 2
+    assert [each.get(f"{HOME}/batches").text.count("/batches/uploads/") for each in (grace, other)] == [2, 0]
 
 
 def test_the_assignment_is_the_courses_own_where_it_has_one_and_never_a_folder(web: Web, grace: TestClient) -> None:
@@ -257,11 +286,41 @@ def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, gr
     web.student("zoe")
     made = a_batch(web, "ada", "bob", refusals=(Refusal("x.zip", "is broken, expected a zip."),))
     told = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
-    for each in ("Graded 2", "Commonest causes", "Not submitted Zoe", "x.zip is broken", "robomark batch similar"):
+    for each in ("Graded 2", "Commonest causes", "Not submitted Zoe", "x.zip is broken", "nearly the same"):
         assert each in told, told
     assert "Grace" not in told.partition("Not submitted")[2][:40]
     everybody = grace.get(f"{HOME}/batches/{made.id}/overview?pass=0").text
     assert "With 0 per cent or more 2 (100 %)" in words(everybody)
+
+
+def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a_course(
+    web: Web, grace: TestClient
+) -> None:
+    step = "def step_{}(value):\n    total = value * 3 {} 4\n    return [total, {!r}]\n"
+    lines = [step.format(name, sign, HOSTILE) for name in "abc" for sign in "+-%"]
+    own = "".join(lines) + "".join(f"while left.distance < {number}: right.on(30)\n" for number in range(12))
+    for student, program in (("ada", own), ("bob", own.replace("step", "go").replace("total", "sum"))):
+        request = grading_request(student, program)
+        made = intake.accept_batch(web.store, f"of {student}", [request], (), course=COURSE, max_attempts=3)
+    grade_all(web)
+    path = f"{HOME}/batches/{made.id}/similar"
+    page = grace.get(path).text
+    assert "1 pair is alike among 2 students" in words(page)
+    assert len(re.findall(rf'href="{HOME}/grades/\w+">ada', page)) == 3
+    assert "sum = value * 3" in page
+    assert "<script>alert" not in page
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.hide_names(session, 1, "echo-responder", hidden=True)
+    hidden = words(grace.get(path).text)
+    assert "1 pair is alike" in hidden
+    assert "ada" not in hidden
+    answer = grace.get(f"/api/v1{path}", headers=web.token(web.instructor(), "read"))
+    (found,) = answer.json()["assignments"]
+    (pair,) = found["pairs"]
+    assert pair["share"] > 0.9
+    assert {each["aspect"] for each in pair["trials"]} <= {"path", "messages", "faults"}
+    assert all(student.startswith("Participant ") for student in pair["students"])
 
 
 def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
@@ -274,7 +333,7 @@ def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
         assert session.get_one(Job, other).published_at is None
         assert [entry.action for entry in audit.entries(session, "job", one)] == ["publish"]
     answer = submit(grace, f"{HOME}/batches/{made.id}/publish")
-    assert "1 grades are published now" in words(grace.get(answer.headers["location"]).text)
+    assert "1 grade is published now" in words(grace.get(answer.headers["location"]).text)
     with web.store.reading() as session:
         assert session.get_one(Job, other).published_at is not None
 
@@ -309,6 +368,10 @@ def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClie
     assert f'href="{HOME}/grades/{ids["ada"]}" rel="prev"' in shown
     assert f'href="{HOME}/grades/{ids["cid"]}" rel="next"' in shown
     assert 'rel="prev"' not in grace.get(f"{HOME}/grades/{ids['ada']}").text
+    german = grace.get(f"{HOME}/grades/{ids['bob']}", headers={"accept-language": "de"}).text
+    assert '<p class="next" data-before="Als Nächstes:">Rufen Sie' in german
+    assert '"play": "Abspielen"' in german
+    assert "staff copy" not in german
 
 
 def test_hidden_names_are_nowhere_on_the_pages_of_who_marks(web: Web, grace: TestClient) -> None:
@@ -336,11 +399,13 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "=cmd()", "bob")
     path = f"{HOME}/batches/{made.id}"
     answer = grace.get(f"{path}/export?format=csv")
-    assert answer.headers["content-disposition"].startswith(f'attachment; filename="{made.id}-csv.csv"')
-    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert answer.headers["content-disposition"].startswith('attachment; filename="week_one-csv.csv"')
+    assert answer.content.startswith(codecs.BOM_UTF8)  # or Excel does not take it for UTF-8
+    rows = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert [row["student"] for row in rows] == ["'=cmd()", "bob"]
     assert rows[0]["marks"]
-    published = list(csv.DictReader(io.StringIO(grace.get(f"{path}/export?format=csv&published=true").text)))
+    answer = grace.get(f"{path}/export?format=csv&published=true")
+    published = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert {row["marks"] for row in published} == {""}
     for name, each in FORMATS.items():
         if each.filled_in is None and each.packed is None:
@@ -348,6 +413,11 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
             assert answer.status_code == 200, name
             assert answer.headers["content-disposition"].startswith("attachment"), name
     assert grace.get(f"{path}/export?format=../../etc").status_code == 422
+    answer = grace.get(f"{path}/export?format=moodle-feedback")
+    assert (answer.status_code, "came from Moodle" in words(answer.text)) == (
+        422,
+        True,
+    )
 
 
 def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient) -> None:
@@ -365,6 +435,12 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
         allowed = policies.policies(session, 1)["echo-responder"]
         done = [entry.action for entry in audit.entries(session, "course", "1")]
     assert (allowed.late_days, allowed.attempts) == (2, 3)
+    submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
+    told = words(grace.get(f"{path}/echo-responder?done=policy").text)
+    assert "Set." in told
+    assert "This date has passed" in told
+    submit(grace, f"{path}/echo-responder/no-policy")
+    assert "It has no dates and attempts of its own" in words(grace.get(f"{path}/echo-responder").text)
     assert done == ["prepare", "open", "close", "open", "policy"]
     assert submit(grace, f"{HOME}/policy", {"due": "soon"}).status_code == 422
     assert submit(grace, path, {"assignment": "/etc"}).status_code == 422
@@ -394,9 +470,31 @@ def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: Te
     answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
     assert answer.status_code == 422
     assert "mine/assignment.toml:" in words(answer.text)
+    assert grace.get(f"{HOME}/assignments/uploads").headers["location"] == f"{HOME}/assignments"
+    answer = submit(grace, f"{HOME}/assignments/uploads", files={"file": ("mine.zip", zipped({"a/b.py": ""}))})
+    assert "mine.zip: has no assignment.toml" in words(answer.text)
+    example = grace.get(f"{HOME}/assignments/uploads/my-assignment.zip").content
+    assert submit(grace, f"{HOME}/assignments/uploads", files={"file": ("my.zip", example)}).status_code == 303
 
 
-def test_students_are_let_in_get_a_link_and_more_time(web: Web, grace: TestClient) -> None:
+def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/catalogue"
+
+    def found(query: str) -> list[str]:
+        return re.findall(r'name="assignment" value="([^"]+)"', grace.get(f"{path}?{query}").text)
+
+    assert sorted(found("")) == sorted(catalogue())
+    assert found("q=LOLLIPOP+noise") == ["lollipop-with-noise"]
+    assert found("q=sensor&topic=05") == [each for each in found("topic=05") if each in found("q=sensor")]
+    assert "relay-a-message" in found("topic=none")
+    assert found("q=nothing+is+like+this") == []
+    assert "<script" not in words(grace.get(f"{path}?q=%3Cscript%3E&topic=%22").text)
+    submit(grace, f"{HOME}/assignments", {"assignment": "lollipop"})
+    assert "lollipop" not in found("q=lollipop")
+    assert f'href="{HOME}/assignments/lollipop"' in grace.get(f"{path}?q=lollipop").text
+
+
+def test_students_are_let_in_and_get_more_time(web: Web, grace: TestClient) -> None:
     path = f"{HOME}/people"
     table = {"file": ("class.csv", b"id,name,email\nada,Ada Lovelace,ada@example.org\nbob,Bob,\n")}
     assert submit(grace, f"{path}/table", files=table).status_code == 303
@@ -405,18 +503,40 @@ def test_students_are_let_in_get_a_link_and_more_time(web: Web, grace: TestClien
     for each in ("ada Ada Lovelace ada@example.org student", "bob Bob", "cid Cid", "grace Grace instructor"):
         assert each in told
     assert "ada@" not in words(grace.get(f"{path}?q=cid").text)
-    link = re.search(r"/sign-in/(rml_[\w-]+)", submit(grace, f"{own}/link").text)
-    assert link
-    cid = web.browser()
-    assert cid.post("/sign-in", data={"secret": link[1]}).status_code == 303
-    assert "Cid" in cid.get("/account").text
-    assert "rml_" not in grace.get(own).text
     submit(grace, f"{own}/extensions", {"due": "2030-01-02", "more_attempts": "2"})
     assert "2 attempts more" in words(grace.get(own).text)
     with web.store.reading() as session:
         done = [entry.action for entry in audit.entries(session, "course", "1")]
     assert done == ["enrol", "enrol", "extend"]
-    assert submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")}).status_code == 422
+    answer = submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")})
+    assert (answer.status_code, "x.csv: " in words(answer.text)) == (422, True)
+    assert grace.get(f"{path}/table").headers["location"] == path
+
+
+def test_letting_in_one_changes_nobody_who_is_there(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/people"
+    submit(grace, path, {"who": "ada", "name": "Ada Lovelace"})
+    again = submit(grace, path, {"who": "ada", "name": "Somebody Else"})
+    assert (again.status_code, "in this course already, as Ada Lovelace" in words(again.text)) == (422, True)
+    staff = submit(grace, path, {"who": "grace", "name": "Somebody Else"})
+    assert (staff.status_code, "grace is an instructor of this course" in words(staff.text)) == (422, True)
+    assert submit(grace, f"{path}/table", files={"file": ("x.csv", b"id,name\ngrace,Nobody")}).status_code == 303
+    told = words(grace.get(path).text)
+    assert "ada Ada Lovelace" in told
+    assert "grace Grace" in told
+
+
+def test_who_has_submitted_nothing_is_taken_out_of_the_course(web: Web, grace: TestClient) -> None:
+    mistyped = submit(grace, f"{HOME}/people", {"who": "zoe"}).headers["location"]
+    answer = submit(grace, f"{mistyped}/remove")
+    assert "zoe is in the course no more" in words(grace.get(answer.headers["location"]).text)
+    assert grace.get(mistyped).status_code == 404
+    a_batch(web, "ada")
+    with web.store.reading() as session:
+        ada = f"{HOME}/people/{people.member(session, COURSE, 'ada').enrolment_id}"
+    assert f"{ada}/remove" not in grace.get(ada).text
+    assert submit(grace, f"{ada}/remove").status_code == 422
+    assert submit(grace, f"{HOME}/people/{web.instructor('linus').enrolment_id}/remove").status_code == 404
 
 
 def test_no_instructor_makes_a_link_for_another_or_for_who_is_more(web: Web, grace: TestClient) -> None:

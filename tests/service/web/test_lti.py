@@ -20,8 +20,11 @@ import report_builders
 from builders import grading_request
 from lti_platform import CLIENT, INSTRUCTOR, ISSUER, LEARNER, LearningPlatform, learning_platform
 from service.lti.launch import CLAIM
-from service.store import intake, jobs, lti, people, results
+from service.store.batches import intake
+from service.store.grades import results
 from service.store.models import Job
+from service.store.people import lti, people
+from service.store.queue import jobs
 from service.store.states import Role
 from service.store.web_tables import LtiCourse
 from service.web.access import CSRF_FIELD

@@ -9,7 +9,10 @@ import pytest
 from starlette.testclient import TestClient
 
 import report_builders
-from service.store import audit, batches, results
+from service.store import audit
+from service.store.batches import batches
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.grades import results
 from web import Web, submit, web_in
 from web_world import World, make_world
 
@@ -61,6 +64,36 @@ def test_marks_are_set_excused_and_withdrawn_and_all_is_told(marked: Marked) -> 
     assert marked.marks() == (before[0] - float(CRITERION.marks), before[1] - float(most))
     submit(marked.grace, f"{marked.marking}/withdraw", {"criterion": CRITERION.id})
     assert marked.marks() == before
+
+
+def test_a_form_that_was_shown_before_another_change_changes_nothing(marked: Marked) -> None:
+    before = marked.marks()
+    form = {"criterion": CRITERION.id, "reason": "looked again", "seen": "0"}
+    assert 'name="seen" value="0"' in marked.grace.get(marked.marking).text
+    assert submit(marked.grace, f"{marked.marking}/set", {**form, "marks": "0"}).status_code == 303
+    for action in ("set", "excuse"):
+        stale = submit(marked.grace, f"{marked.marking}/{action}", {**form, "marks": f"{CRITERION.max_marks}"})
+        assert (stale.status_code, "changed meanwhile" in stale.text) == (422, True)
+    submit(marked.grace, f"{marked.marking}/withdraw", {"criterion": CRITERION.id})
+    assert marked.marks() == before
+
+
+def test_it_says_whose_work_is_marked_unless_names_are_hidden(marked: Marked) -> None:
+    assert "Ada (ada) · Echo" in marked.grace.get(marked.marking).text
+    path = "/courses/1/assignments/echo-responder/names"
+    submit(marked.grace, path, {"hidden": "true"})
+    shown = marked.grace.get(marked.marking).text
+    submit(marked.grace, path, {"hidden": "false"})
+    called = hidden_names_of(marked.web.store, 1).called
+    assert "Participant" in shown
+    assert "Ada" not in shown
+    assert called("echo-responder", "ada") == "ada"
+
+
+def test_the_course_says_how_many_appeals_wait(marked: Marked) -> None:
+    for path in ("batches", "people"):
+        assert '1<span class="hidden"> wait for an answer' in marked.grace.get(f"/courses/1/{path}").text
+    assert "wait for an answer" not in marked.ada.get("/courses/1/mine").text
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,13 +17,15 @@ from starlette.testclient import TestClient
 
 import report_builders
 from builders import PROGRAM, echo
-from service.store import jobs, open_assignments, policies, results, workers
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import PolicyLimits
+from service.store.courses.versions import freeze
+from service.store.grades import results
 from service.store.models import Job
-from service.store.people import Member
-from service.store.policies import PolicyLimits
+from service.store.people.people import Member
+from service.store.queue import jobs, workers
+from service.store.queue.workers import WorkerDescription
 from service.store.states import JobState
-from service.store.versions import freeze
-from service.store.workers import WorkerDescription
 from submissions.assignment.definition import Assignment
 from web import Web, submit, web_in
 
@@ -117,11 +120,11 @@ def test_a_limit_and_an_extension_are_told_as_they_count(web: Web, ada: Member) 
         _send(browser)
         _grade(web)
         assert "1 of 2 attempts left" in browser.get(MINE).text
-        assert "2 days left" in browser.get(MINE).text
+        assert "35 hours left" in browser.get(MINE).text
         with web.store.transaction() as session:
             policies.extend(session, ada.enrolment_id, "open", due + timedelta(days=7), 3)
         assert "4 of 5 attempts left" in browser.get(f"{MINE}/open").text
-        assert "9 days left" in browser.get(f"{MINE}/open").text
+        assert "8 days left" in browser.get(f"{MINE}/open").text
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
@@ -142,6 +145,9 @@ def test_files_go_where_they_are_waited_for_and_come_back_as_they_were(web: Web,
     over = browser.get(answer.headers["location"], headers={"hx-request": "true"})
     assert over.headers["hx-refresh"] == "true"
     assert "division by zero" in browser.get(answer.headers["location"]).text
+    german = browser.get(answer.headers["location"], headers={"accept-language": "de"}).text
+    assert "<h2>Wiedergabe</h2>" in german
+    assert "What went wrong" not in german
 
 
 @pytest.mark.parametrize("path", [f"{MINE}/open", f"{MINE}/open/try"])
@@ -153,8 +159,49 @@ def test_a_refusal_keeps_what_was_typed_as_it_was(web: Web, ada: Member, path: s
     assert "<script>alert" not in answer.text
     assert "\n\n\tprint(&#39;\u202e&#39;)  # &lt;/textarea&gt;&lt;script&gt;" in answer.text
     assert 'role="alert"' in answer.text
+    assert "robot.py was chosen as a file and typed as well" in answer.text
     empty = submit(browser, path)
     assert "Nothing was sent; choose a file, or paste a program." in empty.text
+
+
+@pytest.mark.parametrize(
+    ("files", "texts", "german"),
+    [
+        ([], [], "Es wurde nichts gesendet; wählen Sie eine Datei, oder fügen Sie ein Programm ein."),
+        ([("essay.pdf", b"%PDF")], [], "hat kein robot.py oder responder.py (gefunden: essay.pdf)"),
+        ([("robot.py", b"x" * (17 << 20))], [], "ist zu groß, erwartet waren höchstens 16 MB je Datei"),
+        (
+            [("robot.py", b" \n"), ("responder.py", RESPONDER.encode())],
+            [],
+            "robot.py ist leer, erwartet war ein Programm.",
+        ),
+        ([("robot.py", b"\x00"), ("responder.py", RESPONDER.encode())], [], "hat ein NUL-Zeichen in Zeile 1"),
+        ([("all.zip", b"PK\x03\x04 torn")], [], "ist kein lesbares Zip-Archiv"),
+        ([("robot.py", PROGRAM.encode())], [PROGRAM], "robot.py wurde als Datei gewählt und auch getippt"),
+        ([("robot.py", PROGRAM.encode())], [], "Es gibt kein responder.py: Fügen Sie es hinzu"),
+    ],
+)
+def test_a_german_page_refuses_in_german(
+    web: Web, ada: Member, files: list[tuple[str, bytes]], texts: list[str], german: str
+) -> None:
+    browser = web.browser(ada)
+    sent = [("files", file) for file in files]
+    answer = submit(browser, f"{MINE}/open", {"texts": texts}, files=sent or None, headers={"accept-language": "de"})
+    assert answer.status_code == 422
+    (told,) = re.findall(r'<p class="refused" role="alert">(.*?)</p>', answer.text, re.DOTALL)
+    assert german in told
+    assert "expected" not in told
+
+
+def test_a_part_that_is_missing_is_asked_for_once(web: Web, ada: Member) -> None:
+    browser = web.browser(ada)
+    answer = submit(browser, f"{MINE}/open", {"texts": [PROGRAM, ""]})
+    assert answer.status_code == 422
+    assert "There is no responder.py: add it" in answer.text
+    assert 'name="even_in_part"' in answer.text
+    assert 'name="even_in_part"' not in browser.get(f"{MINE}/open").text
+    again = submit(browser, f"{MINE}/open", {"texts": [PROGRAM, ""], "even_in_part": "true"})
+    assert again.status_code == 303
 
 
 def test_too_many_are_told_when_to_come_again(web: Web, ada: Member) -> None:
@@ -185,10 +232,14 @@ def test_no_marks_are_shown_that_are_not_published_and_none_that_are_for_staff(w
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
-    assert "attempt 2, allowed: 1" in shown
+    assert "all attempts were used" in shown
+    assert "Attempt 1 still counts." in shown
     assert "4 of 4 marks" not in shown
     assert "division by zero" not in shown
-    assert "4 of 4 marks" not in browser.get(MINE).text
+    card = browser.get(MINE).text
+    assert "4 of 4 marks" not in card
+    assert re.search(r"<b>Counts:</b> <a [^>]*>Attempt 1</a>: 2 of 8 marks", card)
+    assert "kept without marks: all attempts were used" in card
 
 
 def test_attempts_are_shown_with_how_the_marks_moved(web: Web, ada: Member) -> None:
@@ -204,6 +255,61 @@ def test_attempts_are_shown_with_how_the_marks_moved(web: Web, ada: Member) -> N
     _send(browser, "print(6)")
     assert "A newer one took its place." in browser.get(newer).text
     _grade(web)
+
+
+def test_the_attempt_that_counts_and_the_same_files_are_marked(web: Web, ada: Member) -> None:
+    browser = web.browser(ada)
+    for program, marks in (("print('high')", "3"), ("print('low')", "1"), ("print('high')", "3")):
+        last = _send(browser, program).headers["location"]
+        _grade(web, marks)
+    shown = browser.get(last).text
+    assert "the same files as attempt 1: no further attempt" in shown
+    rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", shown.partition("<h2>Your attempts</h2>")[2], re.DOTALL)
+    assert ["counts</span>" in row for row in rows] == [True, False, False]
+
+
+def test_a_limit_that_is_reached_is_named_and_invites_no_more(web: Web, ada: Member) -> None:
+    browser = web.browser(ada)
+    due = datetime.now(UTC) - timedelta(hours=9.5)
+    try:
+        with web.store.transaction() as session:
+            policies.set_policy(session, 1, "open", PolicyLimits(due, late_days=1, attempts=1))
+        late = _send(browser, "print('late')").headers["location"]
+        _grade(web)
+        shown = browser.get(late).text
+        assert "9 hours late" in shown
+        assert "submit again" not in shown
+        shown = browser.get(f"{MINE}/open").text
+        assert "Your attempts are used up" in shown
+        assert '<button class="second">Submit</button>' in shown
+        with web.store.transaction() as session:
+            policies.set_policy(session, 1, "open", PolicyLimits(due - timedelta(days=2), attempts=1))
+        first = web.browser(web.student("comes too late"))
+        assert "The last date has passed" in first.get(f"{MINE}/open").text
+        over = _send(first, "print('too late')").headers["location"]
+        _grade(web)
+        shown = first.get(over).text
+        assert "it came after the last date" in shown
+        assert "still counts" not in shown
+    finally:
+        with web.store.transaction() as session:
+            policies.set_policy(session, 1, "open", PolicyLimits())
+
+
+def test_cards_come_by_due_date_then_title(web: Web, ada: Member) -> None:
+    browser = web.browser(ada)
+    with web.store.transaction() as session:
+        for name in ("zebra", "soon", "apple"):
+            open_assignments.prepare(session, 1, freeze(_assignment(name)))
+            open_assignments.open_for_students(session, 1, name)
+        for name, days in (("zebra", 9), ("soon", 2), ("apple", 9)):
+            policies.set_policy(session, 1, name, PolicyLimits(datetime(2100, 1, days, tzinfo=UTC)))
+    try:
+        assert re.findall(r">About (\w+)</a>", browser.get(MINE).text) == ["soon", "apple", "zebra", "open"]
+    finally:
+        with web.store.transaction() as session:
+            for name in ("zebra", "soon", "apple"):
+                open_assignments.close(session, 1, name)
 
 
 def test_what_failed_by_our_fault_says_so_and_tells_no_more(web: Web, ada: Member) -> None:

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import select
 
 from command import robomark
-from service.store import credentials, people
+from service.store.people import credentials, people
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE

@@ -12,13 +12,15 @@ from sqlalchemy import select
 from starlette.exceptions import HTTPException
 
 from builders import PROGRAM, echo
-from service.store import credentials, intake, open_assignments
-from service.store.credentials import Identity
-from service.store.intake import Accepted
+from service.store.batches import intake
+from service.store.batches.intake import Accepted
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
 from service.store.models import Job, SubmissionRow
-from service.store.people import Member
+from service.store.people import credentials
+from service.store.people.credentials import Identity
+from service.store.people.people import Member
 from service.store.states import CredentialKind, Lane
-from service.store.versions import freeze
 from service.web.submitting import submit
 from sim.errors import UsageError
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, SentFile
@@ -57,7 +59,7 @@ def _identity(web: Web, member: Member) -> Identity:
 
 def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> Accepted:
     sent = [SentFile(name, BytesIO(data.encode() if isinstance(data, str) else data)) for name, data in files]
-    return submit(web.app.state.context, _identity(web, member), 1, echo().id, sent)
+    return submit(web.app.state.context, _identity(web, member), 1, echo().id, sent, even_in_part=False)
 
 
 def _zip(*entries: tuple[str, str]) -> bytes:
@@ -106,6 +108,9 @@ def test_a_submission_is_whose_session_it_is_whatever_its_files_say(web: Web, ad
         ((("notes.txt", "x"),), "notes.txt: has no robot.py"),
         ((*BOTH, ("a/robot.py", PROGRAM)), "has robot.py twice"),
         ((("robot.py", b"\0"),), "has a NUL character"),
+        ((("robot.py", " \n\t\n"), BOTH[1]), "robot.py is empty"),
+        ((BOTH[0], ("responder.py", "")), "responder.py is empty"),
+        ((BOTH[0],), "there is no responder.py"),
         ((("work.zip", b"PK\x03\x04 no archive"),), "is not a zip archive"),
         ((("work.zip", _zip(("../robot.py", PROGRAM))),), "leads outside"),
         ((("robot\r\nset-cookie: x.py", PROGRAM),), "has a file name that cannot be used"),
@@ -131,7 +136,7 @@ def test_only_what_is_open_takes_submissions(web: Web, ada: Member) -> None:
     with web.store.transaction() as session:
         open_assignments.open_for_students(session, 1, echo().id)
     with pytest.raises(HTTPException) as refused:
-        submit(web.app.state.context, _identity(web, ada), 1, "no-such", [])
+        submit(web.app.state.context, _identity(web, ada), 1, "no-such", [], even_in_part=False)
     assert refused.value.status_code == 404
 
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
-import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from threading import Event, Thread
+from threading import Thread
 
 import pytest
 
-from service.store import outbox, webhooks
+from service.outside import ALL_OTHERS, NO_OTHERS
+from service.store import outbox
 from service.store.engine import Store, now
 from service.store.models import Course
-from service.web import outside
-from service.web.outside import NotReached, is_public, post
+from service.store.people import webhooks
 from service.web.webhook_sender import send_due
 
 
@@ -66,7 +65,7 @@ def hooked(store: Store, url: str) -> str:
 
 def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint) -> None:
     secret = hooked(store, endpoint.url)
-    assert send_due(store, inside=True) == 1
+    assert send_due(store, ALL_OTHERS) == 1
     ((headers, body),) = endpoint.told
     assert headers["robomark-event"] == "grades.published"
     at, signed = (part.split("=")[1] for part in headers["robomark-signature"].split(","))
@@ -74,14 +73,14 @@ def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint)
     document = json.loads(body)
     assert document["id"] == headers["robomark-delivery"]
     assert (document["course"], document["data"]) == (1, {"batch": "b", "published": 3})
-    assert send_due(store, inside=True) == 0
+    assert send_due(store, ALL_OTHERS) == 0
 
 
 @pytest.mark.parametrize("status", [301, 307, 400, 500])
 def test_what_is_answered_otherwise_has_not_arrived(store: Store, endpoint: Endpoint, status: int) -> None:
     hooked(store, endpoint.url)
     endpoint.status, endpoint.headers = status, {"location": endpoint.url}
-    send_due(store, inside=True)
+    send_due(store, ALL_OTHERS)
     assert len(endpoint.told) == 1
     with store.reading() as session:
         (line,) = webhooks.deliveries(session, 1, 10, None)
@@ -91,72 +90,8 @@ def test_what_is_answered_otherwise_has_not_arrived(store: Store, endpoint: Endp
 
 def test_nothing_goes_inside_unless_the_operator_says_so(store: Store, endpoint: Endpoint) -> None:
     hooked(store, endpoint.url)
-    send_due(store, inside=False)
+    send_due(store, NO_OTHERS)
     assert endpoint.told == []
     with store.reading() as session:
         (line,) = webhooks.deliveries(session, 1, 10, None)
-    assert "no public address" in (line.error or "")
-
-
-def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    def resolve(*_: object, **__: object) -> list[tuple[object, ...]]:
-        return [(2, 1, 6, "", (address, 80)) for address in ("93.184.215.14", "10.0.0.1")]
-
-    monkeypatch.setattr(outside.socket, "getaddrinfo", resolve)
-    with pytest.raises(NotReached, match="no public address"):
-        post("http://two.example.org/", b"", {}, inside=False)
-
-
-@pytest.mark.parametrize(
-    ("address", "public"),
-    [
-        ("93.184.215.14", True),
-        ("2606:2800:21f:cb07:6820:80da:af6b:8b2c", True),
-        ("127.0.0.1", False),
-        ("0.0.0.0", False),
-        ("10.1.2.3", False),
-        ("172.16.0.1", False),
-        ("192.168.1.1", False),
-        ("169.254.169.254", False),
-        ("100.64.0.1", False),
-        ("224.0.0.1", False),
-        ("255.255.255.255", False),
-        ("::1", False),
-        ("::", False),
-        ("::ffff:127.0.0.1", False),
-        ("::ffff:93.184.215.14", True),
-        ("::127.0.0.1", False),
-        ("fe80::1%eth0", False),
-        ("fd00::1", False),
-        ("ff02::1", False),
-        ("64:ff9b::7f00:1", False),
-        ("2002:7f00:1::", False),
-    ],
-)
-def test_which_addresses_are_public(address: str, public: bool) -> None:
-    assert is_public(address) is public
-
-
-def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outside, "SECONDS", 0.3)
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        url = f"http://127.0.0.1:{listening.getsockname()[1]}/"
-
-        def answer() -> None:
-            connection, _ = listening.accept()
-            with connection:
-                try:
-                    for _ in range(100):
-                        connection.send(b"H")
-                        if ended.wait(0.05):
-                            return
-                except OSError:
-                    return
-
-        ended = Event()
-        thread = Thread(target=answer, daemon=True)
-        thread.start()
-        with pytest.raises(NotReached, match="did not answer"):
-            post(url, b"{}", {}, inside=True)
-        ended.set()
-        thread.join()
+    assert "no public address; ROBOMARK_WEBHOOKS_INSIDE" in (line.error or "")

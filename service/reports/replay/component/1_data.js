@@ -7,7 +7,7 @@ async function unpack(packed) {
   const bytes = Uint8Array.from(atob(packed), (character) => character.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const replay = JSON.parse(await new Response(stream).text());
-  if (replay.version !== VERSION) throw new Error(`its version is ${replay.version}, expected ${VERSION}`);
+  if (replay.version !== VERSION) throw new Error(say("version", { found: replay.version, expected: VERSION }));
   return replay;
 }
 

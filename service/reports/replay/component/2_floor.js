@@ -226,7 +226,7 @@ class FloorCanvas {
       if (!image || !isMisread(image) || t - image.t > lasting(speed)) continue;
       const [x, y] = this.place.at(...placed(image.pose, robot.body.left));
       const below = Math.max(8, image.side * this.place.scale) / 2 + 14;
-      this.bubble(`taken for ${image.answer ?? "nothing"}`, x, y + below, COLOURS.fault);
+      this.bubble(say("takenFor", { answer: image.answer ?? say("nothing") }), x, y + below, COLOURS.fault);
     }
   }
 
@@ -335,7 +335,8 @@ class FloorCanvas {
       this.drawLink(message, from, to, t);
     }
     if (this.trial.messages.length && !this.trial.beacon && this.trial.robots.length === 1) {
-      chip(this.context, "responder", width - 58, 20);
+      const sent = this.trial.messages.find((each) => each.from === this.trial.robots[0].name);
+      chip(this.context, worded("called", sent?.to ?? "responder"), width - 58, 20);
     }
     words ??= message ? null : printed; // what is printed to the other end is told as a message
     if (words) {
@@ -360,7 +361,7 @@ class FloorCanvas {
     if (lost) outlined(context, COLOURS.fault, 2.5, () => cross(context, x, y, 6));
     else dot(context, x, y, 5, COLOURS.left);
     const what = message.befell ? `${message.befell}: ${message.text}` : message.text;
-    this.bubble(`${message.from} → ${message.to}: ${what}`, from[0], from[1] + (from[1] < 80 ? 32 : -60),
+    this.bubble(`${wayWords(message)}: ${what}`, from[0], from[1] + (from[1] < 80 ? 32 : -60),
       lost ? COLOURS.fault : COLOURS.left);
   }
 

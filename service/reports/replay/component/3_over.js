@@ -10,7 +10,7 @@ function apart(trial, t) {
 
 function apartWords(trial, t) {
   const [far, turned] = apart(trial, t);
-  return `${Math.round(far)} mm and ${Math.round(turned)}° apart`;
+  return say("apart", { far: Math.round(far), turned: Math.round(turned) });
 }
 
 class OverChoice {
@@ -34,19 +34,19 @@ class OverChoice {
     this.trial = trial;
     this.root.hidden = !trial.over;
     if (!trial.over) return;
-    this.words.textContent = `Show ${trial.over.name} over it: ${trial.over.ended}`;
+    this.words.textContent = say("showOver", trial.over);
     const { parted } = trial.over;
-    if (parted === null) this.parted.textContent = "They go the same way.";
+    if (parted === null) this.parted.textContent = say("sameWay");
     else {
       this.parted.replaceChildren(
-        element("a", { href: momentHash(trial, parted) }, `Here they part: ${seconds(parted)}`));
+        element("a", { href: momentHash(trial, parted) }, say("part", { seconds: seconds(parted) })));
     }
     this.now.hidden = !this.box.checked;
   }
 
   draw(t) {
     if (!this.of(this.trial)) return;
-    const words = `Now ${apartWords(this.trial, t)}.`;
+    const words = say("now", { apart: apartWords(this.trial, t) });
     if (this.now.textContent !== words) this.now.textContent = words;
   }
 }

@@ -133,11 +133,14 @@ function label(context, text, x, y, colour) {
 }
 
 function chip(context, text, x, y) {
+  context.font = `bold 12px ${FONT}`;
+  const half = Math.max(48, context.measureText(text).width / 2 + 8);
+  const middle = Math.min(x, context.canvas.clientWidth - half - 10);
   context.beginPath();
-  context.roundRect(x - 48, y - 12, 96, 24, 12);
+  context.roundRect(middle - half, y - 12, 2 * half, 24, 12);
   context.fillStyle = COLOURS.left;
   context.fill();
-  written(context, text, x, y, COLOURS.paper, "bold 12px");
+  written(context, text, middle, y, COLOURS.paper, "bold 12px");
 }
 
 function shortened(context, text, width) {

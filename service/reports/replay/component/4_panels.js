@@ -3,11 +3,6 @@
 const RECENT = 7;
 const MOST_ROWS = 1500;
 const WIDE = matchMedia("(min-width: 48rem)"); // as in replay.css: on a phone the numbers are folded
-const NAMES = {
-  left_rgb: "Left light", right_rgb: "Right light", ultrasonic: "Ultrasonic", gyro: "Gyro",
-  left_position: "Left wheel", right_position: "Right wheel",
-};
-const SHORT_UNITS = { "encoder degrees": "°", degrees: "°", "degrees, clockwise": "° clockwise" };
 
 // An element with these properties and children; texts become text, never markup.
 function element(tag, properties = {}, ...children) {
@@ -37,8 +32,8 @@ class SensorPanel {
   constructor() {
     this.eyes = {};
     const eyes = element("div", { className: "eyes" });
-    for (const [key, title] of [["left", "Left light"], ["right", "Right light"], ["sentLeft", "Sent, left"],
-      ["sentRight", "Sent, right"]]) {
+    for (const [key, title] of [["left", worded("readings", "left_rgb")], ["right", worded("readings", "right_rgb")],
+      ["sentLeft", say("sentLeft")], ["sentRight", say("sentRight")]]) {
       const canvas = element("canvas", { width: 120, height: 120, role: "img", "aria-label": title });
       const figure = element("figure", {}, canvas, element("figcaption", {}, title));
       this.eyes[key] = { canvas, figure };
@@ -47,8 +42,8 @@ class SensorPanel {
     this.sent = element("p", { className: "sent small" });
     this.readings = element("dl", { className: "readings" });
     const readings = element("details", { className: "all-readings", open: WIDE.matches },
-      element("summary", {}, "Readings"), this.readings);
-    this.root = element("section", { className: "sensors" }, element("h3", {}, "What it senses"), eyes, this.sent, readings);
+      element("summary", {}, say("readings")), this.readings);
+    this.root = element("section", { className: "sensors" }, element("h3", {}, say("senses")), eyes, this.sent, readings);
   }
 
   show(trial) {
@@ -64,7 +59,7 @@ class SensorPanel {
       if (["x", "y", "heading"].includes(name)) continue;
       const value = element("dd");
       this.cells.set(name, value);
-      this.readings.append(element("dt", {}, name === "place" ? "Robot" : NAMES[name] ?? name.replaceAll("_", " ")), value);
+      this.readings.append(element("dt", {}, name === "place" ? say("robot") : worded("readings", name).replaceAll("_", " ")), value);
     }
   }
 
@@ -108,14 +103,14 @@ class SensorPanel {
     this.lastSent = latest;
     drawPixels(this.eyes.sentLeft.canvas, latest && latest.left, latest && latest.side);
     drawPixels(this.eyes.sentRight.canvas, latest && latest.right, latest && latest.side);
-    this.sent.textContent = latest ? sentWords(latest) : "No image is sent yet.";
+    this.sent.textContent = latest ? sentWords(latest) : say("noImage");
     this.sent.classList.toggle("wrong", Boolean(latest) && isMisread(latest));
   }
 }
 
 function placeWords([x, y, heading]) {
   const tenths = ((Math.round(heading * 10) % 3600) + 3600) % 3600;
-  return `x ${x.toFixed(1)}, y ${y.toFixed(1)} mm, heading ${(tenths / 10).toFixed(1)}°`;
+  return say("place", { x: x.toFixed(1), y: y.toFixed(1), heading: (tenths / 10).toFixed(1) });
 }
 
 function readingWords(robot, name, ticks) {
@@ -123,15 +118,14 @@ function readingWords(robot, name, ticks) {
   if (!values.length) return "–";
   if (values.length === 3) return values.map((value, part) => `${"RGB"[part]} ${Math.round(value)}`).join("  ");
   const unit = robot.units[name];
-  const short = SHORT_UNITS[unit] ?? ` ${unit}`;
-  return `${values.map((value) => value.toFixed(unit === "mm" ? 0 : 1)).join(", ")}${short}`;
+  return `${values.map((value) => value.toFixed(unit === "mm" ? 0 : 1)).join(", ")}${WORDS.units[unit] ?? ` ${unit}`}`;
 }
 
 function sentWords(image) {
-  const sent = `Sent at ${seconds(image.t)}`;
-  if (image.truth === undefined) return `${sent}.`;
-  if (!isMisread(image)) return `${sent}: ${image.truth}, and so it was named.`;
-  return `${sent}: ${image.truth}, ${image.answer === null ? "not named" : `taken for ${image.answer}`}.`;
+  const parts = { ...image, seconds: seconds(image.t) };
+  if (image.truth === undefined) return say("sent", parts);
+  if (!isMisread(image)) return say("named", parts);
+  return say(image.answer === null ? "notNamed" : "taken", parts);
 }
 
 function drawPixels(canvas, told, side) {
@@ -159,24 +153,32 @@ function happenedOver(over) {
 // The words for one thing that happened: who, what, and what came of it at the other end.
 function happenedWords(item) {
   const whose = item.whose ? `${item.whose}: ` : "";
+  const [kind, wrong] = [worded("kinds", item.kind), isWrong(item)];
   if (item.kind !== "message") {
-    return { who: whose + item.who, kind: item.kind, text: item.text, outcome: "", wrong: isWrong(item) };
+    return { who: whose + worded("called", item.who), kind, text: item.text, outcome: "", wrong };
   }
-  const got = item.arrived_as === undefined ? "" : `, as ${item.arrived_as}`;
-  const befell = item.befell ? `${item.befell}; ` : "";
-  const outcome = item.arrived === null ? `${item.befell ?? "not answered"}: never arrived`
-    : `${befell}arrived ${seconds(item.arrived)}${got}`;
-  return { who: `${whose}${item.from} → ${item.to}`, kind: "message", text: item.text, outcome, wrong: isWrong(item) };
+  return { who: whose + wayWords(item), kind, text: item.text, outcome: outcomeWords(item), wrong };
+}
+
+function wayWords(message) {
+  return `${worded("called", message.from)} → ${worded("called", message.to)}`;
+}
+
+function outcomeWords(message) {
+  if (message.arrived === null) return say("neverArrived", { befell: message.befell ?? say("notAnswered") });
+  const befell = message.befell ? `${message.befell}; ` : "";
+  const arrived = befell + say("arrived", { seconds: seconds(message.arrived) });
+  return message.arrived_as === undefined ? arrived : say("arrivedAs", { arrived, text: message.arrived_as });
 }
 
 function isWrong(item) {
-  return ["fault", "touched"].includes(item.kind) || (item.kind === "message" && (item.arrived === null || Boolean(item.befell)));
+  return ["fault", "touched", "lost"].includes(item.kind) || (item.kind === "message" && (item.arrived === null || Boolean(item.befell)));
 }
 
 class HappenedPanel {
   constructor() {
     this.list = element("ol", { className: "happened" });
-    this.root = element("section", { className: "now" }, element("h3", {}, "What happens"), this.list);
+    this.root = element("section", { className: "now" }, element("h3", {}, say("happens")), this.list);
   }
 
   show(trial, over) {
@@ -192,7 +194,7 @@ class HappenedPanel {
     const recent = [...this.trial.happened.slice(Math.max(0, count - RECENT), count),
       ...this.happenedOver.slice(Math.max(0, countOver - RECENT), countOver)].sort((a, b) => a.t - b.t).reverse();
     this.list.replaceChildren(...recent.map((item) => this.row(item)));
-    if (!recent.length) this.list.append(element("li", { className: "soft" }, "Nothing yet."));
+    if (!recent.length) this.list.append(element("li", { className: "soft" }, say("nothingYet")));
   }
 
   row(item) {
@@ -209,15 +211,15 @@ class HappenedPanel {
 class SourcePanel {
   constructor(sources) {
     this.sources = sources;
-    this.choice = element("select", { "aria-label": "Source" },
+    this.choice = element("select", { "aria-label": say("source") },
       ...sources.map((source, index) => element("option", { value: index }, source.name)));
     this.choice.addEventListener("change", () => this.open(Number(this.choice.value)));
     this.lines = element("ol");
-    this.window = element("div", { className: "lines", tabIndex: 0, role: "region", "aria-label": "Lines of the source" },
+    this.window = element("div", { className: "lines", tabIndex: 0, role: "region", "aria-label": say("linesOfSource") },
       this.lines);
     this.known = element("p", { className: "small soft" });
     this.root = element("section", { className: "source", hidden: !sources.length },
-      element("div", { className: "source-head" }, element("h3", {}, "Source"), this.choice), this.window, this.known);
+      element("div", { className: "source-head" }, element("h3", {}, say("source")), this.choice), this.window, this.known);
     this.choice.hidden = sources.length < 2;
   }
 
@@ -232,7 +234,7 @@ class SourcePanel {
     this.opened = index;
     this.choice.value = String(index);
     this.lines.replaceChildren(...lines.map((line) => element("li", {}, line || " ")));
-    if (more) this.lines.append(element("li", { className: "soft" }, `… ${more} more lines`));
+    if (more) this.lines.append(element("li", { className: "soft" }, say("moreLines", { count: more })));
   }
 
   // The line of the latest thing that is known to have come from one.
@@ -245,8 +247,8 @@ class SourcePanel {
     if (latest === this.at) return;
     this.at = latest;
     this.lines.querySelector("[aria-current]")?.removeAttribute("aria-current");
-    this.known.textContent = latest ? `Line ${latest.line[1]} at ${seconds(latest.t)}.`
-      : "A line is marked when it has written something that no other line can have written, or has failed.";
+    this.known.textContent = latest ? say("line", { number: latest.line[1], seconds: seconds(latest.t) })
+      : say("lineUnknown");
     if (!latest) return;
     const [source, line] = latest.line;
     if (source !== this.opened) this.open(source);
@@ -262,8 +264,8 @@ class EventTable {
   constructor() {
     this.body = element("tbody");
     this.more = element("p", { className: "small soft" });
-    const head = ["Time", "Who", "What", "Text", "What came of it"].map((title) => element("th", { scope: "col" }, title));
-    this.root = element("details", { className: "events" }, element("summary", {}, "All that happened, as a table"),
+    const head = ["time", "who", "what", "text", "cameOfIt"].map((title) => element("th", { scope: "col" }, say(title)));
+    this.root = element("details", { className: "events" }, element("summary", {}, say("allAsTable")),
       element("div", { className: "scroll" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), this.body)),
       this.more);
     this.root.addEventListener("toggle", () => this.fill());
@@ -277,7 +279,7 @@ class EventTable {
   fill() {
     if (!this.root.open || this.filled) return;
     this.filled = true;
-    const lost = this.trial.lost.map((loss) => ({ ...loss, who: loss.title, kind: "marks lost" }));
+    const lost = this.trial.lost.map((loss) => ({ ...loss, who: loss.title, kind: "lost" }));
     const images = this.trial.robots.flatMap((robot) =>
       robot.images.map((image) => ({ t: image.t, who: robot.name, kind: "image", text: sentWords(image) })));
     const others = this.over ? happenedOver(this.over) : [];
@@ -285,12 +287,12 @@ class EventTable {
     this.body.replaceChildren(...all.slice(0, MOST_ROWS).map((item) => {
       const { who, kind, text, outcome, wrong } = happenedWords(item);
       const place = item.pose ? placeWords(item.pose) : outcome;
-      const states = [wrong || kind === "marks lost" ? "wrong" : "", item.whose ? "of-over" : ""];
+      const states = [wrong ? "wrong" : "", item.whose ? "of-over" : ""];
       return element("tr", { className: states.join(" ").trim() },
         element("td", { className: "number" }, momentLink(this.trial, item.t)),
         ...[who, kind, text, place].map((cell) => element("td", {}, cell)));
     }));
     const missing = Math.max(0, all.length - MOST_ROWS) + this.trial.left_out + (this.over?.left_out ?? 0);
-    this.more.textContent = missing ? `${missing.toLocaleString("en")} more are not shown.` : "";
+    this.more.textContent = missing ? say("moreRows", { count: whole(missing) }) : "";
   }
 }

@@ -1,10 +1,11 @@
 // The controls: one slider over one trial, by mouse, touch, keyboard and links; and how a page starts it.
 
 const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
-const VIEWS = [["path", "Where it drove"], ["floor", "Whole floor"], ["near", "Near the robot"]];
+const VIEWS = [["path", "path"], ["floor", "whole"], ["near", "near"]]; // each with the name of its words
 const STEPS = { ArrowLeft: -0.1, ArrowRight: 0.1, ArrowDown: -1, ArrowUp: 1, PageDown: -10, PageUp: 10 };
 const REDUCED = window.matchMedia("(prefers-reduced-motion: reduce)");
 const REDUCED_STEP = 500; // ms from one still to the next
+const COPIED_FOR = 2000; // ms for which a link says that it was copied
 
 class ReplayControls {
   constructor(replay, root) {
@@ -29,32 +30,31 @@ class ReplayControls {
       const select = element("select", {}, ...options.map(([value, text]) => element("option", { value }, text)));
       return [select, element("label", {}, element("span", {}, label), select)];
     };
-    const [trial, trialLabel] = choice("Trial", this.trials.map((each) => [each.trial, `${each.name}: ${each.ended}`]));
-    const [view, viewLabel] = choice("View", VIEWS);
-    const [speed, speedLabel] = choice("Speed", SPEEDS);
+    const [trial, trialLabel] = choice(say("trial"), this.trials.map((each) => [each.trial, `${each.name}: ${each.ended}`]));
+    const [view, viewLabel] = choice(say("view"), VIEWS.map(([value, words]) => [value, say(words)]));
+    const [speed, speedLabel] = choice(say("speed"), SPEEDS);
     speed.value = "1";
     Object.assign(this, { trialChoice: trial, viewChoice: view, speedChoice: speed });
     trialLabel.hidden = this.trials.length < 2;
     trialLabel.className = "trial-choice";
     this.canvas = element("canvas", { className: "floor", role: "img",
-      "aria-label": "The floor with the robot. The table below tells what happened in words." });
+      "aria-label": say("floor") });
     this.floor = new FloorCanvas(this.canvas);
-    this.play = element("button", { type: "button", className: "play" }, "Play");
-    this.slider = element("input", { type: "range", min: 0, step: "any", className: "moment", "aria-label": "Moment" });
+    this.play = element("button", { type: "button", className: "play" }, say("play"));
+    this.slider = element("input", { type: "range", min: 0, step: "any", className: "moment", "aria-label": say("moment") });
     this.clock = element("span", { className: "clock" });
-    this.link = element("a", { className: "small" }, "Link to this moment");
+    this.link = element("a", { className: "small" }, say("link"));
     this.losses = element("ol", { className: "losses" });
-    const keys = "Space plays; arrows step by 0.1 and 1 s, page keys by 10 s; Home and End go to the ends.";
     const main = element("div", { className: "main-part" }, this.canvas,
       element("div", { className: "controls" }, this.play, this.slider, this.clock),
       element("div", { className: "choices" }, speedLabel, viewLabel, this.link),
-      element("p", { className: "small soft keys" }, keys), this.losses, sensors.root);
+      element("p", { className: "small soft keys" }, say("keys")), this.losses, sensors.root);
     this.root.replaceChildren(trialLabel, this.overChoice.root, element("div", { className: "columns" }, main,
       element("div", { className: "panels" }, ...beside.map((panel) => panel.root))), this.table.root);
     const missing = this.replay.of - this.trials.length;
     if (missing) {
       this.root.append(element("p", { className: "small soft" },
-        `Of ${this.replay.of} trials, ${missing} are left out of this file.`));
+        say("leftOut", { all: this.replay.of, missing })));
     }
   }
 
@@ -66,6 +66,7 @@ class ReplayControls {
       this.floor.mode = this.viewChoice.value;
       this.draw();
     });
+    this.link.addEventListener("click", () => this.copyLink().catch(() => {}));
     this.trialChoice.addEventListener("change", () => this.open(this.byNumber(this.trialChoice.value), 0));
     this.root.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -87,7 +88,7 @@ class ReplayControls {
     const over = this.layOver();
     for (const panel of [...this.panels, this.table]) panel.show(trial, over);
     this.losses.replaceChildren(...trial.lost.map((loss) =>
-      element("li", {}, element("b", {}, loss.title), ` (${loss.marks}), lost at `, momentLink(trial, loss.t),
+      element("li", {}, element("b", {}, loss.title), ` (${loss.marks}), ${say("lostAt")} `, momentLink(trial, loss.t),
         element("p", { className: "small" }, loss.text))));
     this.seek(t);
   }
@@ -149,7 +150,7 @@ class ReplayControls {
   start() {
     if (this.t >= this.seconds - ALMOST) this.seek(0);
     this.playing = true;
-    this.play.textContent = "Pause";
+    this.play.textContent = say("pause");
     let last = performance.now();
     const frame = (now) => {
       if (!this.playing) return;
@@ -165,28 +166,40 @@ class ReplayControls {
 
   pause() {
     this.playing = false;
-    this.play.textContent = "Play";
+    this.play.textContent = say("play");
     this.tell();
   }
 
   draw() {
     this.slider.value = String(this.t);
-    this.clock.textContent = `${this.t.toFixed(2)} of ${seconds(this.seconds)}`;
+    this.clock.textContent = this.clockWords();
     this.floor.draw(this.t, this.speed);
     for (const panel of this.panels) panel.draw(this.t);
+    this.link.href = momentHash(this.trial, this.t);
     if (!this.playing) this.tell();
   }
 
-  // What a screen reader says of the moment, and the link to it.
+  // What a screen reader says of the moment.
   tell() {
     const place = placeWords(this.trial.robots[0].pose(this.trial.ticks(this.t)));
     const count = this.trial.count(this.t);
     const latest = count ? happenedWords(this.trial.happened[count - 1]) : null;
-    const said = latest ? `; last, ${latest.who} ${latest.kind}: ${latest.text.slice(0, 80)}` : "";
+    const said = latest ? `; ${say("last", { ...latest, text: latest.text.slice(0, 80) })}` : "";
     const over = this.overChoice.of(this.trial);
     const far = over ? `; ${over.name} ${apartWords(this.trial, this.t)}` : "";
-    this.slider.setAttribute("aria-valuetext", `${this.t.toFixed(2)} of ${seconds(this.seconds)}; ${place}${far}${said}`);
-    this.link.href = momentHash(this.trial, this.t);
+    this.slider.setAttribute("aria-valuetext", `${this.clockWords()}; ${place}${far}${said}`);
+  }
+
+  // Where it may be copied it is; else it stands in the address.
+  async copyLink() {
+    if (!navigator.clipboard) return;
+    await navigator.clipboard.writeText(this.link.href);
+    this.link.textContent = say("copied");
+    setTimeout(() => { this.link.textContent = say("link"); }, COPIED_FOR);
+  }
+
+  clockWords() {
+    return say("of", { seconds: this.t.toFixed(2), all: seconds(this.seconds) });
   }
 }
 
@@ -198,7 +211,7 @@ async function startReplay(section) {
     if (replay.trials.length) new ReplayControls(replay, root);
     section.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
-    root.replaceChildren(element("p", {}, `The replay cannot be shown by this browser: ${error.message}`));
+    root.replaceChildren(element("p", {}, say("cannotBeShown", { error: error.message })));
   }
 }
 

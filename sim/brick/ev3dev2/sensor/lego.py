@@ -50,7 +50,7 @@ class ColorSensor(Sensor):
     _kind = "color"
 
     def _means(self, times: int = 1) -> list[float]:
-        means: list[float] = self._read("left" if self.address == "in2" else "right", times)
+        means: list[float] = link.read("left" if self.address == "in2" else "right", times)
         return means
 
     @property

@@ -1,0 +1,77 @@
+"""What a worker and all its processes cost until it has claimed its first job, in CPU: asked first, and spared.
+
+It is asked for the known answer where this build has not given it on this machine, and soon after where it has.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.graded_store import short_request
+from benchmarks.harness.process_tree import descendants
+from benchmarks.measurement import SECONDS, Measurement, median
+from service.queue.broker import EmbeddedBroker
+from service.queue.celery_app import make_celery
+from service.queue.notifier import Notifier
+from service.queue.supervised import SupervisedWorker
+from service.settings import load_settings
+from service.store.batches import intake
+from service.store.engine import Store, open_store
+from service.store.models import Job
+from service.store.states import Lane
+
+_PATIENCE = 120.0
+_LOOK_SECONDS = 0.02
+_TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def measure(times: int) -> list[Measurement]:
+    """Two workers, one after the other, in each new home."""
+    asked, spared = zip(*(_two() for _ in range(times)), strict=True)
+    what = "a worker's start until it claims, all its processes, CPU"
+    return [
+        Measurement(f"{what}, known answer cached", median(spared), SECONDS, 2),
+        Measurement(f"{what}, asked for the known answer", median(asked), SECONDS, 5),
+    ]
+
+
+def _two() -> tuple[float, float]:
+    with tempfile.TemporaryDirectory() as folder:
+        settings = load_settings(home=Path(folder))
+        with open_store(settings) as store, EmbeddedBroker(settings) as broker:
+            notifier = Notifier(make_celery(broker.settings), store, broker.settings)
+            return _cpu_until_claim(store, notifier, "first"), _cpu_until_claim(store, notifier, "second")
+
+
+def _cpu_until_claim(store: Store, notifier: Notifier, student: str) -> float:
+    job = intake.accept(store, short_request(student), max_attempts=3).job_id
+    notifier.grade(Lane.INTERACTIVE)
+    worker = SupervisedWorker(notifier.settings, store, notifier.settings.home / "log" / "worker.log")
+    until = time.monotonic() + _PATIENCE
+    worker.ensure()
+    try:
+        while not _claimed(store, job):
+            if time.monotonic() > until:
+                raise RuntimeError("the worker claims nothing")
+            time.sleep(_LOOK_SECONDS)
+        assert worker.process.pid is not None
+        return sum(map(_cpu_seconds, (worker.process.pid, *descendants(worker.process.pid))))
+    finally:
+        worker.stop(15)
+
+
+def _claimed(store: Store, job: str) -> bool:
+    with store.reading() as session:
+        return session.get_one(Job, job).started_at is not None
+
+
+def _cpu_seconds(pid: int) -> float:
+    """Of the process, and of those below it that it has seen end."""
+    try:
+        words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    return sum(map(int, words[11:15])) / _TICKS

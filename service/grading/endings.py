@@ -1,0 +1,27 @@
+"""How a trial ended, in the few words that fit a table; what is said of it in sentences is ``reports.words``'."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from service.language import translatable
+from sim.recording import Verdict
+
+#: Every verdict has some.
+ENDED: Mapping[Verdict, str] = MappingProxyType(
+    {
+        Verdict.FINISHED: translatable("finished"),
+        Verdict.PROGRAM_ERROR: translatable("error in the robot program"),
+        Verdict.RESPONDER_ERROR: translatable("error in the responder"),
+        Verdict.PROTOCOL_ERROR: translatable("answer could not be read"),
+        Verdict.TIME_LIMIT: translatable("still running at the end"),
+        Verdict.CPU_LIMIT: translatable("computed for too long"),
+        Verdict.MEMORY_LIMIT: translatable("used too much memory"),
+        Verdict.OUTPUT_LIMIT: translatable("printed too much"),
+        Verdict.STALLED: translatable("stopped responding"),
+        Verdict.SANDBOX_VIOLATION: translatable("did something not allowed"),
+        Verdict.ASSIGNMENT_ERROR: translatable("assignment is broken"),
+        Verdict.HOST_ERROR: translatable("grading failed"),
+    }
+)

@@ -1,0 +1,168 @@
+"""Asks addresses of the network, without letting them reach what only this machine or its network can.
+
+Who asks says which networks it may reach besides the internet at large; what an answer means is for them to say.
+A name is resolved once, all that it resolves to is looked at, and what was looked at is what is connected to.
+"""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import ssl
+from collections.abc import Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from threading import Timer
+from urllib.parse import urlsplit
+
+from sim.errors import RobomarkError
+
+#: For the whole of it, from the connection to the end of what is read.
+SECONDS = 10.0
+_MOST_RESOLVED = 20
+Networks = Sequence[IPv4Network | IPv6Network]
+#: What may be reached besides public addresses.
+NO_OTHERS: Networks = ()
+ALL_OTHERS: Networks = (ip_network("0.0.0.0/0"), ip_network("::/0"))
+
+
+class NotReached(RobomarkError):
+    """An address that may not be asked, or did not answer."""
+
+
+class NotPublic(NotReached):
+    """An address in a network that may not be reached."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutsideAnswer:
+    """What was answered: its body as far as it was asked for, and a byte more where there is more."""
+
+    status: int
+    headers: Mapping[str, str]  # by name in small letters
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    scheme: str
+    host: str
+    port: int
+    path: str
+
+
+def ask(
+    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], others: Networks, most_bytes: int = 0
+) -> OutsideAnswer:
+    """What an address answers; no redirection is followed.
+
+    ``others`` are the networks that it may be in besides the internet at large. Raises NotReached.
+    """
+    target = _target(url)
+    addresses = _addresses(target, others)
+    try:
+        sock = _connected(target, addresses)
+        # Each read has its own bound; whoever answers a byte at a time is cut off by this one.
+        ending = Timer(SECONDS, _shut, [sock])
+        ending.daemon = True
+        ending.start()
+        with (
+            closing(sock),
+            closing(http.client.HTTPConnection(target.host, target.port, timeout=SECONDS)) as connection,
+        ):
+            try:
+                answer = _asked(connection, sock, target, method, body, headers, most_bytes)
+            finally:
+                # Set by now, if it has rung: what was read then is not whole.
+                late = ending.finished.is_set()
+                ending.cancel()
+    except (OSError, http.client.HTTPException, ValueError) as error:
+        raise NotReached(f"{target.host} did not answer: {type(error).__name__}") from None
+    if late:
+        raise NotReached(f"{target.host} did not answer within {SECONDS:g} seconds")
+    return answer
+
+
+def _asked(
+    connection: http.client.HTTPConnection,
+    sock: socket.socket,
+    target: _Target,
+    method: str,
+    body: bytes | None,
+    headers: Mapping[str, str],
+    most_bytes: int,
+) -> OutsideAnswer:
+    if isinstance(sock, ssl.SSLSocket):
+        sock.do_handshake()
+    connection.sock = sock
+    host = f"[{target.host}]" if ":" in target.host else target.host
+    usual = {"https": 443, "http": 80}[target.scheme]
+    named = host if target.port == usual else f"{host}:{target.port}"
+    connection.request(method, target.path, body, {"Host": named, "Connection": "close", **headers})
+    answer = connection.getresponse()
+    told = {name.lower(): value for name, value in answer.getheaders()}
+    return OutsideAnswer(answer.status, told, answer.read(most_bytes + 1) if most_bytes else b"")
+
+
+def _target(url: str) -> _Target:
+    try:
+        parts = urlsplit(url)
+        port = parts.port or (443 if parts.scheme == "https" else 80)
+    except ValueError:
+        raise NotReached("the address is none") from None
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise NotReached("the address is neither http nor https")
+    path = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"
+    return _Target(parts.scheme, parts.hostname, port, path)
+
+
+def _addresses(target: _Target, others: Networks) -> list[str]:
+    """Where to connect to. Raises NotPublic where any of the addresses is neither public nor in ``others``."""
+    try:
+        found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_RESOLVED]
+    except (OSError, UnicodeError):
+        raise NotReached(f"{target.host} cannot be found") from None
+    addresses = [str(each[4][0]) for each in found]
+    if not addresses or not all(is_public(each) or _is_in(each, others) for each in addresses):
+        raise NotPublic(f"{target.host} is no public address")
+    return addresses
+
+
+def _connected(target: _Target, addresses: Sequence[str]) -> socket.socket:
+    """To the first that can be connected to, with TLS still to begin. Raises OSError."""
+    for place, address in enumerate(addresses, start=1):
+        try:
+            plain = socket.create_connection((address, target.port), timeout=SECONDS / len(addresses))
+            break
+        except OSError:
+            if place == len(addresses):
+                raise
+    plain.settimeout(SECONDS)
+    if target.scheme == "http":
+        return plain
+    context = ssl.create_default_context()
+    return context.wrap_socket(plain, server_hostname=target.host, do_handshake_on_connect=False)
+
+
+def _is_in(address: str, networks: Networks) -> bool:
+    found = ip_address(address.partition("%")[0])
+    return any(found in network for network in networks)
+
+
+def is_public(address: str) -> bool:
+    """Whether an address belongs to the internet at large, and leads to none that does not."""
+    found = ip_address(address.partition("%")[0])
+    if isinstance(found, IPv6Address):
+        # What carries an address of the older kind is as public as that; translators take what nobody checked.
+        carried = found.ipv4_mapped or found.sixtofour or (found.teredo and found.teredo[1])
+        if carried:
+            return is_public(str(carried))
+        if found.packed[:4] == bytes.fromhex("0064ff9b") or found.packed[:12] == bytes(12):
+            return False
+    return found.is_global and not (found.is_multicast or found.is_reserved)
+
+
+def _shut(sock: socket.socket) -> None:
+    with suppress(OSError):
+        sock.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,77 @@
+"""Where images were taken along a track, and which trials have one. Draws nothing.
+
+What is right was decided when the work was marked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from service.grading.grade import Prediction, TrialResult
+from service.grading.judging.geometry import part_at
+from service.reports.plots.sensor_images import is_right
+from sim.recording import Recording
+
+_LEAST_WAY = 60.0  # mm that images must be apart for a track
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One image: where the left sensor was (mm), how far the robot had driven (mm), and what came of it."""
+
+    x: float
+    y: float
+    way: float
+    heading: float  # degrees
+    right: bool
+    answered: bool
+
+
+def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
+    """The trials, by index, in which images were taken at places far enough apart to speak of a track."""
+    found = []
+    for index in dict.fromkeys(prediction.trial for prediction in predictions):
+        places = [part_at(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
+        if len(places) > 2 and max(math.dist(places[0], place) for place in places) >= _LEAST_WAY:
+            found.append(index)
+    return tuple(found)
+
+
+def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
+    """The images of one trial, in the order in which they were sent."""
+    recording = trials[index].recording
+    way = _way_driven(recording)
+    return tuple(
+        Taken(
+            *part_at(recording, "left", prediction.image.pose),
+            way[min(max(prediction.image.tick, 0), len(way) - 1)],
+            prediction.image.pose.heading,
+            is_right(prediction),
+            prediction.answer is not None,
+        )
+        for prediction in predictions
+        if prediction.trial == index
+    )
+
+
+def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> int:
+    """Of the trials with a track the one with the smallest share of right images, the first of equals."""
+
+    def share_right(index: int) -> float:
+        own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
+        return sum(own) / len(own)
+
+    return min(tracks(predictions, trials), key=share_right)
+
+
+def _way_driven(recording: Recording) -> list[float]:
+    """How far the middle of the axle has gone at the start and after each tick, mm."""
+    points = [(recording.start.x, recording.start.y), *zip(recording.ticks.x, recording.ticks.y, strict=True)]
+    way = [0.0]
+    for before, after in pairwise(points):
+        step = math.dist(before, after)
+        way.append(way[-1] + (step if math.isfinite(step) else 0.0))
+    return way

@@ -1,0 +1,1 @@
+"""What is submitted together: taking in, looking at, publishing and grading again."""

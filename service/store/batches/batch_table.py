@@ -1,0 +1,223 @@
+"""The table of a batch: a short row for each submission and each refusal, filtered, sorted and cut into pages.
+
+Only reads, and of each job only what a row shows; all that is known of one job is in ``batches.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from decimal import Decimal
+from types import MappingProxyType
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from service.store.batches.batches import standing_in
+from service.store.courses.hidden_names import HiddenNames
+from service.store.grades import overrides
+from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
+from service.store.states import JobState
+from submissions.people import Refusal
+
+REFUSED = "refused"
+ROWS_A_PAGE = 100
+#: What rows can be asked for by.
+STATES = (*(state.value for state in JobState), REFUSED)
+
+
+@dataclass(frozen=True, slots=True)
+class TableLine:
+    """One row. Of what was refused there is no job, so that ``id`` is empty and ``error`` says why."""
+
+    id: str
+    submission_id: int
+    student: str
+    name: str
+    source: str
+    assignment: str
+    state: str
+    verdict: str | None
+    marks: Decimal | None
+    max_marks: Decimal
+    error: str
+    suspect: str | None
+    staff_only: str | None
+    days_late: int
+    attempt: int
+    sha256: str
+    seconds: float | None  # from its begin to its marks, where it was run
+    published_at: datetime | None
+
+    @property
+    def share(self) -> Decimal:
+        """What it got of its marks; less than nothing where it has none, so that it comes last."""
+        return Decimal(-1) if self.marks is None or not self.max_marks else self.marks / self.max_marks
+
+
+@dataclass(frozen=True, slots=True)
+class TableAsked:
+    """What of a table is wanted: rows in a state (all, if empty), with a text in them, sorted, and which page."""
+
+    state: str = ""
+    text: str = ""
+    sort: str = "student"
+    descending: bool = False
+    page: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class TablePage:
+    """Some rows of all that were found, and which page that is of how many."""
+
+    lines: tuple[TableLine, ...]
+    found: int
+    page: int
+    pages: int
+
+
+@dataclass(frozen=True, slots=True)
+class Remarked:
+    """What else there is to be looked at: criteria that could not be judged, trials that our own code stumbled in."""
+
+    unjudged: int = 0
+    surprises: int = 0
+
+
+def _by_student(line: TableLine) -> tuple[Any, ...]:
+    return (line.student.casefold(), line.assignment, line.id)
+
+
+#: How rows are sorted, by the word that asks for it.
+SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
+    {
+        "student": _by_student,
+        "name": lambda line: line.name.casefold(),
+        "assignment": lambda line: line.assignment,
+        "marks": lambda line: line.share,
+        "state": lambda line: (STATES.index(line.state), line.verdict or ""),
+        "seconds": lambda line: -1.0 if line.seconds is None else line.seconds,
+    }
+)
+
+
+def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hidden: HiddenNames) -> list[TableLine]:
+    """All rows of a batch, by student."""
+    query = (
+        select(
+            Job.id,
+            Job.submission_id,
+            Enrolment.student,
+            Person.name,
+            SubmissionRow.source,
+            SubmissionRow.assignment,
+            Job.state,
+            Job.verdict,
+            Job.marks,
+            func.coalesce(Job.max_marks, AssignmentVersion.max_marks),
+            Job.error,
+            Job.suspect,
+            SubmissionRow.staff_only,
+            SubmissionRow.days_late,
+            SubmissionRow.attempt,
+            SubmissionRow.sha256,
+            Job.started_at,
+            Job.graded_at,
+            Job.published_at,
+        )
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(Person, Enrolment.person_id == Person.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(*standing_in(session, batch_id))
+    )
+    lines = [_line(tuple(row), hidden) for row in session.execute(query)]
+    lines += [_refused(refusal) for refusal in refusals]
+    return sorted(lines, key=_by_student)
+
+
+def table_page(lines: Sequence[TableLine], asked: TableAsked) -> TablePage:
+    """The page of the rows that is asked for, the last where there are not so many."""
+    text = asked.text.strip().casefold()
+    found = [line for line in lines if (not asked.state or line.state == asked.state) and text in _searched(line)]
+    found.sort(key=SORTS.get(asked.sort, _by_student), reverse=asked.descending)
+    pages = max(1, -(-len(found) // ROWS_A_PAGE))
+    page = min(max(asked.page, 1), pages)
+    return TablePage(tuple(found[(page - 1) * ROWS_A_PAGE : page * ROWS_A_PAGE]), len(found), page, pages)
+
+
+def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked]:
+    """What there is to be looked at in some jobs, by id."""
+    ids = [line.id for line in lines if line.id]
+    unjudged = dict(
+        session.execute(
+            select(CriterionResultRow.job_id, func.count())
+            .join(Job, CriterionResultRow.job_id == Job.id)
+            .where(CriterionResultRow.job_id.in_(ids), overrides.waits_for_judgement())
+            .group_by(CriterionResultRow.job_id)
+        ).all()
+    )
+    surprises = dict(
+        session.execute(
+            select(TrialRow.job_id, func.count())
+            .where(TrialRow.job_id.in_(ids), TrialRow.surprise.is_not(None))
+            .group_by(TrialRow.job_id)
+        ).all()
+    )
+    return {job_id: Remarked(unjudged.get(job_id, 0), surprises.get(job_id, 0)) for job_id in {*unjudged, *surprises}}
+
+
+def _line(row: tuple[Any, ...], hidden: HiddenNames) -> TableLine:
+    (job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, error, *rest) = row
+    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at = rest
+    nameless = assignment in hidden.assignments
+    took: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
+    return TableLine(
+        id=job_id,
+        submission_id=submission_id,
+        student=hidden.called(assignment, student),
+        name="" if nameless else name,
+        source="" if nameless else source,
+        assignment=assignment,
+        state=state.value,
+        verdict=verdict,
+        marks=marks,
+        max_marks=max_marks,
+        error=error or "",
+        suspect=suspect,
+        staff_only=staff_only,
+        days_late=days_late,
+        attempt=attempt,
+        sha256=sha256,
+        seconds=None if took is None else took.total_seconds(),
+        published_at=published_at,
+    )
+
+
+def _refused(refusal: Refusal) -> TableLine:
+    return TableLine(
+        id="",
+        submission_id=0,
+        student=refusal.student.id or refusal.source,
+        name=refusal.student.name,
+        source=refusal.source,
+        assignment=refusal.assignment,
+        state=REFUSED,
+        verdict=None,
+        marks=None,
+        max_marks=Decimal(0),
+        error=refusal.reason,
+        suspect=None,
+        staff_only=None,
+        days_late=0,
+        attempt=0,
+        sha256="",
+        seconds=None,
+        published_at=None,
+    )
+
+
+def _searched(line: TableLine) -> str:
+    return " ".join((line.student, line.name, line.source, line.assignment, line.verdict or "")).casefold()

@@ -1,0 +1,389 @@
+"""What an instructor asks about batches and jobs: how far, what marks, what went wrong. Only reads.
+
+Of several attempts of a student in one batch the newest counts that is over no limit; the others are told elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
+
+from sqlalchemy import ColumnElement, Row, Select, and_, case, func, or_, select, tuple_
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from service.store.codec import decode
+from service.store.courses.hidden_names import HiddenNames
+from service.store.grades import overrides
+from service.store.models import (
+    AssignmentVersion,
+    Batch,
+    CriterionResultRow,
+    Enrolment,
+    Job,
+    Person,
+    SubmissionRow,
+    TrialRow,
+)
+from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Role, Standing
+from service.store.web_tables import OpenAssignment, Override
+from sim.errors import UsageError
+from submissions.nearest import did_you_mean
+from submissions.people import Refusal
+
+#: What is read of each job; the last three count.
+_Asked = tuple[
+    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
+    int | None,
+]  # fmt: skip
+_MOST_LISTED = 50
+#: The newest of which one may have been meant by an id that there is not.
+_MOST_COMPARED = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class JobLine:
+    """One job, as a table shows it."""
+
+    id: str
+    submission_id: int
+    student: str
+    name: str  # the student's
+    email: str
+    source: str
+    assignment: str
+    state: JobState
+    verdict: str | None
+    marks: Decimal | None
+    max_marks: Decimal
+    accuracy: float | None  # of the first criterion that classifies
+    attempt: int  # the student's
+    error: str | None
+    plots: PlotState
+    sandbox: str | None  # what stood around the student's code
+    worker: str | None
+    queued_at: datetime
+    finished_at: datetime | None
+    standing: Standing
+    missing: str  # the part that was asked for and not submitted
+    copied_from: str | None  # the identical grade that was run
+    suspect: str | None  # why the grade is not to be trusted
+    staff_only: str | None  # the limit that the submission was over
+    unjudged: int  # criteria that could not be judged, nor were set by hand
+    set_by_hand: int  # criteria that were
+    surprises: int  # trials in which our own code stumbled over what a child sent
+    days_late: int
+    published_at: datetime | None
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will come of the job any more but what has come."""
+        return self.state not in UNFINISHED
+
+    def hidden_by(self, names: HiddenNames) -> JobLine:
+        """The same with nothing in it that tells whose it is, where names are hidden."""
+        if self.assignment not in names.assignments:
+            return self
+        return replace(self, student=names.called(self.assignment, self.student), name="", email="", source="")
+
+
+@dataclass(frozen=True, slots=True)
+class BatchLine:
+    """A batch, and how many of its jobs are in each state."""
+
+    id: str
+    name: str
+    state: BatchState
+    created_at: datetime
+    refusals: tuple[Refusal, ...]
+    jobs: int
+    states: dict[JobState, int]
+    regrade_of: str | None  # the batch whose submissions these are
+    web_assignment: str | None  # the assignment that these were submitted to on the web
+    takes_in: bool  # more may come, for the assignment is open
+
+    @property
+    def unfinished(self) -> int:
+        """How many of its jobs have not ended."""
+        return sum(self.states.get(state, 0) for state in UNFINISHED)
+
+
+@dataclass(frozen=True, slots=True)
+class BatchProgress:
+    """How far jobs have come; ``partial`` is what the running ones have done, in jobs."""
+
+    jobs: int
+    ended: int
+    partial: float
+    plots_due: int
+
+
+def find_batch(session: Session, start: str) -> str:
+    """The id of the batch that begins so. Raises UsageError where none or several do."""
+    return _find(session, Batch.id, Batch.created_at, start, "batch")
+
+
+def find_job(session: Session, start: str) -> str:
+    """The id of the job that begins so. Raises UsageError where none or several do."""
+    return _find(session, Job.id, Job.queued_at, start, "grade")
+
+
+def job_before(session: Session, job_id: str) -> str:
+    """The id of the grade that stands for the same student's last attempt before this job's.
+
+    Raises UsageError where there is none; what is for staff alone, or not to be trusted, is passed over.
+    """
+    mine = session.execute(
+        select(SubmissionRow).join(Job, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
+    ).scalar_one()
+    found = session.scalar(
+        select(Job.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .where(
+            SubmissionRow.enrolment_id == mine.enrolment_id,
+            SubmissionRow.assignment == mine.assignment,
+            SubmissionRow.attempt < mine.attempt,
+            SubmissionRow.staff_only.is_(None),
+            Job.state == JobState.DONE,
+            Job.standing == Standing.STANDS,
+            Job.suspect.is_(None),
+        )
+        .order_by(SubmissionRow.attempt.desc())
+        .limit(1)
+    )
+    if found is None:
+        raise UsageError(f"no grade of the same student for the same assignment comes before {job_id}")
+    return found
+
+
+def list_batches(session: Session, course_id: int | None = None) -> list[BatchLine]:
+    """The newest batches first, of all courses or of one."""
+    query = select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(_MOST_LISTED)
+    if course_id is not None:
+        query = query.where(Batch.course_id == course_id)
+    return _batch_lines(session, session.scalars(query).all())
+
+
+def batches_of(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[BatchLine]:
+    """The newest batches of a course first, from the one on that was made ``after`` at, and has that id."""
+    query = select(Batch).where(Batch.course_id == course_id)
+    if after is not None:
+        earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
+        query = query.where(or_(Batch.created_at < after[0], earlier))
+    rows = session.scalars(query.order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
+    return _batch_lines(session, rows)
+
+
+def batch(session: Session, batch_id: str) -> BatchLine:
+    """One batch. Raises UsageError if there is none of this id."""
+    row = session.get(Batch, batch_id)
+    if row is None:
+        raise UsageError(f"there is no batch {batch_id}")
+    return _batch_lines(session, [row])[0]
+
+
+def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
+    """What holds of the job that stands for a submission of the batch; of a batch of regrades, of its own jobs."""
+    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+        return (Job.batch_id == batch_id, Job.suspect.is_(None))
+    return (Job.submission_id.in_(counting([batch_id])), Job.standing == Standing.STANDS)
+
+
+def submissions_in(session: Session, batch_id: str) -> Select[int]:
+    """The submissions that a batch is about: those that count of it, or all that a batch of regrades has."""
+    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+        return select(Job.submission_id).where(Job.batch_id == batch_id)
+    return counting([batch_id])
+
+
+def counting(batch_ids: Sequence[str]) -> Select[int]:
+    """The submissions of some batches that count: of each student and assignment in each the newest over no limit."""
+    return _newest(SubmissionRow.batch_id.in_(batch_ids), SubmissionRow.batch_id)
+
+
+def _newest(which: ColumnElement[bool], *apart: InstrumentedAttribute[Any]) -> Select[int]:
+    attempts = (*apart, SubmissionRow.enrolment_id, SubmissionRow.assignment)
+    order = (SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
+    place = func.row_number().over(partition_by=attempts, order_by=order).label("place")
+    ranked = select(SubmissionRow.id, place).where(which).subquery()
+    return select(ranked.c.id).where(ranked.c.place == 1)
+
+
+def job_lines(session: Session, batch_id: str) -> list[JobLine]:
+    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs."""
+    query = _job_lines().where(*standing_in(session, batch_id))
+    return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
+
+
+def some_job_lines(
+    session: Session, batch_id: str, hidden: HiddenNames, limit: int, after: str | None = None
+) -> list[JobLine]:
+    """Some of them, which follow on the job of this id, without the hidden names and in no order that tells them."""
+    student = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
+    query = _job_lines().where(*standing_in(session, batch_id)).order_by(student, Job.id).limit(limit)
+    if after is not None:
+        own = (
+            select(student)
+            .select_from(Job)
+            .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+            .join(Enrolment, Job.enrolment_id == Enrolment.id)
+            .where(Job.id == after)
+        )
+        query = query.where(tuple_(student, Job.id) > tuple_(own.correlate(None).scalar_subquery(), after))
+    return [_line(row).hidden_by(hidden) for row in session.execute(query)]
+
+
+def course_lines(session: Session, course_id: int, assignments: Sequence[str]) -> list[JobLine]:
+    """The same of each student of a course for some assignments, in whichever batch it is or in none."""
+    students = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
+    ids = _newest(and_(SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students)))
+    query = _job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+    return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
+
+
+def job_line(session: Session, job_id: str) -> JobLine:
+    """One job. Raises UsageError if there is none of this id."""
+    row = session.execute(_job_lines().where(Job.id == job_id)).one_or_none()
+    if row is None:
+        raise UsageError(f"there is no grade {job_id}")
+    return _line(row)
+
+
+def progress(session: Session, batch_id: str) -> BatchProgress:
+    """How far a batch has come."""
+    of_batch = Job.batch_id == batch_id
+    states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
+    running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
+    waiting = select(func.count()).select_from(Job).where(of_batch, Job.plots == PlotState.DUE)
+    return BatchProgress(
+        jobs=sum(states.values()),
+        ended=sum(count for state, count in states.items() if state not in UNFINISHED),
+        partial=session.scalar(running) or 0.0,
+        plots_due=session.scalar(waiting) or 0,
+    )
+
+
+def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
+    ids = [row.id for row in rows]
+    opened = session.scalars(select(OpenAssignment).where(OpenAssignment.batch_id.in_(ids)))
+    of_the_web = {row.batch_id: row for row in opened if row.batch_id is not None}
+    # What a worker in quarantine graded is in the batch a second time.
+    counted = select(Job.batch_id, Job.state, func.count()).where(
+        Job.batch_id.in_([own for own in ids if own not in of_the_web]), Job.suspect.is_(None)
+    )
+    states: dict[str | None, dict[JobState, int]] = {row.id: {} for row in rows}
+    for batch_id, state, count in session.execute(counted.group_by(Job.batch_id, Job.state)):
+        states[batch_id][state] = count
+    if of_the_web:
+        attempts = (
+            select(SubmissionRow.batch_id, Job.state, func.count())
+            .join(Job, Job.submission_id == SubmissionRow.id)
+            .where(Job.submission_id.in_(counting(list(of_the_web))), Job.standing == Standing.STANDS)
+        )
+        for batch_id, state, count in session.execute(attempts.group_by(SubmissionRow.batch_id, Job.state)):
+            states[batch_id][state] = count
+    return [
+        BatchLine(
+            row.id,
+            row.name,
+            row.state,
+            row.created_at,
+            decode(tuple[Refusal, ...], row.refusals),
+            sum(states[row.id].values()),
+            states[row.id],
+            row.regrade_of,
+            of_the_web[row.id].assignment if row.id in of_the_web else None,
+            row.id in of_the_web and of_the_web[row.id].closed_at is None,
+        )
+        for row in rows
+    ]
+
+
+def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:
+    found = session.scalars(select(column).where(column.startswith(start, autoescape=True)).limit(2)).all()
+    if not found:
+        known = session.scalars(select(column).order_by(newest.desc()).limit(_MOST_COMPARED))
+        raise UsageError(f"there is no {what} {start!r}{did_you_mean(start, known)}")
+    if len(found) > 1:
+        raise UsageError(f"more than one {what} begins with {start!r}; give more of its id")
+    return found[0]
+
+
+def _job_lines() -> Select[*_Asked]:
+    accuracy = (
+        select(CriterionResultRow.accuracy)
+        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None))
+        .order_by(CriterionResultRow.position)
+        .limit(1)
+        .scalar_subquery()
+    )
+    unjudged = (
+        select(func.count())
+        .where(CriterionResultRow.job_id == Job.id, overrides.waits_for_judgement())
+        .scalar_subquery()
+    )
+    by_hand = (
+        select(func.count())
+        .where(Override.submission_id == Job.submission_id, Override.withdrawn_at.is_(None))
+        .scalar_subquery()
+    )
+    surprises = select(func.count()).where(TrialRow.job_id == Job.id, TrialRow.surprise.is_not(None)).scalar_subquery()
+    return (
+        select(
+            Job,
+            Enrolment.student,
+            Person.name,
+            Person.email,
+            SubmissionRow.source,
+            AssignmentVersion,
+            SubmissionRow.attempt,
+            accuracy,
+            SubmissionRow.staff_only,
+            SubmissionRow.days_late,
+            unjudged,
+            by_hand,
+            surprises,
+        )
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(Person, Enrolment.person_id == Person.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+    )
+
+
+def _line(row: Row[*_Asked]) -> JobLine:
+    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, *counts = row
+    unjudged, by_hand, surprises = counts
+    return JobLine(
+        id=job.id,
+        submission_id=job.submission_id,
+        student=student,
+        name=name,
+        email=email or "",
+        source=source,
+        assignment=version.assignment,
+        state=job.state,
+        verdict=job.verdict,
+        marks=job.marks,
+        max_marks=version.max_marks if job.max_marks is None else job.max_marks,
+        accuracy=accuracy,
+        attempt=attempt,
+        error=job.error,
+        plots=job.plots,
+        sandbox=job.sandbox,
+        worker=job.worker,
+        queued_at=job.queued_at,
+        finished_at=job.finished_at,
+        standing=job.standing,
+        missing=job.missing,
+        copied_from=job.copied_from,
+        suspect=job.suspect,
+        staff_only=staff_only,
+        unjudged=unjudged or 0,
+        set_by_hand=by_hand or 0,
+        surprises=surprises or 0,
+        days_late=days_late,
+        published_at=job.published_at,
+    )

@@ -1,0 +1,345 @@
+"""Takes submissions in: the student, the frozen assignment, the submission and its job, in one transaction.
+
+Publishes nothing: the row is the job, and the queue's notice comes after the commit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import TYPE_CHECKING, TypeVar
+
+from sqlalchemy import func, or_, select
+from sqlalchemy.orm import Session
+
+from service.store import outbox
+from service.store.codec import encode
+from service.store.courses.policies import Ruling, rule
+from service.store.courses.versions import Frozen, assignment_from_bytes, freeze, keep
+from service.store.engine import Store, now
+from service.store.grades import result_cache
+from service.store.ids import new_id
+from service.store.installation import secret_of
+from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.people.students import DEFAULT_COURSE, Students, course_of
+from service.store.queue import jobs
+from service.store.states import BatchState, JobState, Lane, Standing
+from service.version import grader_sha256
+from sim.errors import HostError, UsageError
+from submissions.grading_request import GradingRequest
+from submissions.packed import pack_submission, unpack_submission
+from submissions.people import Refusal
+from submissions.submission import Submission
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """A submission that is now a job."""
+
+    job_id: str
+    submission_id: int
+    student: str
+    attempt: int
+    copied_from: str | None = None  # the identical grade that it has already
+    staff_only: str = ""  # the limit that it is over
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedBatch:
+    """``refused`` are students whom the course cannot tell from others."""
+
+    id: str
+    jobs: tuple[Accepted, ...]
+    refused: tuple[Refusal, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AlreadySubmitted:
+    """A submission that changes nothing: the newest of its student is the same, for the same assignment."""
+
+    job_id: str
+    batch_id: str | None
+    student: str
+    state: JobState
+    other_grader: bool = False  # graded by another version than this
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedNew:
+    """What was new of a batch, and what was not; no batch was made when nothing was."""
+
+    batch: AcceptedBatch | None
+    known: tuple[AlreadySubmitted, ...]
+    refused: tuple[Refusal, ...] = ()
+
+
+def accept(
+    store: Store,
+    grading_request: GradingRequest,
+    *,
+    course: str = DEFAULT_COURSE,
+    max_attempts: int,
+    lane: Lane = Lane.INTERACTIVE,
+    batch_id: str | None = None,
+) -> Accepted:
+    """Take in one submission that a person waits for; where an identical one has a grade, it has that grade at once.
+
+    It is submitted now, unless it says when. Raises UsageError where its student cannot be told from another.
+    """
+    (packed,) = _pack([grading_request])
+    secret = secret_of(store).sha256
+    with store.transaction() as session:
+        at = now(session)
+        packed = replace(
+            packed, grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or at)
+        )
+        terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret, batch_id)
+        enrolment_id = Students(session, terms.course_id).enrol(grading_request.student, at)
+        return _accept(session, _Item(packed, enrolment_id), terms)
+
+
+def accept_batch(
+    store: Store,
+    name: str,
+    grading_requests: Sequence[GradingRequest],
+    refusals: Sequence[Refusal],
+    *,
+    course: str = DEFAULT_COURSE,
+    max_attempts: int,
+) -> AcceptedBatch:
+    """Take in a whole batch or nothing of it, each submission to be graded anew whatever was submitted before.
+
+    ``refusals`` were made when it was read. Raises UsageError when the course refuses the rest.
+    """
+    packed = _pack(grading_requests)
+    secret = secret_of(store).sha256
+    with store.transaction() as session:
+        at = now(session)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
+        items, refused = _enrolled(session, packed, terms)
+        if refused and not items:
+            raise UsageError(f"none can be taken in; {refused[0].source}: {refused[0].reason}")
+        return replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
+
+
+def accept_new(
+    store: Store,
+    name: str,
+    grading_requests: Sequence[GradingRequest],
+    refusals: Sequence[Refusal],
+    *,
+    course: str = DEFAULT_COURSE,
+    max_attempts: int,
+) -> AcceptedNew:
+    """Take in what is new of a batch, so that submitting the same batch twice changes nothing.
+
+    Not new is what has the bytes of the student's newest submission and is marked against the same version of the
+    assignment; but for what was cancelled, which comes in again. What is new and identical to a submission with a grade
+    has that grade at once.
+    """
+    packed = _pack(grading_requests)
+    secret = secret_of(store).sha256
+    with store.transaction() as session:
+        at = now(session)
+        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret)
+        items, refused = _enrolled(session, packed, terms)
+        found = [
+            already_submitted(session, item.packed.grading_request, item.enrolment_id, item.packed.frozen.sha256)
+            for item in items
+        ]
+        new = [item for item, known in zip(items, found, strict=True) if known is None]
+        batch = _accept_batch(session, new, name, [*refusals, *refused], terms) if new else None
+        return AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
+
+
+def load_grading_request(session: Session, job_id: str) -> GradingRequest:
+    """What a job is about, rebuilt from the database alone.
+
+    Raises UsageError for an unknown job, HostError where what was kept cannot be read.
+    """
+    source = select(SubmissionRow.source).join(Job, Job.submission_id == SubmissionRow.id)
+    return GradingRequest(
+        load_submission(session, job_id),
+        load_assignment(session, job_id),
+        session.scalars(source.where(Job.id == job_id)).one(),
+    )
+
+
+def load_submission(session: Session, job_id: str) -> Submission:
+    """What was submitted for a job; raises like ``load_grading_request``."""
+    kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
+    return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
+
+
+def load_assignment(session: Session, job_id: str) -> Assignment:
+    """What a job is marked against; raises like ``load_grading_request``."""
+    kept = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
+    return _read_back(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
+
+
+def _read_back(read: Callable[[bytes], Read], kept: bytes | None, what: str, job_id: str) -> Read:
+    if kept is None:
+        raise UsageError(f"there is no job {job_id}")
+    try:
+        return read(kept)
+    except (UsageError, ValueError, TypeError, KeyError) as error:
+        raise HostError(f"The {what} of {job_id} cannot be read back: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class _Packed:
+    grading_request: GradingRequest
+    data: bytes
+    frozen: Frozen
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """What is taken in, and whose it is."""
+
+    packed: _Packed
+    enrolment_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Terms:
+    """How submissions are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
+
+    course_id: int
+    lane: Lane
+    max_attempts: int
+    at: datetime
+    secret_sha256: str
+    batch_id: str | None = None
+    anew: bool = False
+
+
+def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
+    """What is stored of each submission; done before the transaction, and once for each assignment."""
+    frozen: dict[int, Frozen] = {}
+    packed = []
+    for grading_request in grading_requests:
+        key = id(grading_request.assignment)
+        if key not in frozen:
+            frozen[key] = freeze(grading_request.assignment)
+        packed.append(_Packed(grading_request, pack_submission(grading_request.submission), frozen[key]))
+    return packed
+
+
+def _enrolled(session: Session, packed: Sequence[_Packed], terms: _Terms) -> tuple[list[_Item], tuple[Refusal, ...]]:
+    """Whose each is, and what is refused because its student cannot be told from another."""
+    students = Students(session, terms.course_id)
+    items, refused = [], []
+    for each in packed:
+        asked = each.grading_request
+        try:
+            items.append(_Item(each, students.enrol(asked.student, terms.at)))
+        except UsageError as error:
+            refused.append(Refusal(asked.source, str(error), asked.student, asked.assignment.id))
+    return items, tuple(refused)
+
+
+def already_submitted(
+    session: Session, grading_request: GradingRequest, enrolment_id: int, assignment_sha256: str
+) -> AlreadySubmitted | None:
+    """The job of the student's newest submission, where that is the very same; None where this one is new."""
+    newest = session.scalar(
+        select(SubmissionRow)
+        .where(
+            SubmissionRow.enrolment_id == enrolment_id,
+            SubmissionRow.assignment == grading_request.assignment.id,
+        )
+        .order_by(SubmissionRow.attempt.desc())
+        .limit(1)
+    )
+    if newest is None or newest.sha256 != grading_request.submission.sha256:
+        return None
+    query = (
+        select(Job)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(
+            Job.submission_id == newest.id,
+            AssignmentVersion.sha256 == assignment_sha256,
+            Job.state != JobState.CANCELLED,
+            # A dead job of a cancelled batch cannot be retried, so it too comes in again.
+            or_(Job.state != JobState.DEAD, Job.batch_id.is_(None), Batch.state != BatchState.CANCELLED),
+        )
+        # A regrade that waits to be published comes after the grade that stands.
+        .order_by(Job.standing == Standing.KEPT, Job.standing == Standing.PROPOSED, Job.queued_at.desc(), Job.id)
+        .limit(1)
+    )
+    job = session.scalar(query)
+    if job is None:
+        return None
+    other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
+    return AlreadySubmitted(job.id, job.batch_id, grading_request.submission.student, job.state, other_grader)
+
+
+def _accept_batch(
+    session: Session, items: Sequence[_Item], name: str, refusals: Sequence[Refusal], terms: _Terms
+) -> AcceptedBatch:
+    batch = Batch(course_id=terms.course_id, name=name, refusals=encode(tuple(refusals)), created_at=terms.at)
+    session.add(batch)
+    session.flush()
+    terms = replace(terms, batch_id=batch.id)
+    accepted = AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in items))
+    outbox.batch_ended(session, batch.id)
+    return accepted
+
+
+def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
+    packed, enrolment_id, at = item.packed, item.enrolment_id, terms.at
+    grading_request = packed.grading_request
+    submission, assignment = grading_request.submission, grading_request.assignment
+    version_id = keep(session, packed.frozen, at)
+    of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
+    earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
+    ruling = Ruling()
+    if not terms.anew:
+        ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
+    job_id = new_id()
+    if not ruling.over:
+        jobs.supersede(session, select(SubmissionRow.id).where(*of_student), job_id, at)
+    row = SubmissionRow(
+        enrolment_id=enrolment_id,
+        assignment=assignment.id,
+        batch_id=terms.batch_id,
+        attempt=earlier + 1,
+        sha256=submission.sha256,
+        source=grading_request.source,
+        size=len(packed.data),
+        packed=packed.data,
+        created_at=at,
+        submitted_at=grading_request.submitted_at,
+        days_late=ruling.days_late,
+        staff_only=ruling.over or None,
+    )
+    session.add(row)
+    session.flush()
+    job = Job(
+        id=job_id,
+        submission_id=row.id,
+        assignment_version_id=version_id,
+        enrolment_id=enrolment_id,
+        batch_id=terms.batch_id,
+        # Nobody waits for what only staff will see.
+        lane=Lane.BATCH if ruling.over else terms.lane,
+        max_attempts=terms.max_attempts,
+        forced=terms.anew,
+    )
+    jobs.enqueue(session, job, at)
+    source = (
+        None
+        if terms.anew
+        else result_cache.find(session, result_cache.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
+    )
+    if source is not None:
+        jobs.copy(session, job_id, source, at)
+    return Accepted(job_id, row.id, submission.student, row.attempt, source, ruling.over)

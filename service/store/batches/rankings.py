@@ -1,0 +1,77 @@
+"""The measures that the assignments of a batch rank, read from its grades: a table for each criterion. Only reads.
+
+Places, ties and intervals are worked out in ``service.grading.ranks``.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.grading.ranks import RankTable, StudentMeasures, ranked
+from service.store.batches.batches import JobLine
+from service.store.codec import decode
+from service.store.courses.versions import assignment_from_bytes
+from service.store.models import AssignmentVersion, CriterionResultRow, Job
+from service.store.states import JobState
+
+if TYPE_CHECKING:
+    from submissions.criteria.timing import Ranking
+
+#: How many jobs are asked for at once: databases take so many values, and not every number of them.
+_AT_ONCE = 1000
+
+
+def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
+    """What is ranked among these jobs, over all that are graded and not for staff alone."""
+    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
+    asked: dict[tuple[str, str], Ranking] = {}
+    for content in _contents(session, graded):
+        # Most assignments rank nothing, and reading one whole takes longer than everything else here.
+        if b'"ranking"' in zlib.decompress(content):
+            from submissions.criteria.timing import Ranking
+
+            assignment = assignment_from_bytes(content)
+            rankings = (each for each in assignment.criteria if isinstance(each, Ranking))
+            asked |= {(assignment.id, ranking.id): ranking for ranking in rankings}
+    return [
+        _table(session, assignment, ranking, [line for line in graded if line.assignment == assignment])
+        for (assignment, _), ranking in asked.items()
+    ]
+
+
+def _portions(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
+    for begin in range(0, len(lines), _AT_ONCE):
+        yield {line.id: line for line in lines[begin : begin + _AT_ONCE]}
+
+
+def _contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
+    """Each assignment version that these jobs are graded against, once."""
+    versions: set[int] = set()
+    for jobs in _portions(lines):
+        versions.update(session.scalars(select(Job.assignment_version_id).where(Job.id.in_(jobs)).distinct()))
+    for version in sorted(versions):
+        yield from session.scalars(select(AssignmentVersion.content).where(AssignmentVersion.id == version))
+
+
+def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[JobLine]) -> RankTable:
+    from service.grading.grade import Evidence
+
+    measures, unit = [], ""
+    for jobs in _portions(lines):
+        rows = session.execute(
+            select(CriterionResultRow.job_id, CriterionResultRow.evidence).where(
+                CriterionResultRow.job_id.in_(jobs), CriterionResultRow.criterion == ranking.id
+            )
+        )
+        for job_id, kept in rows:
+            evidence = decode(tuple[Evidence, ...], kept)
+            found = [measure for each in evidence for measure in each.measures if measure.name == ranking.measure]
+            unit = next((measure.unit for measure in found), unit)
+            values = tuple(measure.value for measure in found)
+            measures.append(StudentMeasures(jobs[job_id].student, values, len(evidence)))
+    return RankTable(assignment, ranking.title, ranking.measure, unit, ranked(measures, highest=ranking.highest))

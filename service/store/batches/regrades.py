@@ -1,0 +1,308 @@
+"""Batches graded again after an assignment or the grader changed: what changes, and why.
+
+The old grades stay and stand until somebody publishes the new ones (``publishing.py``). Nothing is graded here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from sqlalchemy import case, func, or_, select
+from sqlalchemy.orm import Session, aliased
+
+from service.store import audit
+from service.store.batches import batches
+from service.store.courses.versions import freeze, keep
+from service.store.engine import Store, now
+from service.store.grades import overrides
+from service.store.models import AssignmentVersion, Batch, Enrolment, Job, TrialRow
+from service.store.queue.jobs import enqueue
+from service.store.states import UNFINISHED, JobState, Lane, Standing
+from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+_CHANGES_A_PAGE = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Regraded:
+    """A batch of regrades, and how many submissions were left out: for another assignment, or not graded yet."""
+
+    batch_id: str
+    jobs: int
+    other_assignment: int
+    unfinished: int
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionChange:
+    """One criterion whose marks differ, as (marks, the most there are); None where the assignment did not have it."""
+
+    title: str
+    before: tuple[Decimal, Decimal] | None
+    after: tuple[Decimal, Decimal] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A regrade beside the grade that it may replace. Marks are None where there is no grade (yet)."""
+
+    student: str
+    job_id: str
+    before_id: str
+    state: JobState
+    standing: Standing
+    before: Decimal | None
+    after: Decimal | None
+    before_max: Decimal | None
+    after_max: Decimal | None
+    criteria: tuple[CriterionChange, ...]
+    reason: str
+
+    @property
+    def differs(self) -> bool:
+        """Whether there is a new grade and its marks, or what they are out of, are others than before."""
+        return self.state is JobState.DONE and (self.before, self.before_max) != (self.after, self.after_max)
+
+
+@dataclass(frozen=True, slots=True)
+class Grading:
+    """One of the times that a submission was graded."""
+
+    id: str
+    state: JobState
+    standing: Standing
+    marks: Decimal | None
+    max_marks: Decimal | None
+    queued_at: datetime
+    published_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class ChangesPage:
+    """Some of the changes of a batch, of how many, and how many differ in marks or have none yet."""
+
+    changes: tuple[Change, ...]
+    found: int
+    differing: int
+    page: int
+    pages: int
+
+
+def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> Regraded:
+    """Queue every submission of the batch that has a grade, or could not be given one, to be graded again.
+
+    Against ``assignment``, or without it the version that each was graded against. The grades that stand are not
+    touched. Raises UsageError when there is nothing to grade again.
+    """
+    frozen = None if assignment is None else freeze(assignment)
+    with store.transaction() as session:
+        at = now(session)
+        original = session.get(Batch, batch_id)
+        if original is None:
+            raise UsageError(f"there is no batch {batch_id}")
+        standing = _standing(session, batch_id)
+        ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
+        wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
+        unfinished = sum(job.state in UNFINISHED for job, _ in standing)
+        if not wanted:
+            raise UsageError(_nothing(batch_id, assignment, {name for _, name in standing}, unfinished))
+        version_id = None if frozen is None else keep(session, frozen, at)
+        batch = Batch(
+            course_id=original.course_id,
+            name=f"regrade of {original.name}",
+            refusals=[],
+            regrade_of=original.id,
+            created_at=at,
+        )
+        session.add(batch)
+        session.flush()
+        for job in wanted:
+            enqueue(session, _proposal(job, version_id, batch.id, Lane.BATCH, max_attempts), at)
+        audit.note(session, actor, "regrade", "batch", batch_id, as_batch=batch.id, grades=len(wanted))
+        return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+
+
+def regrade_one(store: Store, job_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> str:
+    """Queue the submission of one grade to be graded again, at once; the id of the job that may take its place.
+
+    ``assignment`` as ``regrade`` has it. Raises UsageError where there is no grade yet, or for another assignment.
+    """
+    frozen = None if assignment is None else freeze(assignment)
+    with store.transaction() as session:
+        at = now(session)
+        asked = session.get(Job, job_id)
+        if asked is None:
+            raise UsageError(f"there is no grade {job_id}")
+        of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
+        standing = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id)).all()
+        ended = [job for job in standing if job.state in (JobState.DONE, JobState.DEAD)]
+        if not ended:
+            raise UsageError("this submission is not graded yet")
+        name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
+        if frozen is not None and frozen.assignment.id != name:
+            raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
+        version_id = None if frozen is None else keep(session, frozen, at)
+        proposal = _proposal(ended[-1], version_id, None, Lane.INTERACTIVE, max_attempts)
+        enqueue(session, proposal, at)
+        session.flush()
+        audit.note(session, actor, "regrade", "job", ended[-1].id, as_job=proposal.id)
+        return proposal.id
+
+
+def change(session: Session, job_id: str) -> Change | None:
+    """What one regrade changes; None for a grade that is none."""
+    after = session.get(Job, job_id)
+    if after is None or after.regrade_of is None:
+        return None
+    student = session.get_one(Enrolment, after.enrolment_id).student
+    return _change(session, after, session.get_one(Job, after.regrade_of), student)
+
+
+def gradings(session: Session, submission_id: int) -> list[Grading]:
+    """All that a submission was graded, in order; what a worker in quarantine did is left out."""
+    of_submission = (Job.submission_id == submission_id, Job.suspect.is_(None))
+    rows = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id))
+    return [
+        Grading(row.id, row.state, row.standing, row.marks, row.max_marks, row.queued_at, row.published_at)
+        for row in rows
+    ]
+
+
+def changes(session: Session, batch_id: str) -> list[Change]:
+    """What a batch of regrades changes, by student."""
+    before = aliased(Job)
+    query = (
+        select(Job, before, Enrolment.student)
+        .join(before, Job.regrade_of == before.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .where(Job.batch_id == batch_id)
+        .order_by(Enrolment.student, Job.id)
+    )
+    return [_change(session, after, earlier, student) for after, earlier, student in session.execute(query)]
+
+
+def changes_page(session: Session, batch_id: str, page: int) -> ChangesPage:
+    """Some of what a batch of regrades changes: other marks first, then by student."""
+    before = aliased(Job)
+    differ = or_(Job.marks != before.marks, Job.max_marks != before.max_marks, Job.marks.is_(None))
+    of_batch = (Job.batch_id == batch_id, Job.suspect.is_(None))
+    joined = (
+        select(func.count(), func.count(case((differ, 1)))).select_from(Job).join(before, Job.regrade_of == before.id)
+    )
+    found, differing = session.execute(joined.where(*of_batch)).one()
+    page = min(max(page, 1), max(1, -(-found // _CHANGES_A_PAGE)))
+    query = (
+        select(Job, before, Enrolment.student)
+        .join(before, Job.regrade_of == before.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .where(*of_batch)
+        .order_by(case((differ, 0), else_=1), Enrolment.student, Job.id)
+        .limit(_CHANGES_A_PAGE)
+        .offset((page - 1) * _CHANGES_A_PAGE)
+    )
+    shown = tuple(_change(session, after, earlier, student) for after, earlier, student in session.execute(query))
+    return ChangesPage(shown, found, differing, page, max(1, -(-found // _CHANGES_A_PAGE)))
+
+
+def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
+    """The jobs that stand for the submissions of a batch, with their assignment."""
+    query = (
+        select(Job, AssignmentVersion.assignment)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.submission_id.in_(batches.submissions_in(session, batch_id)), Job.standing == Standing.STANDS)
+        .order_by(Job.queued_at, Job.id)
+    )
+    return [(job, name) for job, name in session.execute(query)]
+
+
+def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfinished: int) -> str:
+    if assignment is not None and found and assignment.id not in found:
+        return f"batch {batch_id} has no submission for {assignment.id}, only for {', '.join(sorted(found))}"
+    waits = f": {unfinished} of its submissions are not graded yet" if unfinished else ""
+    return f"batch {batch_id} has nothing to grade again{waits}"
+
+
+def _proposal(job: Job, version_id: int | None, batch_id: str | None, lane: Lane, max_attempts: int) -> Job:
+    return Job(
+        submission_id=job.submission_id,
+        assignment_version_id=version_id or job.assignment_version_id,
+        enrolment_id=job.enrolment_id,
+        batch_id=batch_id,
+        lane=lane,
+        max_attempts=max_attempts,
+        forced=True,
+        regrade_of=job.id,
+        standing=Standing.PROPOSED,
+    )
+
+
+def _change(session: Session, after: Job, before: Job, student: str) -> Change:
+    return Change(
+        student=student,
+        job_id=after.id,
+        before_id=before.id,
+        state=after.state,
+        standing=after.standing,
+        before=before.marks,
+        after=after.marks,
+        before_max=before.max_marks,
+        after_max=after.max_marks,
+        criteria=_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
+        reason=_reason(session, before, after),
+    )
+
+
+def _criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
+    before, after = _marks(session, before_id), _marks(session, after_id)
+    differing = [key for key in {**after, **before} if _worth(before.get(key)) != _worth(after.get(key))]
+    return tuple(
+        CriterionChange((after.get(key) or before[key])[0], _worth(before.get(key)), _worth(after.get(key)))
+        for key in differing
+    )
+
+
+_Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
+
+
+def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
+    lines = overrides.criterion_marks(session, job_id)
+    return {line.criterion: (line.title, line.marks, line.max_marks) for line in lines}
+
+
+def _worth(marked: _Marked | None) -> tuple[Decimal, Decimal] | None:
+    return None if marked is None else marked[1:]
+
+
+def _reason(session: Session, before: Job, after: Job) -> str:
+    """Why the grades may differ: everything that differs between the two gradings."""
+    if after.state is not JobState.DONE:
+        return after.error or after.state.value
+    reasons = []
+    versions = [session.get_one(AssignmentVersion, job.assignment_version_id) for job in (before, after)]
+    if versions[0].id != versions[1].id and versions[0].version != versions[1].version:
+        reasons.append("assignment changed")
+    if before.state is not JobState.DONE:
+        reasons.append("had no grade")
+    elif before.grader_sha256 is None or before.grader_sha256 != after.grader_sha256:
+        versions_differ = before.grader_version != after.grader_version
+        told = f" ({before.grader_version} to {after.grader_version})" if versions_differ else ""
+        reasons.append(f"grader changed{told}")
+    if before.state is JobState.DONE and before.secret_sha256 != after.secret_sha256:
+        reasons.append("secret changed")
+    if before.suspect is not None:
+        reasons.append("the earlier worker was found to grade wrongly")
+    if not reasons and _chains(session, before.id) != _chains(session, after.id):
+        # The same grader and assignment owe the same recordings: somebody has to look.
+        return "unexplained: other recordings from the same assignment and grader; robomark verify both"
+    return ", ".join(reasons) or "nothing changed"
+
+
+def _chains(session: Session, job_id: str) -> list[str]:
+    return list(session.scalars(select(TrialRow.sha256).where(TrialRow.job_id == job_id).order_by(TrialRow.position)))

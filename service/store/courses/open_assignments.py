@@ -1,0 +1,148 @@
+"""What a course has open: assignments that its instructors prepared, and that its students may submit to.
+
+A prepared one is frozen as all that are marked; limits of time and attempts are ``policies.py``'s. What is submitted to
+one on the web is in one batch, which is at its end when nobody may submit any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store import outbox
+from service.store.courses.versions import Frozen, assignment_from_bytes, keep
+from service.store.engine import now
+from service.store.models import AssignmentVersion, Batch
+from service.store.web_tables import OpenAssignment
+from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+
+@dataclass(frozen=True, slots=True)
+class CourseAssignment:
+    """An assignment of a course; students see it from ``opened_at`` on, and may submit until ``closed_at``."""
+
+    assignment: str
+    title: str
+    max_marks: Decimal
+    version: str
+    version_id: int
+    opened_at: datetime | None
+    closed_at: datetime | None
+    names_hidden: bool
+    batch_id: str | None  # of what students submit on the web
+
+    @property
+    def open(self) -> bool:
+        """Whether students may submit to it."""
+        return self.opened_at is not None and self.closed_at is None
+
+
+def prepare(session: Session, course_id: int, frozen: Frozen) -> CourseAssignment:
+    """Put an assignment into a course, not yet open; one of the same id is marked by this version from now on."""
+    at = now(session)
+    version_id = keep(session, frozen, at)
+    row = _row(session, course_id, frozen.assignment.id)
+    if row is None:
+        row = OpenAssignment(course_id=course_id, assignment=frozen.assignment.id, assignment_version_id=version_id)
+        session.add(row)
+    row.assignment_version_id = version_id
+    if row.batch_id is not None:
+        session.get_one(Batch, row.batch_id).name = _batch_name(frozen.assignment.title)
+    session.flush()
+    return find(session, course_id, frozen.assignment.id)
+
+
+def open_for_students(session: Session, course_id: int, assignment: str) -> None:
+    """From now on students see it and may submit. Raises UsageError where the course has none of this id."""
+    row, at = _there(session, course_id, assignment), now(session)
+    row.opened_at, row.closed_at = row.opened_at or at, None
+    if row.batch_id is None:
+        title = session.get_one(AssignmentVersion, row.assignment_version_id).title
+        batch = Batch(course_id=course_id, name=_batch_name(title), created_at=at)
+        session.add(batch)
+        session.flush()
+        row.batch_id = batch.id
+
+
+def close(session: Session, course_id: int, assignment: str) -> None:
+    """Nobody may submit any more; what was submitted stays. Raises UsageError where the course has none of this id."""
+    row = _there(session, course_id, assignment)
+    row.closed_at = now(session)
+    session.flush()
+    if row.batch_id is not None:
+        outbox.batch_ended(session, row.batch_id)
+
+
+def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) -> None:
+    """Whether instructors see whose work it is. Raises UsageError where the course has none of this id."""
+    _there(session, course_id, assignment).names_hidden = hidden
+
+
+def with_names_hidden(session: Session, course_id: int) -> frozenset[str]:
+    """The assignments of a course whose instructors do not see whose work it is."""
+    of_them = (OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True))
+    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*of_them)))
+
+
+def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
+    """All of a course, by id."""
+    query = (
+        select(OpenAssignment, AssignmentVersion)
+        .join(AssignmentVersion, OpenAssignment.assignment_version_id == AssignmentVersion.id)
+        .where(OpenAssignment.course_id == course_id)
+        .order_by(OpenAssignment.assignment)
+    )
+    return [_line(row, version) for row, version in session.execute(query)]
+
+
+def find(session: Session, course_id: int, assignment: str) -> CourseAssignment:
+    """One of a course. Raises UsageError where there is none of this id."""
+    row = _there(session, course_id, assignment)
+    return _line(row, session.get_one(AssignmentVersion, row.assignment_version_id))
+
+
+def load(session: Session, course_id: int, assignment: str) -> Assignment:
+    """The assignment itself. Raises UsageError where the course has none of this id."""
+    row = _there(session, course_id, assignment)
+    content = session.scalars(
+        select(AssignmentVersion.content).where(AssignmentVersion.id == row.assignment_version_id)
+    ).one()
+    return assignment_from_bytes(content)
+
+
+def _batch_name(title: str) -> str:
+    return f"Submitted on the web: {title}"
+
+
+def _row(session: Session, course_id: int, assignment: str) -> OpenAssignment | None:
+    of_this = (OpenAssignment.course_id == course_id, OpenAssignment.assignment == assignment)
+    return session.scalar(select(OpenAssignment).where(*of_this))
+
+
+def _there(session: Session, course_id: int, assignment: str) -> OpenAssignment:
+    row = _row(session, course_id, assignment)
+    if row is None:
+        raise UsageError(f"this course has no assignment {assignment!r}")
+    return row
+
+
+def _line(row: OpenAssignment, version: AssignmentVersion) -> CourseAssignment:
+    return CourseAssignment(
+        row.assignment,
+        version.title,
+        version.max_marks,
+        version.version,
+        version.id,
+        row.opened_at,
+        row.closed_at,
+        row.names_hidden,
+        row.batch_id,
+    )

@@ -1,0 +1,73 @@
+"""The marks of jobs as they count, as statistics are made of them: criteria's rows, and no recording. Only reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Protocol
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.grading.statistics import MarkedCriterion, MarkedSubmission
+from service.store.grades import overrides
+from service.store.models import CriterionResultRow
+from service.store.states import JobState
+
+#: How many jobs are asked for at once: databases take so many values, and not every number of them.
+_AT_ONCE = 1000
+
+
+class MarkedLine(Protocol):
+    """What is looked at of a job: whose it is, for what, and whether its marks count."""
+
+    @property
+    def id(self) -> str: ...  # noqa: D102
+    @property
+    def student(self) -> str: ...  # noqa: D102
+    @property
+    def assignment(self) -> str: ...  # noqa: D102
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def verdict(self) -> str | None: ...  # noqa: D102
+    @property
+    def marks(self) -> Decimal | None: ...  # noqa: D102
+    @property
+    def max_marks(self) -> Decimal: ...  # noqa: D102
+    @property
+    def staff_only(self) -> str | None: ...  # noqa: D102
+
+
+def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
+    """Those of the jobs that are graded and not for staff alone."""
+    graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
+    criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
+    for begin in range(0, len(graded), _AT_ONCE):
+        some = [line.id for line in graded[begin : begin + _AT_ONCE]]
+        by_hand = overrides.of_jobs(session, some)
+        rows = session.execute(
+            select(
+                CriterionResultRow.job_id,
+                CriterionResultRow.criterion,
+                CriterionResultRow.title,
+                CriterionResultRow.marks,
+                CriterionResultRow.max_marks,
+                CriterionResultRow.unjudged,
+            )
+            .where(CriterionResultRow.job_id.in_(some))
+            .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
+        )
+        for job_id, criterion, title, marks, worth, unjudged in rows:
+            override = by_hand.get(job_id, {}).get(criterion)
+            if override is not None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, *override.counted(worth)))
+            elif unjudged is None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
+    return [
+        MarkedSubmission(
+            line.student, line.assignment, line.marks, line.max_marks, line.verdict or "", tuple(criteria[line.id])
+        )
+        for line in graded
+        if line.marks is not None
+    ]

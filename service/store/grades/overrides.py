@@ -1,0 +1,211 @@
+"""What instructors set by hand: a criterion's marks in place of the grader's, a criterion excused; with a reason.
+
+It belongs to the submission, so every grade of that counts so, a later one too. What the grader gave is never changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal, InvalidOperation
+
+from sqlalchemy import ColumnElement, and_, exists, select, update
+from sqlalchemy.orm import Session
+
+from service.store import audit
+from service.store.engine import now
+from service.store.models import CriterionResultRow, Job
+from service.store.states import JobState
+from service.store.web_tables import Override
+from sim.errors import UsageError
+from submissions.nearest import did_you_mean
+
+LONGEST_REASON = 500
+#: So many digits after the point.
+_FINEST = Decimal("0.0001")
+_NONE = Decimal(0)
+
+
+@dataclass(frozen=True, slots=True)
+class OverrideLine:
+    """What holds of one criterion in place of the grader's marks; None of marks excuses it."""
+
+    id: int
+    marks: Decimal | None
+    reason: str
+    actor: str
+    made_at: datetime
+
+    def counted(self, worth: Decimal) -> tuple[Decimal, Decimal]:
+        """The marks of a criterion and the most there are, where the assignment gives so much for it."""
+        return (_NONE, _NONE) if self.marks is None else (min(self.marks, worth), worth)
+
+
+@dataclass(frozen=True, slots=True)
+class CriterionMarks:
+    """One criterion of a grade: as graded, and as it counts."""
+
+    criterion: str
+    title: str
+    message: str  # the grader's
+    visibility: str
+    graded: Decimal | None  # None where it could not be judged
+    worth: Decimal  # the most that the assignment gives
+    marks: Decimal
+    max_marks: Decimal
+    override: OverrideLine | None
+
+
+def read_marks(text: str) -> Decimal:
+    """Marks as people write them, with a point or a comma. Raises UsageError for what is no number."""
+    try:
+        return Decimal(text.strip().replace(",", "."))
+    except InvalidOperation:
+        raise UsageError(f"marks are {text.strip()[:40]!r}, expected a number such as 2.5") from None
+
+
+def set_marks(session: Session, job_id: str, criterion: str, marks: Decimal, reason: str, actor: str) -> None:
+    """Let a criterion of this grade's submission have these marks from now on.
+
+    Raises UsageError for a grade or criterion that there is not, marks out of its range, or no reason.
+    """
+    submission_id, line = _criterion(session, job_id, criterion)
+    if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):
+        raise UsageError(
+            f"marks for {line.title} are {marks}, "
+            f"expected 0 to {line.worth:f}, with at most four digits after the point"
+        )
+    _replace(session, submission_id, line, abs(marks), reason, actor)
+
+
+def excuse(session: Session, job_id: str, criterion: str, reason: str, actor: str) -> None:
+    """Let neither the marks of a criterion count nor the most there are. Raises UsageError as ``set_marks`` does."""
+    submission_id, line = _criterion(session, job_id, criterion)
+    _replace(session, submission_id, line, None, reason, actor)
+
+
+def withdraw(session: Session, job_id: str, criterion: str, actor: str) -> None:
+    """Let the grader's marks of a criterion count again. Raises UsageError where nothing was set by hand."""
+    submission_id = _submission(session, job_id)
+    before = of_jobs(session, [job_id]).get(job_id, {}).get(criterion)
+    if before is None:
+        raise UsageError(f"nothing is set by hand for {criterion!r} in grade {job_id}")
+    _end(session, before, now(session))
+    detail = {"criterion": criterion, "before": _words(before.marks), "after": "as graded", "override": before.id}
+    audit.note(session, actor, "withdraw", "submission", str(submission_id), **detail)
+    _recount_all(session, submission_id)
+
+
+def of_jobs(session: Session, job_ids: Sequence[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
+    """What is set by hand for the submissions of these jobs, by job and criterion; no job where nothing is."""
+    query = (
+        select(Job.id, Override)
+        .join(Override, Override.submission_id == Job.submission_id)
+        .where(Job.id.in_(job_ids), Override.withdrawn_at.is_(None))
+    )
+    found: dict[str, dict[str, OverrideLine]] = {}
+    for job_id, row in session.execute(query):
+        line = OverrideLine(row.id, row.marks, row.reason, row.actor, row.made_at)
+        found.setdefault(job_id, {})[row.criterion] = line
+    return found
+
+
+def criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
+    """The criteria of a grade in their order."""
+    row = CriterionResultRow
+    columns = (row.criterion, row.title, row.message, row.visibility, row.unjudged, row.marks, row.max_marks)
+    by_hand = of_jobs(session, [job_id]).get(job_id, {})
+    lines = []
+    for criterion, title, message, visibility, unjudged, marks, worth in session.execute(
+        select(*columns).where(row.job_id == job_id).order_by(row.position)
+    ):
+        override = by_hand.get(criterion)
+        counted = (marks, worth) if override is None else override.counted(worth)
+        graded = None if unjudged else marks
+        lines.append(CriterionMarks(criterion, title, message, visibility, graded, worth, *counted, override))
+    return lines
+
+
+def recount(session: Session, job_id: str) -> None:
+    """Write down what a job's criteria come to as they count; nothing else writes a job's marks."""
+    lines = criterion_marks(session, job_id)
+    marks, most = (sum(each, _NONE) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
+    statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=most)
+    session.execute(statement, execution_options={"synchronize_session": False})
+
+
+def waits_for_judgement() -> ColumnElement[bool]:
+    """Of a criterion's row beside its job's: it could not be judged, and nobody has said since what it counts."""
+    said = (
+        exists()
+        .where(
+            Override.submission_id == Job.submission_id,
+            Override.criterion == CriterionResultRow.criterion,
+            Override.withdrawn_at.is_(None),
+        )
+        .correlate(Job, CriterionResultRow)
+    )
+    return and_(CriterionResultRow.unjudged.is_not(None), ~said)
+
+
+def _submission(session: Session, job_id: str) -> int:
+    """Whose grade it is; all grades of that submission are locked, so that one that comes in meanwhile counts too."""
+    job = session.get(Job, job_id)
+    if job is None or job.state is not JobState.DONE:
+        raise UsageError(f"{job_id} has no grade")
+    of_it = select(Job.id).where(Job.submission_id == job.submission_id)
+    session.execute(of_it.order_by(Job.queued_at, Job.id).with_for_update()).all()
+    return job.submission_id
+
+
+def _criterion(session: Session, job_id: str, criterion: str) -> tuple[int, CriterionMarks]:
+    submission_id = _submission(session, job_id)
+    lines = {line.criterion: line for line in criterion_marks(session, job_id)}
+    if criterion not in lines:
+        raise UsageError(f"grade {job_id} has no criterion {criterion[:80]!r}{did_you_mean(criterion, lines)}")
+    return submission_id, lines[criterion]
+
+
+def _replace(
+    session: Session, submission_id: int, line: CriterionMarks, marks: Decimal | None, reason: str, actor: str
+) -> None:
+    reason = reason.strip()
+    if not 0 < len(reason) <= LONGEST_REASON:
+        raise UsageError(f"the reason has {len(reason)} characters, expected 1 to {LONGEST_REASON}: students read it")
+    at = now(session)
+    if line.override is not None:
+        _end(session, line.override, at)
+    row = Override(
+        submission_id=submission_id,
+        criterion=line.criterion,
+        marks=marks,
+        excused=marks is None,
+        reason=reason,
+        actor=actor,
+        made_at=at,
+    )
+    session.add(row)
+    session.flush()
+    before = line.graded if line.override is None else line.override.marks
+    told = "not judged" if line.override is None and line.graded is None else _words(before)
+    # The reason goes with the submission when that is purged, which the trail does not.
+    detail = {"criterion": line.criterion, "before": told, "after": _words(marks), "override": row.id}
+    action = "excuse" if marks is None else "set marks"
+    audit.note(session, actor, action, "submission", str(submission_id), **detail)
+    _recount_all(session, submission_id)
+
+
+def _end(session: Session, line: OverrideLine, at: datetime) -> None:
+    session.get_one(Override, line.id).withdrawn_at = at
+    session.flush()
+
+
+def _recount_all(session: Session, submission_id: int) -> None:
+    done = select(Job.id).where(Job.submission_id == submission_id, Job.state == JobState.DONE)
+    for job_id in session.scalars(done).all():
+        recount(session, job_id)
+
+
+def _words(marks: Decimal | None) -> str:
+    return "excused" if marks is None else f"{marks.normalize():f}"

@@ -1,0 +1,183 @@
+"""Recordings to bytes and back: compact, bit for bit, and readable without running anything.
+
+A recording's bytes are zlib over an npz of arrays, images as raw bytes, and one JSON text; never a pickle.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zlib
+from dataclasses import dataclass, fields, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.store.codec import decode, encode
+from service.store.grades.recorded_words import RecordingError, with_words
+from sim.columns import Column
+from sim.recording import COLUMNS, Image, Recording, Ticks
+
+#: What one grade's recordings may take together, compressed; a flood of output must not fill the database.
+GRADE_BYTES = 64_000_000
+#: What a recording may always have, however many there are.
+SMALLEST_CAP = 256_000
+_TEXT_KEPT = 2000
+
+_Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A recording as it is stored: whole, or without what was too large."""
+
+    recording: Recording
+    data: bytes
+
+
+def cap_for(trials: int) -> int:
+    """Bytes that each of a grade's recordings may take."""
+    return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
+
+
+def keep(recording: Recording, cap: int) -> Kept:
+    """The recording within ``cap`` bytes; what does not fit is left out, and a note says so.
+
+    Left out first are images and all but the first texts of each kind, then every text, then the ticks; the
+    verdict, the faults, the poses and the chain's hash always stay.
+    """
+    data = to_bytes(recording)
+    for trim in (_without_floods, _without_words, _without_ticks):
+        if len(data) <= cap:
+            break
+        if recording.partner is not None:
+            recording = replace(recording, partner=trim(recording.partner))
+        recording = trim(recording)
+        data = to_bytes(recording)
+    return Kept(recording, data)
+
+
+def to_bytes(recording: Recording) -> bytes:
+    """Everything in the recording, compressed."""
+    ticks = recording.ticks
+    words: dict[str, Any] = {
+        field.name: encode(getattr(recording, field.name))
+        for field in fields(recording)
+        if field.name not in ("ticks", "images", "partner")
+    }
+    words["ticks"] = _of_all_ticks(ticks)
+    words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
+    arrays: dict[str, NDArray[Any]] = {
+        "words": _bytes_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
+        "picture_sizes": np.array([[len(i.left), len(i.right)] for i in recording.images], np.int64),
+        "pictures": _bytes_array(b"".join(i.left + i.right for i in recording.images)),
+    }
+    for column in COLUMNS:
+        values = np.asarray(getattr(ticks, column.name), column.dtype)
+        arrays[column.name] = _shuffled(values.reshape(-1, column.width))
+    if recording.partner is not None:
+        arrays["partner"] = _bytes_array(to_bytes(recording.partner))
+    buffer = io.BytesIO()
+    np.savez(buffer, **cast(dict[str, Any], arrays))
+    return zlib.compress(buffer.getvalue(), 6)
+
+
+def from_bytes(data: bytes) -> Recording:
+    """The recording again. Raises RecordingError if the bytes are not one."""
+    try:
+        with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
+            words = json.loads(bytes(arrays["words"]))
+            pixels = bytes(arrays["pictures"])
+            partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
+            sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
+            # A recording may be older than a column.
+            columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
+        ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
+        images = _with_pixels(words.pop("images"), sizes, pixels)
+        return with_words(words, ticks, images, partner)
+    except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
+        raise RecordingError(f"not a recording: {error}") from error
+
+
+def _of_all_ticks(ticks: Ticks) -> dict[str, int]:
+    return {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels, "length": ticks.length}
+
+
+def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
+    made = []
+    offset = 0
+    for words, (left, right) in zip(images, sizes, strict=True):
+        middle, end = offset + left, offset + left + right
+        image = decode(Image, words)
+        made.append(replace(image, left=pixels[offset:middle], right=pixels[middle:end]))
+        offset = end
+    return tuple(made)
+
+
+def _bytes_array(data: bytes) -> _Bytes:
+    return np.frombuffer(data, np.uint8)
+
+
+def _shuffled(columns: NDArray[Any]) -> _Bytes:
+    """(n, c) of 8-byte numbers to (c, 8, n) bytes: differences of their bit patterns, like bytes together.
+
+    Halves what zlib makes of a path, and loses no bit: the differences wrap.
+    """
+    rows, count = columns.shape
+    patterns = np.ascontiguousarray(columns.T).view(np.uint64)
+    steps = np.diff(patterns, axis=1, prepend=np.zeros((count, 1), np.uint64))
+    return np.ascontiguousarray(steps.view(np.uint8).reshape(count, rows, 8).transpose(0, 2, 1))
+
+
+def _unshuffled(data: _Bytes, kind: type[np.generic]) -> NDArray[Any]:
+    count, _, rows = data.shape
+    steps = np.ascontiguousarray(data.transpose(0, 2, 1)).reshape(count, rows * 8).view(np.uint64)
+    return np.ascontiguousarray(np.cumsum(steps, axis=1, dtype=np.uint64).view(kind).T)
+
+
+def _column(data: _Bytes, column: Column) -> NDArray[Any]:
+    values = _unshuffled(data, column.dtype)
+    return (values if column.width > 1 else values[:, 0]).copy()
+
+
+def _noted(recording: Recording, what: str) -> Recording:
+    note = f"The recording was too large to be kept whole: {what}."
+    return replace(recording, notes=(*recording.notes, note))
+
+
+def _without_floods(recording: Recording) -> Recording:
+    return _noted(
+        replace(
+            recording,
+            images=(),
+            image_log=(),
+            calls=recording.calls[:_TEXT_KEPT],
+            printed=recording.printed[:_TEXT_KEPT],
+            datalog=recording.datalog[:_TEXT_KEPT],
+            messages=recording.messages[:_TEXT_KEPT],
+            agent_messages=recording.agent_messages[:_TEXT_KEPT],
+        ),
+        f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
+    )
+
+
+def _without_words(recording: Recording) -> Recording:
+    bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
+    outputs = (
+        replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
+    )
+    cut = replace(
+        bare,
+        responder_output=recording.responder_output[:_TEXT_KEPT],
+        responder_log=recording.responder_log[:_TEXT_KEPT],
+        faults=recording.faults[:10],
+        agent_messages=(),
+        agent_outputs=tuple(outputs),
+    )
+    return _noted(cut, "what was printed, said and sent is left out")
+
+
+def _without_ticks(recording: Recording) -> Recording:
+    ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_of_all_ticks(recording.ticks)}))
+    return _noted(replace(recording, ticks=ticks), "its ticks are left out")

@@ -1,0 +1,103 @@
+"""Grades that need not be run again: the same submission, assignment, seeds and grader give the same marks.
+
+A copy has rows of its own and names the grade that was run. What may be copied is decided here, when is not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import exists, insert, literal, select
+from sqlalchemy.orm import Session
+
+from service.store import phases
+from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
+from service.store.states import JobState, PlotState
+
+#: How far such a trial came depends on the machine and its load, so another run may differ.
+_NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
+
+
+def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
+    """Alike for two jobs only where their grades must be: the seeds follow from the assignment and the secret."""
+    query = (
+        select(SubmissionRow.sha256, AssignmentVersion.sha256)
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.id == job_id)
+    )
+    return key_of(*session.execute(query).one(), grader_sha256, secret_sha256)
+
+
+def key_of(submission_sha256: str, assignment_sha256: str, grader_sha256: str, secret_sha256: str) -> str:
+    """The same of what has no job yet."""
+    parts = (submission_sha256, assignment_sha256, grader_sha256, secret_sha256)
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def find(session: Session, key: str) -> str | None:
+    """The newest grade that may be copied for this key; None where it has to be run.
+
+    Never one without the sandbox, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
+    """
+    distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
+    cut = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
+    unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
+    query = (
+        select(Job.id)
+        .where(
+            Job.cache_key == key,
+            Job.state == JobState.DONE,
+            Job.suspect.is_(None),
+            Job.copied_from.is_(None),
+            # The key fixes the sandbox's policy; these say that both layers stood.
+            Job.sandbox.contains("Landlock"),
+            Job.sandbox.contains("seccomp"),
+            ~distrusted,
+            ~cut,
+            ~unjudged,
+        )
+        .order_by(Job.finished_at.desc(), Job.id)
+        .limit(1)
+    )
+    return session.scalar(query)
+
+
+def copy_rows(session: Session, source_id: str, job_id: str) -> None:
+    """Copy the rows of a grade to another job, which has none."""
+    for table in (TrialRow, CriterionResultRow, Artifact):
+        columns = table.__table__.columns
+        kept = [column for column in columns if column.name not in ("id", "job_id")]
+        rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
+        session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))
+
+
+def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
+    """What another job itself has of a grade that is copied to it."""
+    source = session.scalars(select(Job).where(Job.id == source_id)).one()
+    queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
+    of_grade = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
+    names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
+    drawn = source.plots is PlotState.DONE
+    return {name: getattr(source, name) for name in names} | {
+        "notes": _notes(session, source, job_id),
+        "copied_from": source_id,
+        "graded_at": at,
+        "phases": phases.written({phases.QUEUED: queued_at, phases.COMMITTED: at}),
+        "plots": PlotState.DONE if drawn else PlotState.DUE,
+        "plots_due_at": None if drawn else at,
+        "plotted_at": at if drawn else None,
+    }
+
+
+def _notes(session: Session, source: Job, job_id: str) -> list[str]:
+    """What was noted when this submission was read, then by the grading: another's folder may have their name."""
+    from submissions.packed import unpack_submission
+
+    packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
+    theirs, own = (
+        unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)
+    )
+    return [*own, *(note for note in source.notes if note not in theirs)]

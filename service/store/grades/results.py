@@ -1,0 +1,295 @@
+"""Grades to rows and back, whole: marks, evidence, accuracy as data, and every recording as an artifact.
+
+Whether a worker may store a grade is ``jobs``'s to say; nothing here judges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any, cast
+
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from service.grading.grade import (
+    Accuracy,
+    AccuracyCurve,
+    Confidence,
+    Cost,
+    Counts,
+    CriterionResult,
+    Evidence,
+    Grade,
+    Prediction,
+    SetByHand,
+    Shown,
+    TrialResult,
+    WrittenComment,
+)
+from service.store import artifacts
+from service.store.codec import decode, encode
+from service.store.grades import comments, overrides
+from service.store.grades.overrides import OverrideLine
+from service.store.grades.recorded_words import words_from_bytes
+from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from sim.errors import HostError, UsageError
+from sim.recorded import faults_of
+from sim.recording import Image, Recording
+from submissions.seeds import PUBLIC
+
+_RECORDING = "application/x-robomark-recording"
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A grade made ready for its transaction, so that compressing keeps no lock waiting."""
+
+    grade: Grade
+    files: list[artifacts.File]
+    predictions: list[list[dict[str, Any]]]  # a list a criterion
+
+
+def prepare(grade: Grade) -> Prepared:
+    """Compress the recordings and point the predictions at their images."""
+    from service.store.grades import recordings
+
+    cap = recordings.cap_for(len(grade.trials))
+    kept = [recordings.keep(trial.recording, cap) for trial in grade.trials]
+    files = [artifacts.File(_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)]
+    numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in kept]
+    predictions = [
+        [
+            plain
+            for prediction in result.predictions
+            if (plain := _encoded_prediction(prediction, numbers[prediction.trial])) is not None
+        ]
+        for result in grade.criteria
+    ]
+    return Prepared(grade, files, predictions)
+
+
+def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> None:
+    """Write the rows of a grade; those of an earlier grading of the same job go."""
+    grade = prepared.grade
+    session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))
+    session.execute(delete(CriterionResultRow).where(CriterionResultRow.job_id == job_id))
+    session.add_all(_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
+    session.add_all(
+        _criterion_row(job_id, position, result, prepared.predictions[position])
+        for position, result in enumerate(grade.criteria)
+    )
+    artifacts.put(session, job_id, prepared.files, at)
+
+
+def load(session: Session, job_id: str) -> Grade:
+    """The grade of a job as it counts, with what instructors set and wrote. Raises UsageError when it has none."""
+    return _as_all_counts(session, job_id, load_graded(session, job_id))
+
+
+def load_words(session: Session, job_id: str) -> Grade:
+    """As ``load``, for whoever tells what was said and marked: recordings without their ticks and pixels."""
+    return _as_all_counts(session, job_id, _load(session, job_id, _trials(session, job_id, words_from_bytes)))
+
+
+def load_graded(session: Session, job_id: str) -> Grade:
+    """The grade of a job as the grader gave it. Raises UsageError when it has none."""
+    return _load(session, job_id, load_trials(session, job_id))
+
+
+def load_marks(session: Session, job_id: str) -> Grade:
+    """The grade of a job as it counts, without its trials and predictions, for lists, which read no recordings.
+
+    Raises like ``load``.
+    """
+    return _as_all_counts(session, job_id, _load(session, job_id, ()))
+
+
+def _as_all_counts(session: Session, job_id: str, graded: Grade) -> Grade:
+    by_hand = overrides.of_jobs(session, [job_id]).get(job_id, {})
+    return replace(
+        graded,
+        criteria=tuple(_as_it_counts(result, by_hand.get(result.id)) for result in graded.criteria),
+        comments=tuple(WrittenComment(each.criterion, each.text) for each in comments.of_job(session, job_id)),
+    )
+
+
+def _load(session: Session, job_id: str, trials: tuple[TrialResult, ...]) -> Grade:
+    query = (
+        select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.id == job_id)
+    )
+    found = session.execute(query).one_or_none()
+    if found is None or found[0].verdict is None:
+        raise UsageError(f"{job_id} has no grade")
+    job, sha256, student, version = found
+    rows = session.scalars(
+        select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
+    )
+    return Grade(
+        assignment=version.assignment,
+        assignment_title=version.title,
+        assignment_version=version.version,
+        submission=sha256,
+        student=student,
+        criteria=tuple(_criterion(row, trials) for row in rows),
+        trials=trials,
+        sandbox=job.sandbox or "",
+        grader_version=job.grader_version or "",
+        notes=tuple(job.notes),
+        missing=job.missing,
+        hints=tuple(job.hints),
+        secret_sha256=job.secret_sha256 or PUBLIC.sha256,
+        cost=None if job.cost is None else decode(Cost, job.cost),
+    )
+
+
+def load_trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
+    """The trials of a job with their recordings; none where it has no grade."""
+    from service.store.grades.recordings import from_bytes
+
+    return _trials(session, job_id, from_bytes)
+
+
+def _trials(session: Session, job_id: str, read: Callable[[bytes], Recording]) -> tuple[TrialResult, ...]:
+    files = artifacts.get(session, job_id, prefix="recording-")
+    rows = session.scalars(select(TrialRow).where(TrialRow.job_id == job_id).order_by(TrialRow.position))
+    return tuple(
+        TrialResult(
+            scenario=row.scenario,
+            index=row.scenario_index,
+            seed=row.seed,
+            light_noise=row.light_noise,
+            motor_noise=row.motor_noise,
+            visibility=row.visibility,
+            recording=read(_recording(files, job_id, row.position)),
+            sweep=decode(tuple[tuple[str, float], ...], row.sweep),
+            place=row.place,
+        )
+        for row in rows
+    )
+
+
+def _recording_name(position: int) -> str:
+    return f"recording-{position}"
+
+
+def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
+    return TrialRow(
+        job_id=job_id,
+        position=position,
+        scenario=trial.scenario,
+        scenario_index=trial.index,
+        seed=trial.seed,
+        light_noise=trial.light_noise,
+        motor_noise=trial.motor_noise,
+        visibility=trial.visibility,
+        verdict=trial.verdict.value,
+        sha256=trial.recording.sha256,
+        end_t=trial.recording.end_t,
+        place=trial.place,
+        sweep=encode(trial.sweep),
+        surprise=next((fault.staff for fault in faults_of(trial.recording) if fault.staff), None),
+    )
+
+
+def _criterion_row(
+    job_id: str, position: int, result: CriterionResult, predictions: list[dict[str, Any]]
+) -> CriterionResultRow:
+    accuracy = result.accuracy
+    return CriterionResultRow(
+        job_id=job_id,
+        position=position,
+        criterion=result.id,
+        title=result.title,
+        marks=result.marks,
+        max_marks=result.max_marks,
+        message=result.message,
+        visibility=result.visibility,
+        evidence=encode(result.evidence),
+        accuracy=accuracy and accuracy.value,
+        accuracy_low=accuracy and accuracy.low,
+        accuracy_high=accuracy and accuracy.high,
+        accuracy_n=accuracy and accuracy.n,
+        labels=accuracy and encode(accuracy.labels),
+        confusion=accuracy and encode(accuracy.confusion),
+        counts=accuracy and encode(accuracy.counts),
+        confidence=accuracy and encode(accuracy.confidence),
+        curves=encode(result.curves),
+        unjudged=result.unjudged or None,
+        predictions=predictions,
+        shown=result.shown and encode(result.shown),
+        for_staff=result.for_staff,
+    )
+
+
+def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
+    """A prediction that names its image by number in the recording; none if the image was too much to keep."""
+    if not numbers:
+        return None
+    where = numbers.get(prediction.image)
+    plain = cast(dict[str, Any], encode(replace(prediction, image=cast(Image, None))))
+    return plain | {"image": where if where is not None else encode(prediction.image)}
+
+
+def _recording(files: dict[str, artifacts.File], job_id: str, position: int) -> bytes:
+    name = _recording_name(position)
+    if name not in files:
+        raise HostError(f"The database is damaged: {name} of {job_id} is gone")
+    return files[name].data
+
+
+def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> CriterionResult:
+    return CriterionResult(
+        id=row.criterion,
+        title=row.title,
+        marks=row.marks,
+        max_marks=row.max_marks,
+        message=row.message,
+        visibility=row.visibility,
+        evidence=decode(tuple[Evidence, ...], row.evidence),
+        accuracy=_accuracy(row),
+        predictions=tuple(_prediction(plain, trials) for plain in row.predictions) if trials else (),
+        curves=decode(tuple[AccuracyCurve, ...], row.curves),
+        shown=None if row.shown is None else decode(Shown, row.shown),
+        unjudged=row.unjudged or "",
+        for_staff=row.for_staff,
+    )
+
+
+def _as_it_counts(result: CriterionResult, override: OverrideLine | None) -> CriterionResult:
+    if override is None:
+        return result
+    marks, max_marks = override.counted(result.max_marks)
+    excused = override.marks is None
+    if not result.unjudged:
+        said = SetByHand(result.marks, result.max_marks, override.reason, excused)
+        return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said)
+    # That staff will look at it is true no more.
+    said = SetByHand(None, result.max_marks, override.reason, excused)
+    return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said, message="", unjudged="")
+
+
+def _accuracy(row: CriterionResultRow) -> Accuracy | None:
+    if row.accuracy is None or row.accuracy_low is None or row.accuracy_high is None or row.accuracy_n is None:
+        return None
+    return Accuracy(
+        value=row.accuracy,
+        low=row.accuracy_low,
+        high=row.accuracy_high,
+        n=row.accuracy_n,
+        labels=tuple(row.labels or ()),
+        confusion=decode(tuple[tuple[str, str | None, int], ...], row.confusion or []),
+        counts=None if row.counts is None else decode(Counts, row.counts),
+        confidence=None if row.confidence is None else decode(Confidence, row.confidence),
+    )
+
+
+def _prediction(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
+    where = plain["image"]
+    image = trials[plain["trial"]].recording.images[where] if isinstance(where, int) else decode(Image, where)
+    return Prediction(image, plain["truth"], plain["answer"], plain["scenario"], plain["trial"])

@@ -1,0 +1,122 @@
+"""The students of a course: found by id, enrolled when new, and refused where one cannot be told from another.
+
+What a name comes to is ``submissions.names``'; what a student submits is ``intake.py``'s.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.inserting import insert_if_new
+from service.store.models import Course, Enrolment, Person
+from service.store.states import Role
+from sim.errors import UsageError
+from submissions.names import cannot_be_told, forms, shown_name
+from submissions.nearest import did_you_mean
+from submissions.people import Student
+from submissions.raw_files import shown
+
+#: The course of an installation that has only one.
+DEFAULT_COURSE = "default"
+
+
+def course_of(session: Session, name: str, at: datetime) -> int:
+    """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
+    insert_if_new(session, Course, name=name, created_at=at)
+    return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()
+
+
+class Students:
+    """The students of one course, in one transaction that has locked it."""
+
+    def __init__(self, session: Session, course_id: int) -> None:
+        self._session = session
+        self._course_id = course_id
+        self._by_form: dict[str, dict[str, int]] | None = None
+
+    def enrol(self, student: Student, at: datetime) -> int:
+        """The enrolment of the student whose id is written so, new if there is none.
+
+        One who is written otherwise than in the normal form is only who was first written so. Name and address are
+        those that were told last. Raises UsageError for an id that is nobody's, or cannot be told from another's.
+        """
+        own, written = shown_name(student.id), unicodedata.normalize("NFC", student.id)
+        if not own:
+            raise UsageError("this names no student, expected a name that can be seen.")
+        found = self._enrolled(own)
+        if found is None:
+            others = self._near(own)
+            # What was enrolled before there was one normal form may have blanks round it.
+            same = [enrolment_id for other, enrolment_id in others.items() if shown_name(other) == own]
+            if len(same) == 1:
+                self._tell(same[0], student)
+                return same[0]
+            if not others:
+                return self._new(own, written, student, at)
+        else:
+            others = {own: found.id}
+            if written == own:
+                found.written = own
+            if written == found.written:
+                self._tell(found.id, student)
+                return found.id
+        raise UsageError(
+            f'"{shown(written)}" {cannot_be_told(list(others)[:3])}, who is in this course; '
+            "expected that name as it is written there, or another."
+        )
+
+    def known(self, student: Student) -> int | None:
+        """The enrolment of who is written so in the normal form; None where nobody is, or it would have to be asked."""
+        found = self._enrolled(shown_name(student.id))
+        return None if found is None else found.id
+
+    def find(self, written: str) -> int:
+        """The enrolment of the student who is written so.
+
+        Raises UsageError, with one like it if there is one, for somebody who is not in the course.
+        """
+        found = self._enrolled(shown_name(written))
+        if found is not None:
+            return found.id
+        known = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
+        hint = did_you_mean(written, known) or "; robomark course enrol lets in who has not submitted anything"
+        raise UsageError(f"there is no student {shown(written)!r} in this course{hint}")
+
+    def _enrolled(self, own: str) -> Enrolment | None:
+        query = select(Enrolment).where(Enrolment.course_id == self._course_id, Enrolment.student == own)
+        return self._session.scalars(query).one_or_none()
+
+    def _tell(self, enrolment_id: int, student: Student) -> None:
+        row = self._session.get_one(Enrolment, enrolment_id)
+        # An instructor's name is nothing that another instructor's table changes.
+        if (student.name or student.email) and row.role is Role.STUDENT:
+            person = self._session.get_one(Person, row.person_id)
+            person.name, person.email = student.name or person.name, student.email or person.email
+
+    def _new(self, own: str, written: str, student: Student, at: datetime) -> int:
+        person = Person(name=student.name, email=student.email or None, created_at=at)
+        self._session.add(person)
+        self._session.flush()
+        row = Enrolment(course_id=self._course_id, person_id=person.id, student=own, written=written, role=Role.STUDENT)
+        self._session.add(row)
+        self._session.flush()
+        self._note(own, row.id)
+        return row.id
+
+    def _near(self, name: str) -> dict[str, int]:
+        """The students, by name, that one of this name could be taken for."""
+        if self._by_form is None:
+            self._by_form = {}
+            query = select(Enrolment.student, Enrolment.id).where(Enrolment.course_id == self._course_id)
+            for student, enrolment_id in self._session.execute(query):
+                self._note(student, enrolment_id)
+        return {other: which for form in sorted(forms(name)) for other, which in self._by_form.get(form, {}).items()}
+
+    def _note(self, name: str, enrolment_id: int) -> None:
+        if self._by_form is not None:
+            for form in forms(name):
+                self._by_form.setdefault(form, {})[name] = enrolment_id

@@ -1,0 +1,342 @@
+"""The states of a job, and every transition between them: nothing else writes a job's state, lease or due moment.
+
+A worker holds a job by its lease's token, and every change it makes is refused once the token is no longer the job's.
+Which job is due first stands in ``scheduling.py``; finding lost ones in ``lease_reaper.py``; plots in ``plots.py``.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any, cast
+
+from sqlalchemy import ColumnElement, CursorResult, Select, select, update
+from sqlalchemy.orm import Session
+
+from service.store import outbox, phases
+from service.store.codec import encode
+from service.store.engine import Store, now
+from service.store.grades import overrides, plots, result_cache
+from service.store.installation import secret_of
+from service.store.models import Job
+from service.store.queue import workers
+from service.store.queue.scheduling import next_job
+from service.store.states import JobState, PlotState
+from service.version import grader_sha256
+from sim.errors import Cancelled, HostError
+
+if TYPE_CHECKING:
+    from service.store.grades import results
+
+_LONGEST_BACKOFF = timedelta(hours=1)
+#: Clocks are corrected all the time by less than this.
+_TOLERANCE = timedelta(seconds=2)
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """What may happen to a job: from which states, to which, and by whom. From none: there was no job."""
+
+    name: str
+    before: tuple[JobState, ...]
+    after: JobState
+    by: str
+
+
+ENQUEUE = Transition("enqueue", (), JobState.QUEUED, "intake, a regrade, a quarantine")
+COPY = Transition("copy", (JobState.QUEUED,), JobState.DONE, "intake")
+SUPERSEDE = Transition("supersede", (JobState.QUEUED,), JobState.CANCELLED, "intake")
+CLAIM = Transition("claim", (JobState.QUEUED,), JobState.RUNNING, "a worker")
+HEARTBEAT = Transition("heartbeat", (JobState.RUNNING,), JobState.RUNNING, "the worker that holds it")
+FINISH = Transition("finish", (JobState.RUNNING,), JobState.DONE, "the worker that holds it")
+TRY_AGAIN = Transition("try again", (JobState.RUNNING,), JobState.QUEUED, "the worker that holds it, the lease reaper")
+GIVE_UP = Transition("give up", (JobState.RUNNING,), JobState.DEAD, "the worker that holds it, the lease reaper")
+GIVE_BACK = Transition("give back", (JobState.RUNNING,), JobState.QUEUED, "a worker's end, a quarantine")
+CANCEL = Transition("cancel", (JobState.QUEUED, JobState.RUNNING), JobState.CANCELLED, "staff")
+RETRY = Transition("retry", (JobState.DEAD,), JobState.QUEUED, "staff")
+TRANSITIONS = (
+    ENQUEUE, COPY, SUPERSEDE, CLAIM, HEARTBEAT, FINISH, TRY_AGAIN, GIVE_UP, GIVE_BACK, CANCEL, RETRY,
+)  # fmt: skip
+
+
+class Fenced(Cancelled):
+    """The job is no longer this worker's: cancelled, or another has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A job in the hands of one worker."""
+
+    job_id: str
+    lease: str
+    attempt: int  # 1 is the first
+    max_attempts: int
+    at: datetime  # the database's clock when it was claimed
+
+
+@dataclass(frozen=True, slots=True)
+class Retry:
+    """How often a job is tried again after a fault of ours, and how long it waits: doubling from ``backoff``."""
+
+    backoff_seconds: float
+
+    def wait(self, attempt: int) -> timedelta:
+        """Before the attempt after number ``attempt`` (1 is the first)."""
+        return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _LONGEST_BACKOFF)
+
+
+def enqueue(session: Session, job: Job, at: datetime) -> str:
+    """Let a new job wait from now on. Returns its id."""
+    job.state = ENQUEUE.after
+    job.queued_at = job.due_at = at
+    session.add(job)
+    session.flush()
+    return job.id
+
+
+def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
+    """Give a job that waits the grade of an identical one at once. Raises HostError when it does not wait."""
+    values = result_cache.copied(session, source_id, job_id, at)
+    if not _make(session, COPY, (Job.id == job_id,), at, values):
+        raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
+    result_cache.copy_rows(session, source_id, job_id)
+    overrides.recount(session, job_id)
+    outbox.grade_copied(session, job_id)
+
+
+def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
+    """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
+    which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
+    if _make(session, SUPERSEDE, which, at, {"error": f"superseded by {by}"}):
+        outbox.superseded(session, submissions, at)
+
+
+def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
+    """Take the job whose turn it is; None when none is due."""
+    with store.transaction() as session:
+        at = now(session)
+        job_id = None if workers.is_in_quarantine(session, worker) else next_job(session, at, worker)
+        if job_id is None:
+            return None
+        begun, most = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
+        claimed = Claim(job_id, secrets.token_hex(16), begun + 1, most, at)
+        values = {
+            "attempt": Job.attempt + 1,
+            "lease": claimed.lease,
+            "lease_until": at + timedelta(seconds=lease_seconds),
+            "heartbeat_at": at,
+            "started_at": at,
+            "worker": worker,
+            "process": os.getpid(),
+            "progress": 0.0,
+        }
+        return claimed if _make(session, CLAIM, (Job.id == job_id,), at, values) else None
+
+
+def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
+    """Keep the lease and tell the progress (0 to 1). Raises Fenced when the job is no longer this worker's."""
+    with store.transaction() as session:
+        at = now(session)
+        values = {
+            "lease_until": at + timedelta(seconds=lease_seconds),
+            "heartbeat_at": at,
+            "progress": min(1.0, max(0.0, progress)),
+        }
+        _make_held(session, HEARTBEAT, claim, at, values)
+
+
+def finish(
+    store: Store,
+    claim: Claim,
+    prepared: results.Prepared,
+    graded_at: datetime,
+    trials_at: datetime | None = None,
+) -> None:
+    """Store the grade with all its rows and end the job, in one transaction.
+
+    ``trials_at`` and ``graded_at`` are when the last trial had been run and when all was marked. Raises Fenced, and
+    stores nothing, when the job is no longer this worker's.
+    """
+    # Whoever only enqueues, holds or cancels jobs need not wait for what reads recordings.
+    from service.store.grades import results
+
+    grade = prepared.grade
+    with store.transaction() as session:
+        at = now(session)
+        queued_at = session.scalar(select(Job.queued_at).where(Job.id == claim.job_id))
+        moments = {
+            phases.QUEUED: queued_at,
+            phases.CLAIMED: claim.at,
+            phases.TRIALS: trials_at,
+            phases.JUDGED: graded_at,
+            phases.COMMITTED: at,
+        }
+        values = {
+            "phases": phases.written(moments),
+            "graded_at": graded_at,
+            "verdict": grade.verdict.value,
+            "grader_version": grade.grader_version,
+            "grader_sha256": grader_sha256(),
+            "secret_sha256": grade.secret_sha256,
+            "cache_key": result_cache.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
+            "sandbox": grade.sandbox,
+            "missing": grade.missing,
+            "notes": list(grade.notes),
+            "hints": list(grade.hints),
+            "cost": grade.cost and encode(grade.cost),
+            "plots": PlotState.DUE,
+            "plots_due_at": at,
+        }
+        _refuse_quarantined(session, claim)
+        _make_held(session, FINISH, claim, at, values)
+        results.insert(session, claim.job_id, prepared, at)
+        overrides.recount(session, claim.job_id)
+        outbox.grade_finished(session, claim.job_id)
+
+
+def finish_from_cache(store: Store, claim: Claim) -> bool:
+    """End the job with the grade of an identical one, where there is one and nobody asked for it to be run anew.
+
+    Raises Fenced when the job is no longer this worker's.
+    """
+    secret = secret_of(store)
+    with store.transaction() as session:
+        if session.scalar(select(Job.forced).where(Job.id == claim.job_id)):
+            return False
+        source = result_cache.find(
+            session, result_cache.cache_key(session, claim.job_id, grader_sha256(), secret.sha256)
+        )
+        if source is None:
+            return False
+        at = now(session)
+        _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
+        result_cache.copy_rows(session, source, claim.job_id)
+        overrides.recount(session, claim.job_id)
+        outbox.grade_finished(session, claim.job_id)
+        return True
+
+
+def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
+    """A fault of ours: the job waits for another attempt, or is dead when there were enough.
+
+    Raises Fenced when the job is no longer this worker's.
+    """
+    with store.transaction() as session:
+        return fault(session, claim, reason, retry, now(session))
+
+
+def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetime) -> JobState:
+    """The same in a transaction that is open, for a worker that cannot say so itself any more."""
+    if claim.attempt >= claim.max_attempts:
+        times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
+        _make_held(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
+        outbox.job_ended(session, claim.job_id)
+        return GIVE_UP.after
+    _make_held(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
+    return TRY_AGAIN.after
+
+
+def give_up(store: Store, claim: Claim, reason: str) -> None:
+    """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
+    with store.transaction() as session:
+        _make_held(session, GIVE_UP, claim, now(session), {"error": reason})
+        outbox.job_ended(session, claim.job_id)
+
+
+def release_worker(store: Store, worker: str) -> int:
+    """Give back all that a worker held, one that is known to have ended. Returns how many jobs that were."""
+    with store.transaction() as session:
+        return give_back(session, worker, now(session))
+
+
+def give_back(session: Session, worker: str, at: datetime) -> int:
+    """Let all that a worker holds wait as if it had not been begun. Returns how many jobs that were."""
+    return _make(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
+
+
+def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
+    """End the jobs of a batch that have not ended; a worker that runs one is told at its next heartbeat."""
+    ended = _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
+    if ended:
+        outbox.batch_ended(session, batch_id)
+    return ended
+
+
+def retry(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
+    """Let those of these jobs that are dead wait again, with all their attempts. Returns how many."""
+    return _make(session, RETRY, which, at, {"attempt": 0, "error": None})
+
+
+def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
+    """Bring moments that lie too far ahead of ``at`` back to where they would be; doing it twice changes nothing.
+
+    Nothing but a clock that was set back can have written them; one that was set forward needs no correction, as
+    leases then run out early and the workers are fenced. ``longest_wait`` is how long a job waits after an attempt that
+    failed. A lease keeps its length, a job that never failed is due now, and one that did waits once more.
+    """
+    ahead = at + _TOLERANCE
+    held = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
+    for job_id, lease, lease_until, heartbeat_at in session.execute(
+        held.where(Job.state == JobState.RUNNING, Job.heartbeat_at > ahead)
+    ).all():
+        if lease_until is None or heartbeat_at is None:
+            continue
+        renewed = at + (lease_until - heartbeat_at)
+        leased = update(Job).where(Job.id == job_id, Job.lease == lease)
+        session.execute(leased.values(heartbeat_at=at, lease_until=renewed))
+    waiting = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > ahead)
+    for job_id, attempt, due_at in session.execute(waiting).all():
+        latest = at + longest_wait(attempt) if attempt else at
+        if due_at > latest + _TOLERANCE:
+            held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
+            session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
+    notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
+    session.execute(update(Job).where(*notified).values(notified_at=None))
+    plots.correct_clock(session, at, ahead)
+
+
+def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
+    """What every transition into a state writes beside it."""
+    match state:
+        case JobState.QUEUED:
+            waiting = {"progress": 0.0, "due_at": at, "notified_at": None, "finished_at": None}
+            return {"lease": None, "lease_until": None} | waiting
+        case JobState.RUNNING:
+            return {}
+        case JobState.DONE:
+            return {"lease": None, "lease_until": None, "finished_at": at, "progress": 1.0, "error": None}
+        case JobState.DEAD | JobState.CANCELLED:
+            return {"lease": None, "lease_until": None, "finished_at": at}
+
+
+def _make(
+    session: Session,
+    transition: Transition,
+    which: tuple[ColumnElement[bool], ...],
+    at: datetime,
+    values: dict[str, Any],
+) -> int:
+    """Make the transition for those of these jobs that are where it begins; the others stay. Returns how many."""
+    columns = {"state": transition.after} | _arriving(transition.after, at) | values
+    statement = update(Job).where(*which, Job.state.in_(transition.before)).values(**columns)
+    options = {"synchronize_session": False}
+    return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
+
+
+def _make_held(session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]) -> None:
+    """Make the transition for a job that is held. Raises Fenced when it is held no more."""
+    if not _make(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
+        state = session.scalar(select(Job.state).where(Job.id == claim.job_id))
+        if state is None:
+            raise HostError(f"The job {claim.job_id} is gone from the database")
+        raise Fenced(f"The job {claim.job_id} is no longer this worker's: it is {state.value}")
+
+
+def _refuse_quarantined(session: Session, claim: Claim) -> None:
+    held = (Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING)
+    worker = session.scalar(select(Job.worker).where(*held))
+    if worker is not None and workers.is_in_quarantine(session, worker, lock=True):
+        raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")

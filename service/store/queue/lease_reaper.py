@@ -1,0 +1,84 @@
+"""Finds jobs that were lost: leases that ran out, notices that never came. Any number may sweep at any time.
+
+Publishes nothing; it says how many notices are wanting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import func, or_, select, update
+from sqlalchemy.orm import Session
+
+from service.store.engine import Store, now
+from service.store.models import Job
+from service.store.queue import jobs
+from service.store.queue.jobs import Claim, Retry
+from service.store.queue.scheduling import claimable
+from service.store.states import JobState, Lane
+
+#: Databases bound how many values one statement may carry.
+_AT_ONCE = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Wanting:
+    """How many notices should be on their way, and how many of those may have been lost."""
+
+    due: int
+    stale: int
+
+
+def requeue_lost(store: Store, retry: Retry) -> int:
+    """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
+    with store.transaction() as session:
+        at = now(session)
+        jobs.correct_clock(session, at, retry.wait)
+        lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
+        query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
+        rows = session.execute(query.with_for_update(skip_locked=True)).all()
+        for job_id, lease, attempt, max_attempts, worker in rows:
+            reason = f"the worker {worker} fell silent while it graded; its log may tell why"
+            jobs.fault(session, Claim(job_id, lease or "", attempt, max_attempts, at), reason, retry, at)
+        return len(rows)
+
+
+def wanting_notices(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
+    """By lane, the jobs that could be claimed, and those whose notice is missing or older than ``older_seconds``."""
+    with store.reading() as session:
+        at = now(session)
+        query = select(Job.lane, func.count()).where(*claimable(at)).group_by(Job.lane)
+        stale = or_(Job.notified_at.is_(None), Job.notified_at < at - timedelta(seconds=older_seconds))
+        all_due = dict(session.execute(query).all())
+        all_stale = dict(session.execute(query.where(stale)).all())
+        return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
+
+
+def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
+    """Remember that the ``count`` longest unannounced jobs of a lane were notified now. Returns their ids."""
+    with store.transaction() as session:
+        at = now(session)
+        oldest = (
+            select(Job.id)
+            .where(*claimable(at), Job.lane == lane)
+            .order_by(func.coalesce(Job.notified_at, Job.queued_at), Job.id)
+            .limit(count)
+        )
+        ids = session.scalars(oldest).all()
+        _set_notified(session, ids, at)
+        return ids
+
+
+def forget_notices(store: Store, ids: Sequence[str]) -> None:
+    """These were not notified after all."""
+    with store.transaction() as session:
+        _set_notified(session, ids, None)
+
+
+def _set_notified(session: Session, ids: Sequence[str], at: datetime | None) -> None:
+    for start in range(0, len(ids), _AT_ONCE):
+        some = (Job.id.in_(ids[start : start + _AT_ONCE]), Job.state == JobState.QUEUED)
+        options = {"synchronize_session": False}
+        session.execute(update(Job).where(*some).values(notified_at=at), execution_options=options)

@@ -1,0 +1,119 @@
+"""What the database tells of the whole service: how much waits and since when, what ended how, and how long it took.
+
+Only reads, so that every replica that is asked tells the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+
+from sqlalchemy import case, func, select
+from sqlalchemy.orm import Session
+
+from service.store import phases
+from service.store.engine import now
+from service.store.models import Batch, CriterionResultRow, Job, TrialRow, Worker
+from service.store.queue import workers
+from service.store.queue.scheduling import claimable
+from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotState
+
+#: Times are told of the jobs that ended in this time, the newest of them.
+TIMES_OVER = timedelta(hours=1)
+TIMES_MOST = 2000
+PACE_OVER = timedelta(minutes=5)
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceMetrics:
+    """One look at the whole service."""
+
+    jobs: Mapping[tuple[Lane, JobState], int]
+    claimable: Mapping[Lane, int]
+    oldest_seconds: Mapping[Lane, float]  # how long the oldest job that could be claimed has waited
+    verdicts: Mapping[str, int]
+    host_faults: int  # attempts that ended through no fault of the student's
+    unjudged: int  # criteria that could not be judged
+    surprises: int  # trials in which our own code stumbled over what a child sent
+    plots: Mapping[PlotState, int]
+    paused_batches: int
+    workers: Sequence[workers.Seen]
+    silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
+    quarantined: int
+    times: Mapping[str, Sequence[float]]  # seconds by span, sorted
+
+
+def collect(session: Session) -> ServiceMetrics:
+    """All metrics at one moment."""
+    at = now(session)
+    by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
+    waiting = select(Job.lane, func.count(), func.min(Job.queued_at)).where(*claimable(at)).group_by(Job.lane)
+    rows = session.execute(waiting).all()
+    verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
+    # Of the attempts of a job that is graded, or is being graded, the last is no fault.
+    good = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
+    faults = select(func.sum(Job.attempt - good)).where(Job.attempt > 0)
+    plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
+    paused = select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED)
+    quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
+    unjudged = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.unjudged.is_not(None))
+    surprises = select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None))
+    seen = workers.known_workers(session)
+    return ServiceMetrics(
+        jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
+        claimable={lane: count for lane, count, _ in rows},
+        oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
+        verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
+        host_faults=session.scalar(faults) or 0,
+        unjudged=session.scalar(unjudged) or 0,
+        surprises=session.scalar(surprises) or 0,
+        plots=dict(session.execute(plots).all()),
+        paused_batches=session.scalar(paused) or 0,
+        workers=seen,
+        silent_seconds={each.worker.name: max(0.0, (at - each.seen_at).total_seconds()) for each in seen},
+        quarantined=session.scalar(quarantined) or 0,
+        times=_times(session),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast a batch is being graded, and how long the rest of it takes at that pace."""
+
+    per_minute: float
+    left: timedelta
+
+
+def pace(session: Session, batch_id: str) -> Pace | None:
+    """By what ended in the last minutes; None where nothing did, or nothing is left."""
+    at = now(session)
+    of_batch = Job.batch_id == batch_id
+    unfinished = select(func.count()).select_from(Job).where(of_batch, Job.state.in_(UNFINISHED))
+    left = session.scalar(unfinished) or 0
+    ended = (of_batch, Job.state == JobState.DONE, Job.finished_at > at - PACE_OVER)
+    count, first = session.execute(select(func.count(), func.min(Job.started_at)).where(*ended)).one()
+    if not left or not count or first is None:
+        return None
+    seconds = max(1.0, min((at - first).total_seconds(), PACE_OVER.total_seconds()))
+    return Pace(60 * count / seconds, timedelta(seconds=round(left * seconds / count)))
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The value that ``share`` of the sorted values do not exceed (nearest rank)."""
+    return values[max(0, min(len(values) - 1, round(share * len(values) + 0.5) - 1))]
+
+
+def _times(session: Session) -> dict[str, list[float]]:
+    recent = (
+        select(Job.phases)
+        .where(Job.finished_at > now(session) - TIMES_OVER, Job.state == JobState.DONE)
+        .order_by(Job.finished_at.desc())
+        .limit(TIMES_MOST)
+    )
+    times: dict[str, list[float]] = {span: [] for span in phases.SPANS}
+    for stored in session.scalars(recent):
+        for span, duration in phases.durations(stored).items():
+            # A clock that was set back in between makes nonsense; nothing takes less than no time.
+            times[span].append(max(0.0, duration.total_seconds()))
+    return {span: sorted(found) for span, found in times.items()}

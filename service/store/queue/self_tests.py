@@ -1,0 +1,125 @@
+"""What a known answer says of a worker: when each process last graded it rightly, and what follows when one did not.
+
+A worker that got it wrong claims nothing any more, and what it graded since its last right answer is run again by
+others. Grading the known answer is ``service.queue.self_test``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import delete, or_, select
+from sqlalchemy.orm import Session
+
+from service.store import audit
+from service.store.engine import Store, now
+from service.store.models import Batch, Job, SelfTest, Worker
+from service.store.queue import jobs
+from service.store.states import BatchState, JobState, Lane, Standing
+from service.version import GRADER_VERSION, grader_sha256
+
+_FORGOTTEN = timedelta(days=30)
+
+
+@dataclass(frozen=True, slots=True)
+class Quarantined:
+    """What a quarantine brought about: jobs taken back, grades that are suspect, and jobs that run them again."""
+
+    taken_back: int
+    suspect: tuple[str, ...]
+    again: tuple[str, ...]
+
+
+def answered_rightly(store: Store, worker: str, process: int) -> None:
+    """Write down that this process of the worker graded the known answer rightly now."""
+    with store.transaction() as session:
+        at = now(session)
+        _worker(session, worker, at).self_tested_at = at
+        query = select(SelfTest).where(SelfTest.worker == worker, SelfTest.process == process)
+        row = session.scalar(query)
+        if row is None:
+            session.add(SelfTest(worker=worker, process=process, right_at=at))
+        else:
+            row.right_at = at
+
+
+def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
+    """Let the worker claim and finish nothing more, take back what it holds, and run again what it may have spoilt.
+
+    Its grades since the last right answer of the process that gave them stay, marked suspect, and are published no
+    more. Does nothing for a worker that is in quarantine already.
+    """
+    with store.transaction() as session:
+        at = now(session)
+        row = _worker(session, worker, at)
+        if row.quarantined_at is not None:
+            return Quarantined(0, (), ())
+        row.self_tested_at = row.quarantined_at = at
+        row.reason = reason
+        # A finish waits for this row, or was committed before it was locked and is seen below.
+        session.flush()
+        taken_back = jobs.give_back(session, worker, at)
+        sentence = f"the worker {worker} was found to grade wrongly: {reason}"
+        suspects = _suspects(session, worker)
+        again = tuple(_run_again(session, job, sentence, at) for job in suspects if job.standing is not Standing.KEPT)
+        for job in suspects:
+            job.suspect, job.standing = sentence, Standing.KEPT
+            job.published_at = job.published_by = None
+        ids = tuple(job.id for job in suspects)
+        audit.note(session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again))
+        return Quarantined(taken_back, ids, again)
+
+
+def _worker(session: Session, name: str, at: datetime) -> Worker:
+    """The worker's row, locked; made if there is none."""
+    row = session.scalar(select(Worker).where(Worker.name == name).with_for_update())
+    if row is None:
+        _forget_old(session, at)
+        row = Worker(
+            name=name, grader_version=GRADER_VERSION, grader_sha256=grader_sha256(), first_at=at, self_tested_at=at
+        )
+        session.add(row)
+        session.flush()
+    return row
+
+
+def _forget_old(session: Session, at: datetime) -> None:
+    old = select(Worker.name).where(Worker.self_tested_at < at - _FORGOTTEN)
+    for statement in (
+        delete(SelfTest).where(SelfTest.worker.in_(old)),
+        delete(Worker).where(Worker.name.in_(old)),
+    ):
+        session.execute(statement, execution_options={"synchronize_session": False})
+
+
+def _suspects(session: Session, worker: str) -> Sequence[Job]:
+    """What the worker graded since it was last known to grade rightly, and all copies of that."""
+    last = (
+        select(SelfTest.right_at)
+        .where(SelfTest.worker == worker, SelfTest.process == Job.process)
+        .correlate(Job)
+        .scalar_subquery()
+    )
+    graded = (Job.worker == worker, Job.state == JobState.DONE, Job.copied_from.is_(None), Job.suspect.is_(None))
+    own = select(Job.id).where(*graded, or_(last.is_(None), Job.finished_at > last))
+    ids = session.scalars(own).all()
+    query = select(Job).where(or_(Job.id.in_(ids), Job.copied_from.in_(ids))).order_by(Job.queued_at, Job.id)
+    return session.scalars(query.with_for_update()).all()
+
+
+def _run_again(session: Session, job: Job, sentence: str, at: datetime) -> str:
+    cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
+    again = Job(
+        submission_id=job.submission_id,
+        assignment_version_id=job.assignment_version_id,
+        enrolment_id=job.enrolment_id,
+        # Nothing of a cancelled batch is begun, but this one had its grade before.
+        batch_id=None if cancelled else job.batch_id,
+        lane=Lane(job.lane),
+        max_attempts=job.max_attempts,
+        regrade_of=job.id,
+        standing=job.standing,
+    )
+    return jobs.enqueue(session, again, at)

@@ -1,0 +1,181 @@
+"""A batch at a glance for programs: what would be taken in of one, what came of it, and what publishing it would do."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from decimal import Decimal
+from typing import Annotated, Literal
+
+from fastapi import Depends, Query
+from pydantic import Field
+
+from service.store.batches import batch_table, batches, preflight, publishing
+from service.store.batches.overview import PASS_SHARE, overview
+from service.store.courses.hidden_names import hidden_names_of
+from service.store.installation import secret_of
+from service.store.states import Role
+from service.web.access import RowName, batch_in
+from service.web.api.batches import StatisticsShape
+from service.web.api.regrades import PublishedShape
+from service.web.api.shapes import BATCH_EXAMPLE, RefusalShape, Shape, example_of, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import NO_KEY, api_router
+from service.web.api_uploads import ZIP_BODY, Uploaded
+from service.web.batch_uploads import read_upload
+from service.web.context import Context
+
+router = api_router("batches")
+Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
+Submits = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "submit"))]
+
+
+class ExpectedShape(Shape):
+    """One submission that would be taken in."""
+
+    student: str
+    name: str
+    source: str = Field(description="The name that it came under.")
+    assignment: str
+    enrolled: bool = Field(description="Whether the student is in the course already.")
+    known: bool = Field(description="Whether it was submitted already and would stay as it is.")
+    copied: bool = Field(description="Whether an identical one is graded, whose grade it would get.")
+
+
+class PreflightShape(Shape):
+    """What would be taken in of a zip, and what not and why."""
+
+    submissions: list[ExpectedShape]
+    refusals: list[RefusalShape]
+
+    model_config = like(
+        submissions=[
+            {
+                "student": "ada",
+                "name": "Ada Lovelace",
+                "source": "ada",
+                "assignment": "shape-recognition",
+                "enrolled": True,
+                "known": False,
+                "copied": False,
+            }
+        ],
+        refusals=BATCH_EXAMPLE["refusals"],
+    )
+
+
+class BinShape(Shape):
+    """How many got from `low` to below `high`; the last bin has those with all marks."""
+
+    low: float
+    high: float
+    count: int
+
+
+class OutlierShape(Shape):
+    """A grade to be looked at, and why."""
+
+    id: str
+    why: Literal["low", "slow", "close"]
+
+
+class MissingShape(Shape):
+    """Somebody in the course who has submitted nothing for the assignment."""
+
+    id: str
+    name: str
+
+
+class ClassShape(Shape):
+    """What came of a batch for one assignment."""
+
+    statistics: StatisticsShape
+    distribution: list[BinShape]
+    passed: int = Field(description="How many have the share of marks that was asked for, or more.")
+    outliers: list[OutlierShape]
+    identical: list[list[str]] = Field(description="Groups of students whose submissions are the very same.")
+    missing: list[MissingShape]
+
+
+class OverviewShape(Shape):
+    """What came of a batch, by assignment; empty until something is graded."""
+
+    classes: list[ClassShape]
+
+    model_config = like(classes=[])
+
+
+class PublicationShape(Shape):
+    """What publishing a batch would do now, and of how many students grades would be released."""
+
+    counts: PublishedShape
+    students: int
+
+    model_config = like(counts=example_of(PublishedShape), students=19)
+
+
+@router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))
+def look_first(
+    here: Submits,
+    context: Context,
+    upload: Uploaded,
+    assignment: Annotated[
+        str, Query(max_length=100, description="An assignment of the course or catalogue; else each names its own.")
+    ] = "",
+) -> PreflightShape:
+    """What would be taken in of a zip with a submission for each student; nothing is."""
+    checked = read_upload(context, here.course_id, upload, assignment)
+    secret = secret_of(context.store).sha256
+    with context.store.reading() as session:
+        foreseen = preflight.foresee(session, here.course_id, checked.grading_requests, secret)
+    return PreflightShape(
+        submissions=[
+            ExpectedShape(
+                student=asked.submission.student,
+                name=asked.student.name,
+                source=asked.source,
+                assignment=asked.assignment.id,
+                **asdict(ahead),
+            )
+            for asked, ahead in zip(checked.grading_requests, foreseen, strict=True)
+        ],
+        refusals=[RefusalShape.model_validate(refusal) for refusal in checked.refusals],
+    )
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/overview")
+def show_overview(
+    here: Reads,
+    context: Context,
+    batch_id: RowName,
+    at_least: Annotated[
+        int, Query(alias="pass", ge=0, le=100, description="The pass mark, per cent of all marks.")
+    ] = int(PASS_SHARE * 100),
+) -> OverviewShape:
+    """Marks and their distribution, criteria, causes, whom to look at, and who has not submitted."""
+    hidden = hidden_names_of(context.store, here.course_id)
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+        refusals = batches.batch(session, batch_id).refusals
+        lines = batch_table.table_lines(session, batch_id, refusals, hidden)
+        classes = overview(session, here.course_id, lines, Decimal(at_least) / 100)
+    return OverviewShape(
+        classes=[
+            ClassShape(
+                statistics=StatisticsShape.model_validate(each.statistics),
+                distribution=[BinShape.model_validate(found) for found in each.distribution],
+                passed=each.passed,
+                outliers=[OutlierShape.model_validate(found) for found in each.outliers],
+                identical=[[line.student for line in same] for same in each.identical],
+                missing=[MissingShape.model_validate(student) for student in each.missing],
+            )
+            for each in classes
+        ]
+    )
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/publish")
+def would_publish(here: Reads, context: Context, batch_id: RowName) -> PublicationShape:
+    """What publishing the batch would do now; it does nothing."""
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+        return PublicationShape.model_validate(publishing.would_publish(session, batch_id))

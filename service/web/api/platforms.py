@@ -1,0 +1,138 @@
+"""Learning platforms: registered by whoever runs the installation; members fetched and marks sent by instructors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends
+from pydantic import BaseModel, Field
+
+from service.lti import course_services
+from service.store import audit
+from service.store.people import lti
+from service.store.states import Role
+from service.web.api.shapes import Shape, like
+from service.web.api_access import Caller, CallerInCourse, in_course, operating
+from service.web.api_routes import Described, Listed, api_router
+from service.web.context import Context
+
+router = api_router("platforms")
+OperatorReads = Annotated[Caller, Depends(operating("read"))]
+OperatorManages = Annotated[Caller, Depends(operating("manage"))]
+Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
+Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+Address = Annotated[str, Field(min_length=1, max_length=1000)]
+_SILENT: Described = {
+    502: {
+        "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        "description": "The platform does not do what it is asked.",
+    }
+}
+_MOODLE = {
+    "name": "Moodle",
+    "issuer": "https://moodle.example.org",
+    "client_id": "a1b2c3",
+    "deployments": ["1"],
+    "authorization_url": "https://moodle.example.org/mod/lti/auth.php",
+    "token_url": "https://moodle.example.org/mod/lti/token.php",
+    "keys_url": "https://moodle.example.org/mod/lti/certs.php",
+}
+
+
+class PlatformShape(Shape):
+    """A platform as it is registered."""
+
+    id: int
+    name: str
+    issuer: str
+    client_id: str
+    deployments: list[str]
+    authorization_url: str
+    token_url: str
+    keys_url: str
+
+    model_config = like(id=1, **_MOODLE)
+
+
+class PlatformAsked(BaseModel):
+    """A platform to be registered, or to be changed where issuer and client are those of one."""
+
+    name: str = Field(min_length=1, max_length=200, examples=[_MOODLE["name"]])
+    issuer: Address = Field(examples=[_MOODLE["issuer"]])
+    client_id: Address = Field(examples=[_MOODLE["client_id"]])
+    deployments: list[Address] = Field(min_length=1, max_length=100, examples=[_MOODLE["deployments"]])
+    authorization_url: Address = Field(examples=[_MOODLE["authorization_url"]])
+    token_url: Address = Field(examples=[_MOODLE["token_url"]])
+    keys_url: Address = Field(examples=[_MOODLE["keys_url"]])
+
+
+class CoursePlatformShape(Shape):
+    """The platform that a course is launched from."""
+
+    name: str | None = Field(description="Null where there is none.")
+    members: bool = Field(description="Whether it tells who its members are.")
+    marks: bool = Field(description="Whether it takes marks.")
+
+    model_config = like(name="Moodle", members=True, marks=True)
+
+
+class EnrolledMembersShape(Shape):
+    """How many of the platform's members are in the course, and why others are not."""
+
+    members: int
+    refused: list[str]
+
+    model_config = like(members=20, refused=[])
+
+
+class MarksOfAsked(BaseModel):
+    """Of which assignment to send the published marks."""
+
+    assignment: str = Field(min_length=1, max_length=200, examples=["shape-recognition"])
+
+
+class SentShape(Shape):
+    """How many marks were sent."""
+
+    sent: int
+
+    model_config = like(sent=18)
+
+
+@router.get("/operator/platforms")
+def list_platforms(_operator: OperatorReads, context: Context) -> Listed[PlatformShape]:
+    """All that are registered, by name."""
+    with context.store.reading() as session:
+        return Listed(items=[PlatformShape.model_validate(each) for each in lti.platforms(session)])
+
+
+@router.post("/operator/platforms", status_code=201)
+def register(operator: OperatorManages, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
+    """Register a platform, or change one of the same issuer and client; all that are registered then."""
+    with context.store.transaction() as session:
+        platform_id = lti.register(session, **asked.model_dump())
+        audit.note(session, operator.actor, "register", "lti_platform", str(platform_id), issuer=asked.issuer)
+        return Listed(items=[PlatformShape.model_validate(each) for each in lti.platforms(session)])
+
+
+@router.get("/courses/{course_id}/platform")
+def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
+    """The platform that the course is launched from, if one does."""
+    with context.store.reading() as session:
+        link = lti.course_link(session, here.course_id)
+    if link is None:
+        return CoursePlatformShape(name=None, members=False, marks=False)
+    marks = link.lineitems_url is not None
+    return CoursePlatformShape(name=link.platform.name, members=link.members_url is not None, marks=marks)
+
+
+@router.post("/courses/{course_id}/platform/members", responses=_SILENT)
+def enrol_members(here: Manages, context: Context) -> EnrolledMembersShape:
+    """Enrol everybody whom the platform has in the course."""
+    return EnrolledMembersShape.model_validate(course_services.enrol_members(context.store, here.course_id, here.actor))
+
+
+@router.post("/courses/{course_id}/platform/marks", responses=_SILENT)
+def pass_back(here: Manages, context: Context, asked: MarksOfAsked) -> SentShape:
+    """Send the published marks of an assignment to the platform's gradebook."""
+    return SentShape(sent=course_services.pass_back(context.store, here.course_id, asked.assignment, here.actor))

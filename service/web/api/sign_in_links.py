@@ -1,0 +1,109 @@
+"""Links that sign students in once, for whoever instructs their course: for one of them, or for all."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import Annotated
+
+from fastapi import Depends
+from pydantic import BaseModel, Field
+
+from service.store.people import sign_in_links
+from service.store.people.sign_in_links import StudentLink
+from service.store.states import Role
+from service.web.access import RowNumber, member_in
+from service.web.api.shapes import Shape, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import NO_KEY, api_router
+from service.web.context import Context, WebContext
+
+router = api_router("people")
+Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+_WHERE = "Where ROBOMARK_PUBLIC_URL says how browsers reach the server."
+
+
+class LinkShape(Shape):
+    """A link that signs somebody in once; it is told this once."""
+
+    path: str
+    url: str | None = Field(description=_WHERE)
+
+    model_config = like(path="/sign-in/rml_...", url="https://robomark.example.org/sign-in/rml_...")
+
+
+class LinksAsked(BaseModel):
+    """How long links for a whole course last."""
+
+    days: int = Field(sign_in_links.DAYS, ge=1, le=sign_in_links.MOST_DAYS)
+
+
+class StudentLinkShape(Shape):
+    """One student's link, or why there is none."""
+
+    enrolment: int
+    id: str
+    name: str
+    email: str
+    path: str | None
+    url: str | None = Field(description=_WHERE)
+    expires_at: datetime | None
+    reason: str = Field(description="Why there is no link; empty where there is one.")
+
+
+class StudentLinksShape(Shape):
+    """A link for each student of the course, told this once."""
+
+    links: list[StudentLinkShape]
+
+    model_config = like(
+        links=[
+            {
+                "enrolment": 7,
+                "id": "ada",
+                "name": "Ada Lovelace",
+                "email": "ada@example.org",
+                "path": "/sign-in/rml_...",
+                "url": "https://robomark.example.org/sign-in/rml_...",
+                "expires_at": "2026-11-09T09:00:00Z",
+                "reason": "",
+            }
+        ]
+    )
+
+
+@router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
+def links(here: Manages, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
+    """A new link for each student of the course, by id; those that were made before count no more."""
+    lifetime = timedelta(days=sign_in_links.DAYS if asked is None else asked.days)
+    with context.store.transaction() as session:
+        made = sign_in_links.make_links(session, here.course_id, lifetime, here.actor)
+    return StudentLinksShape(links=[_told(context, each) for each in made])
+
+
+@router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
+def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
+    """A new link that signs a student of the course in; instructors have theirs from whoever runs it all."""
+    with context.store.transaction() as session:
+        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
+        secret = sign_in_links.make_students_link(session, row, here.actor)
+    return link_shape(context, secret)
+
+
+def link_shape(context: WebContext, secret: str) -> LinkShape:
+    """How a link is told."""
+    path, public = f"/sign-in/{secret}", context.settings.public_url
+    return LinkShape(path=path, url=f"{public}{path}" if public else None)
+
+
+def _told(context: WebContext, each: StudentLink) -> StudentLinkShape:
+    shown = None if each.secret is None else link_shape(context, each.secret)
+    return StudentLinkShape(
+        enrolment=each.student.enrolment_id,
+        id=each.student.id,
+        name=each.student.name,
+        email=each.student.email,
+        path=None if shown is None else shown.path,
+        url=None if shown is None else shown.url,
+        expires_at=each.expires_at,
+        reason=each.reason,
+    )

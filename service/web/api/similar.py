@@ -1,0 +1,102 @@
+"""Whose work for the assignments of a batch is alike, for programs of those who instruct the course.
+
+What is alike is ``service.similarity``'s to say; it proves nothing, and no mark has anything of it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends
+from pydantic import Field
+
+from service.similarity.behaviour import Aspect
+from service.store.batches.similarities import MOST_AT_ONCE, newest_of_course, similarities
+from service.store.installation import secret_of
+from service.store.states import Role
+from service.web.access import RowName, batch_in
+from service.web.api.shapes import Shape, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import api_router
+from service.web.context import Context
+from sim.errors import UsageError
+
+router = api_router("batches")
+Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
+
+
+class StretchShape(Shape):
+    """Lines of the first one's source, and those of the second one's that are like them; lines count from 1."""
+
+    lines: tuple[int, int]
+    other_lines: tuple[int, int]
+
+
+class AlikeSourcesShape(Shape):
+    """Two sources that are alike."""
+
+    files: tuple[str, str]
+    shares: tuple[float, float] = Field(description="The part of each one's own code that the other has too.")
+    stretches: list[StretchShape]
+
+
+class TrialNameShape(Shape):
+    """Which trial it is, of those of a scenario."""
+
+    scenario: str
+    index: int
+    noisy: bool = Field(description="Whether light, motors or the channel had chance in them.")
+
+
+class SameInTrialShape(Shape):
+    """A trial in which both did what few others did."""
+
+    trial: TrialNameShape
+    aspect: Aspect
+    sharing: int = Field(description="How many students did so.")
+    students: int = Field(description="How many did anything there.")
+
+
+class SimilarPairShape(Shape):
+    """Two students whose work is alike."""
+
+    students: tuple[str, str]
+    share: float = Field(description="The largest part of a source that is in the other's.")
+    sources: list[AlikeSourcesShape]
+    trials: list[SameInTrialShape]
+
+
+class SimilarityShape(Shape):
+    """What is alike for one assignment, the most similar pair first."""
+
+    assignment: str
+    students: int
+    pairs: list[SimilarPairShape]
+    too_short: list[str] = Field(description="Who has too little of their own for anything to be said of it.")
+    same: list[list[str]] = Field(description="Groups who have a whole file in common, however many they are.")
+    not_compared: int = Field(description="Pairs of sources that were too many to compare.")
+
+
+class SimilaritiesShape(Shape):
+    """What is alike, by assignment."""
+
+    assignments: list[SimilarityShape]
+
+    model_config = like(assignments=[])
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/similar")
+def show_similar(here: Reads, context: Context, batch_id: RowName) -> SimilaritiesShape:
+    """Pairs of students of the course whose newest submissions are alike: a reason to look and to ask, and no proof."""
+    secret = secret_of(context.store)
+    with context.store.reading() as session:
+        batch_in(session, here.course_id, batch_id)
+        lines = newest_of_course(session, here.course_id, batch_id, secret)
+    if len(lines) > MOST_AT_ONCE:
+        raise UsageError(
+            f"{len(lines)} submissions are too many to compare while you wait, expected {MOST_AT_ONCE} at most; "
+            f"robomark batch similar {batch_id} compares those of this batch"
+        )
+    return SimilaritiesShape(
+        assignments=[SimilarityShape.model_validate(found) for found in similarities(context.store, lines)]
+    )

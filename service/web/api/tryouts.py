@@ -1,0 +1,104 @@
+"""Trying a program without submitting it: asked for, waited for, and what it said. It leaves no marks."""
+
+from __future__ import annotations
+
+import zlib
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import Depends, Query, Request
+from fastapi.responses import Response
+from pydantic import Field
+from sqlalchemy.orm import Session
+
+from service.store.queue import tryouts
+from service.store.queue.tryouts import TryoutLine
+from service.store.states import Role, TryoutState
+from service.web.access import RowName, enrolment_in, nothing_here
+from service.web.api.grades import REPLAY
+from service.web.api.shapes import Shape, like
+from service.web.api_access import CallerInCourse, in_course
+from service.web.api_routes import api_router, tagged
+from service.web.api_uploads import SENT_BODY, Sent
+from service.web.context import Context
+from service.web.submitting import try_out
+
+router = api_router("mine")
+Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
+Submits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
+PREFIX = "/courses/{course_id}/mine/tryouts"
+
+
+class TryoutShape(Shape):
+    """A program that is tried."""
+
+    id: str
+    assignment: str
+    state: TryoutState
+    queued_at: datetime
+    before: int = Field(description="How many are run before it.")
+    said: dict[str, Any] | None = Field(
+        description="What came of it, once it is done: `happened`, `whose`, `seconds`, `lines` as [time, text], "
+        "`faults`; or `refused`, why it cannot be run."
+    )
+    error: str = Field(description="Why it could not be run, through no fault of the program.")
+
+    model_config = like(
+        id="7xk2v9q4m0ab",
+        assignment="shape-recognition",
+        state="done",
+        queued_at="2026-11-02T09:00:00Z",
+        before=0,
+        said={"happened": "The program ended by itself.", "seconds": 2.5, "lines": [[0.1, "begun"]], "faults": []},
+        error="",
+    )
+
+
+@router.post(PREFIX, status_code=201, openapi_extra=SENT_BODY)
+def ask(
+    here: Submits,
+    context: Context,
+    sent: Sent,
+    assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
+) -> TryoutShape:
+    """Let a program be run once, as the assignment starts it first; nothing is marked, and it counts as no attempt."""
+    made = try_out(context, here.caller.identity, here.course_id, assignment, sent)
+    with context.store.reading() as session:
+        return _shown(_own(session, here, made))
+
+
+@router.get(PREFIX + "/{tryout_id}")
+def one_tryout(here: Reads, context: Context, tryout_id: RowName) -> TryoutShape:
+    """How far it is, and what came of it; it is kept for a day."""
+    with context.store.reading() as session:
+        return _shown(_own(session, here, tryout_id))
+
+
+@router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY, response_class=Response)
+def replay(request: Request, here: Reads, context: Context, tryout_id: RowName) -> Response:
+    """What a replay of it plays; 404 until there is something."""
+    with context.store.reading() as session:
+        kept = tryouts.replay_of(session, _own(session, here, tryout_id).id)
+    if kept is None:
+        raise nothing_here()
+    return tagged(request, zlib.decompress(kept), "application/json")
+
+
+def _own(session: Session, here: CallerInCourse, tryout_id: str) -> TryoutLine:
+    enrolment = enrolment_in(session, here.caller.identity, here.course_id)
+    line = tryouts.line(session, enrolment.id, tryout_id)
+    if line is None:
+        raise nothing_here()
+    return line
+
+
+def _shown(line: TryoutLine) -> TryoutShape:
+    return TryoutShape(
+        id=line.id,
+        assignment=line.assignment,
+        state=line.state,
+        queued_at=line.queued_at,
+        before=line.before,
+        said=line.words or None,
+        error="" if line.waits else line.error,
+    )

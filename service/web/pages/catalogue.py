@@ -1,0 +1,44 @@
+"""The catalogue for instructors: looked through by topic and by words, to take assignments from. Takes none itself."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import Response
+
+from service.store.courses import open_assignments
+from service.web.access import Instructing
+from service.web.context import Context
+from service.web.rendering import page
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.overview import TOPICS, overview
+
+router = APIRouter()
+
+
+@router.get("/courses/{course_id}/catalogue")
+def look_through(
+    request: Request,
+    here: Instructing,
+    context: Context,
+    q: Annotated[str, Query(max_length=100)] = "",
+    topic: Annotated[str, Query(max_length=10)] = "",
+) -> Response:
+    """What comes with Robomark, as far as it is of the topic and has all words that are looked for."""
+    with context.store.reading() as session:
+        prepared = {each.assignment for each in open_assignments.of_course(session, here.course_id)}
+    everything = [overview(assignment_folder(each)) for each in catalogue()]
+    found = [each for each in everything if each.says(q) and topic in ("", each.topic or "none")]
+    return page(
+        request,
+        here.reader,
+        "catalogue.html",
+        here=here,
+        found=sorted(found, key=lambda each: (each.topic == "", each.section, each.title)),
+        everything=len(everything),
+        topics={number: TOPICS[number] for number in sorted({each.topic for each in everything if each.topic})},
+        prepared=prepared,
+        text=q,
+        topic=topic,
+    )

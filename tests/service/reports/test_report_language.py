@@ -1,0 +1,142 @@
+"""A report and its replay are in the reader's language: nothing that is ours is said in another one."""
+
+from __future__ import annotations
+
+import gettext
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields, is_dataclass
+from html.parser import HTMLParser
+from importlib.resources import files
+from typing import Any
+
+import pytest
+
+from replays import data_of, island_of
+from report_builders import astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade
+from service.grading.grade import Grade
+from service.grading.judging.words import shown_words
+from service.language import Language, language_called
+from service.message_catalogue import messages
+from service.reports.html import report
+from service.reports.plots.drawn import plots_of
+from service.reports.view import View, staff_view, student_view
+
+GERMAN = language_called("de")
+GRADES = (astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade)
+_PIXEL = bytes.fromhex("89504e470d0a1a0a0000000d4948445200000001000000010100000000376ef924")
+_WORD = re.compile(r"[^\W\d_]{3,}")
+#: What is the same in every language: names of ours, units, formats.
+_NO_SENTENCE = {"Robomark", "JSON", "IMG", "DATA"}
+
+
+@dataclass(eq=False)
+class Foreign(gettext.NullTranslations):
+    """Puts everything that is said in it into angle brackets, and remembers what that was."""
+
+    said: set[str] = field(default_factory=set)
+
+    def gettext(self, message: str) -> str:
+        self.said.add(message)
+        return f"⟨{message}⟩"
+
+    def ngettext(self, one: str, many: str, count: int) -> str:
+        self.said.add(one)
+        return f"⟨{one if count == 1 else many}⟩"
+
+
+class Texts(HTMLParser):
+    """The texts of a page, and of those attributes that are read out or shown."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self._silent = False
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._silent = tag in ("script", "style")
+        self.found += [value or "" for name, value in attrs if name in ("alt", "aria-label", "title", "data-before")]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._silent = False
+
+    def handle_data(self, data: str) -> None:
+        if not self._silent:
+            self.found.append(data)
+
+
+def page_of(view: View) -> str:
+    return report(view, {plot.name: _PIXEL for plot in plots_of(view.grade)})
+
+
+def unbracketed(text: str) -> str:
+    while (shorter := re.sub(r"⟨[^⟨⟩]*⟩", "", text)) != text:
+        text = shorter
+    return text
+
+
+def texts_in(value: object) -> Iterator[str]:
+    """Every text that a grade has."""
+    if isinstance(value, str):
+        yield value
+    elif is_dataclass(value) and not isinstance(value, type):
+        for each in fields(value):
+            yield from texts_in(getattr(value, each.name))
+    elif isinstance(value, tuple | list | frozenset):
+        for each in value:
+            yield from texts_in(each)
+
+
+def texts_of_replay(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for key, each in value.items():
+            if key not in ("columns", "image", "images", "format", "verdict", "kind", "who", "from", "to"):
+                yield from texts_of_replay(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from texts_of_replay(each)
+
+
+@pytest.fixture(scope="module")
+def foreign() -> Foreign:
+    return Foreign()
+
+
+@pytest.mark.parametrize("made", GRADES)
+def test_nothing_of_ours_is_said_in_another_language(made: Callable[[], Grade], foreign: Foreign) -> None:
+    grade, language = made(), Language("xx", foreign)
+    # What was written when it was graded stays as it is.
+    kept = {word for text in (*texts_in(grade), shown_words("")) for word in _WORD.findall(text)}
+    for view in (staff_view(grade, language), student_view(grade, language=language)):
+        page = page_of(view)
+        shown = [*Texts(page).found, *texts_of_replay(data_of(page) if view.grade.trials else {})]
+        left = {word for text in shown for word in _WORD.findall(unbracketed(text))}
+        assert left - kept - _NO_SENTENCE == set()
+
+
+def test_everything_that_is_said_is_in_the_catalogues(foreign: Foreign) -> None:
+    for made in GRADES:
+        page_of(staff_view(made(), Language("xx", foreign)))
+    known = {each.id if isinstance(each.id, str) else each.id[0] for each in messages() if each.id}
+    assert foreign.said - known == {"°"}, "what is said inside an f-string is not found"
+
+
+def test_a_german_report_is_german() -> None:
+    page = page_of(student_view(shape_grade(), language=GERMAN))
+    assert '<html lang="de">' in page
+    for words in ("Punkten</span>", "<h2>Wiedergabe</h2>", "wurde für", "Die meisten Punkte fehlen bei", "Alle Läufe"):
+        assert words in page
+    assert island_of(page)["words"]["sentences"]["play"] == "Abspielen"
+    assert data_of(page)["trials"][0]["ended"] == "zu Ende gelaufen"
+
+
+def test_the_script_of_a_replay_asks_for_all_the_words_that_there_are_and_no_others() -> None:
+    folder = files("service.reports.replay").joinpath("component")
+    code = "".join(each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name.endswith(".js"))
+    words = island_of(page_of(student_view(line_follower_grade())))["words"]
+    literals = set(re.findall(r'"(\w+)"', code))
+    assert set(re.findall(r'\bsay\("(\w+)"', code)) <= set(words["sentences"]) <= literals
+    assert set(re.findall(r'\bworded\("(\w+)"', code)) <= set(words)

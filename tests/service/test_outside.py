@@ -1,0 +1,121 @@
+"""Addresses that are asked: public ones and those of networks that may be reached, once, within a time and a length."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ipaddress import ip_network
+from threading import Event, Thread
+
+import pytest
+
+from service import outside
+from service.outside import ALL_OTHERS, NO_OTHERS, NotPublic, NotReached, ask, is_public
+
+
+@contextmanager
+def answering(answer: bytes) -> Iterator[str]:
+    """Where somebody answers the first request with these bytes."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            connection, _ = listening.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(answer)
+
+        thread = Thread(target=serve, daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}/"
+
+
+def get(url: str, others: outside.Networks = ALL_OTHERS, most_bytes: int = 0) -> outside.OutsideAnswer:
+    return ask(url, method="GET", body=None, headers={}, others=others, most_bytes=most_bytes)
+
+
+def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
+    said = b"HTTP/1.1 200 OK\r\nLink: <x>\r\nContent-Length: 10\r\n\r\n0123456789"
+    for most, body in ((0, b""), (4, b"01234"), (10, b"0123456789")):
+        with answering(said) as url:
+            found = get(url, most_bytes=most)
+        assert (found.status, found.headers["link"], found.body) == (200, "<x>", body)
+
+
+def test_a_network_may_be_reached_that_is_named() -> None:
+    with answering(b"HTTP/1.1 204 No Content\r\n\r\n") as url:
+        for others in (NO_OTHERS, (ip_network("10.0.0.0/8"), ip_network("::/0"))):
+            with pytest.raises(NotPublic):
+                get(url, others)
+        assert get(url, (ip_network("127.0.0.0/8"),)).status == 204
+
+
+@pytest.mark.parametrize("url", ["ftp://x/", "http://", "file:///etc/passwd", "http://[", "http://x:99999999/", "x"])
+def test_what_is_no_address_of_the_web_is_not_asked(url: str) -> None:
+    with pytest.raises(NotReached):
+        get(url)
+
+
+def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def resolve(*_: object, **__: object) -> list[tuple[object, ...]]:
+        return [(2, 1, 6, "", (address, 80)) for address in ("93.184.215.14", "10.0.0.1")]
+
+    monkeypatch.setattr(outside.socket, "getaddrinfo", resolve)
+    others = (ip_network("192.168.0.0/16"),)
+    with pytest.raises(NotPublic, match="no public address"):
+        ask("http://two.example.org/", method="POST", body=b"", headers={}, others=others)
+
+
+@pytest.mark.parametrize(
+    ("address", "public"),
+    [
+        ("93.184.215.14", True),
+        ("2606:2800:21f:cb07:6820:80da:af6b:8b2c", True),
+        ("127.0.0.1", False),
+        ("0.0.0.0", False),
+        ("10.1.2.3", False),
+        ("172.16.0.1", False),
+        ("192.168.1.1", False),
+        ("169.254.169.254", False),
+        ("100.64.0.1", False),
+        ("224.0.0.1", False),
+        ("255.255.255.255", False),
+        ("::1", False),
+        ("::", False),
+        ("::ffff:127.0.0.1", False),
+        ("::ffff:93.184.215.14", True),
+        ("::127.0.0.1", False),
+        ("fe80::1%eth0", False),
+        ("fd00::1", False),
+        ("ff02::1", False),
+        ("64:ff9b::7f00:1", False),
+        ("2002:7f00:1::", False),
+    ],
+)
+def test_which_addresses_are_public(address: str, public: bool) -> None:
+    assert is_public(address) is public
+
+
+def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outside, "SECONDS", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}/"
+
+        def answer() -> None:
+            connection, _ = listening.accept()
+            with connection:
+                try:
+                    for _ in range(100):
+                        connection.send(b"H")
+                        if ended.wait(0.05):
+                            return
+                except OSError:
+                    return
+
+        ended = Event()
+        thread = Thread(target=answer, daemon=True)
+        thread.start()
+        with pytest.raises(NotReached, match="did not answer"):
+            ask(url, method="POST", body=b"{}", headers={}, others=ALL_OTHERS)
+        ended.set()
+        thread.join()

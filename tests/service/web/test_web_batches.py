@@ -1,0 +1,188 @@
+"""What students submit on the web to an open assignment is one batch: its table, its end, what is done to it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+import report_builders
+from builders import PROGRAM, echo
+from service.store import outbox as told_outbox
+from service.store import purge
+from service.store.batches import batches, publishing, regrades
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import PolicyLimits
+from service.store.courses.versions import freeze
+from service.store.engine import now
+from service.store.grades import results
+from service.store.models import Batch, Job
+from service.store.people import webhooks
+from service.store.people.people import Member
+from service.store.queue import batch_control, jobs
+from service.store.states import JobState
+from sim.errors import UsageError
+from web import Web, submit, web_in
+
+RESPONDER = "def responder(msg):\n    return msg\n"
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[Web]:
+    with web_in(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def grace(web: Web) -> TestClient:
+    client = web.browser(web.instructor())
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+    submit(client, "/courses/1/assignments/echo-responder/open")
+    return client
+
+
+def batch_of(web: Web) -> str:
+    with web.store.reading() as session:
+        found = open_assignments.find(session, 1, "echo-responder").batch_id
+    assert found is not None
+    return found
+
+
+def send(web: Web, member: Member, program: str = PROGRAM) -> None:
+    answer = submit(web.browser(member), "/courses/1/mine/echo-responder", {"texts": [program, RESPONDER]})
+    assert answer.status_code == 303, answer.text
+
+
+def grade_all(web: Web, marks: int = 1) -> None:
+    grade = report_builders.faulty_grade()
+    first = replace(grade.criteria[0], marks=Decimal(marks), max_marks=Decimal(4))
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(replace(grade, criteria=(first,))), datetime.now(UTC))
+
+
+def rows(page: str) -> list[str]:
+    return re.findall(r'<th scope="row"><a [^>]*>([^<]*)', page[page.find("<tbody") :])
+
+
+def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web, grace: TestClient) -> None:
+    ada, bob = web.student("ada"), web.student("bob")
+    web.student("cyd")
+    for marks, program in enumerate(("print(1)\n", "print(2)\n", "print(3)\n")):
+        send(web, ada, program)
+        grade_all(web, marks)
+    send(web, bob)
+    grade_all(web, 4)
+    path = f"/courses/1/batches/{batch_of(web)}"
+    page = grace.get(path).text
+    assert rows(page) == ["ada", "bob"]
+    assert "attempt 3" in page
+    assert "Submitted on the web" in grace.get("/courses/1/batches").text
+    assert path in grace.get("/courses/1/assignments/echo-responder").text
+    overview = grace.get(f"{path}/overview").text
+    assert "<dt>Graded</dt><dd>2</dd>" in overview
+    assert "Cyd" in overview
+    grade = re.findall(r'href="(/courses/1/grades/\w+)">ada', page)[0]
+    assert grace.get(grade).text.count("attempt ") == 3
+    exported = grace.get(f"{path}/export?format=csv").text
+    assert len(exported.strip().splitlines()) == 3
+    with web.store.reading() as session:
+        line = batches.batch(session, batch_of(web))
+    assert (line.web_assignment, line.takes_in, line.jobs) == ("echo-responder", True, 2)
+
+
+def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace: TestClient) -> None:
+    ada, bob = web.student("ada"), web.student("bob")
+    send(web, ada, "print(1)\n")
+    grade_all(web)
+    with web.store.transaction() as session:
+        policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
+    send(web, ada, "print(2)\n")
+    with web.store.transaction() as session:
+        policies.set_policy(session, 1, "", PolicyLimits(due_at=datetime(2020, 1, 1, tzinfo=UTC)))
+    send(web, bob)
+    grade_all(web)
+    with web.store.reading() as session:
+        found = {line.student: (line.attempt, line.staff_only) for line in batches.job_lines(session, batch_of(web))}
+    assert found["ada"] == (1, None)
+    assert found["bob"][1] is not None
+
+
+def test_nobody_has_submitted_yet(web: Web, grace: TestClient) -> None:
+    web.student("ada")
+    overview = grace.get(f"/courses/1/batches/{batch_of(web)}/overview").text
+    assert "Nothing is graded yet." in overview
+    assert "Ada" in overview
+
+
+def test_it_is_not_held_back_and_what_could_not_be_graded_is_retried(web: Web, grace: TestClient) -> None:
+    send(web, web.student())
+    batch = batch_of(web)
+    page = grace.get(f"/courses/1/batches/{batch}").text
+    assert "/pause" not in page
+    assert "/cancel" not in page
+    for done in (batch_control.pause, batch_control.cancel):
+        with pytest.raises(UsageError, match="close echo-responder"):
+            done(web.store, batch)
+    with web.store.transaction() as session:
+        job = session.query(Job).one()
+        job.state, job.error = JobState.DEAD, "the worker ended"
+    submit(grace, f"/courses/1/batches/{batch}/retry")
+    grade_all(web)
+    with web.store.reading() as session:
+        assert session.query(Job).one().state is JobState.DONE
+
+
+def test_it_is_finished_when_the_assignment_is_closed(web: Web, grace: TestClient) -> None:
+    with web.store.transaction() as session:
+        webhooks.create(session, 1, "https://hooks.example.org/x", ["batch.finished"], "grace")
+    send(web, web.student())
+    grade_all(web)
+    assert told_outbox.claim(web.store, 9) == []
+    submit(grace, "/courses/1/assignments/echo-responder/close")
+    (told,) = told_outbox.claim(web.store, 9)
+    assert told.payload["data"] == {"batch": batch_of(web), "states": {"done": 1}}
+    with web.store.reading() as session:
+        assert not batches.batch(session, batch_of(web)).takes_in
+
+
+def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web, grace: TestClient) -> None:
+    ada = web.student()
+    for program in ("print(1)\n", "print(2)\n"):
+        send(web, ada, program)
+        grade_all(web)
+    batch = batch_of(web)
+    made = regrades.regrade(web.store, batch, None, max_attempts=1, actor="grace")
+    assert made.jobs == 1
+    send(web, ada, "print(3)\n")
+    grade_all(web, 2)
+    page = grace.get(f"/courses/1/batches/{batch}/publish").text
+    assert "This releases 3 grades to their students" in page
+    assert "They are of 1 student." in page
+    with web.store.reading() as session:
+        planned = publishing.would_publish(session, batch).counts
+        assert all(job.published_at is None for job in session.query(Job))
+    assert (planned.published, planned.replaced) == (3, 1)
+    assert publishing.publish(web.store, batch, actor="grace") == planned
+    assert "There is nothing to release" in grace.get(f"/courses/1/batches/{batch}/publish").text
+
+
+def test_it_outlives_what_was_in_it_and_is_called_as_the_assignment(web: Web, grace: TestClient) -> None:
+    send(web, web.student())
+    grade_all(web)
+    batch = batch_of(web)
+    with web.store.reading() as session:
+        later = now(session)
+    assert purge.purge(web.store, later, "root").submissions == 1
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(replace(echo(), title="Echo again")))
+        assert session.get_one(Batch, batch).name == "Submitted on the web: Echo again"
+    send(web, web.student("bob"))
+    with web.store.reading() as session:
+        assert [line.student for line in batches.job_lines(session, batch)] == ["bob"]
