@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "has_touch": True}
@@ -56,3 +57,16 @@ def opened(browser: Browser, file: Path, after: str = "", **context: Any) -> Ite
     page.wait_for_selector("section.replay[data-ready]")
     yield found
     within.close()
+
+
+def follow(link: Locator) -> None:
+    """Click, and wait until the page that it leads to is there: `click` itself returns while the old one still goes."""
+    with link.page.expect_navigation():
+        link.click()
+
+
+def assert_in_order(page: Page) -> None:
+    """No fault that axe finds, and nothing has to be pushed sideways."""
+    found = Axe().run(page).response["violations"]
+    assert not found, (page.url, [(each["id"], [node["html"][:200] for node in each["nodes"]]) for each in found])
+    assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth"), page.url
