@@ -5,22 +5,20 @@ marks set by hand, publishing, and what the student sees of it.
 from __future__ import annotations
 
 import re
-import socket
-import threading
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-import uvicorn
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from browsing import DESKTOP, PHONE, assert_in_order, chromium, follow
 from builders import settings_in
 from service.queue.embedded import EmbeddedServices
 from service.store.engine import open_store
 from service.web.app import make_app
+from serving import served
 from submissions.assignment.examples import examples
 from web import Web
 
@@ -31,20 +29,13 @@ STUDENTS = [f"student{number:02}" for number in range(20)]
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[tuple[Web, str]]:
+def grading(folder: Path) -> Iterator[tuple[Web, str]]:
     """The web with broker and worker, and where it answers."""
     settings = settings_in(folder)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
-        listening = socket.create_server(("127.0.0.1", 0))
         web = Web(services.settings, store, make_app(services.settings, store))
-        server = uvicorn.Server(uvicorn.Config(web.app, log_config=None, lifespan="off"))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-        thread.start()
-        try:
-            yield web, f"http://127.0.0.1:{listening.getsockname()[1]}"
-        finally:
-            server.should_exit = True
-            thread.join()
+        with served(web.app) as address:
+            yield web, address
 
 
 def a_class(folder: Path) -> Path:
@@ -64,7 +55,7 @@ def a_class(folder: Path) -> Path:
 
 def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
     complaints: list[str] = []
-    with served(tmp_path / "home") as (web, address), chromium() as browser:
+    with grading(tmp_path / "home") as (web, address), chromium() as browser:
         grace = web.instructor()
         within = browser.new_context(**DESKTOP)
         page = within.new_page()
