@@ -30,6 +30,10 @@ from submissions.unzipping import unzip
 _MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
 
 
+class StudentsKnowAnother(UsageError):
+    """Students have been shown another assignment of this id, and nobody said that it is to be replaced."""
+
+
 def prepare(context: WebContext, identity: Identity, course_id: int, found: Assignment) -> CourseAssignment:
     """Let the course have an assignment, not yet open; one of the same id is marked by this version from now on."""
     frozen = freeze(found)
@@ -40,13 +44,17 @@ def prepare(context: WebContext, identity: Identity, course_id: int, found: Assi
     return made
 
 
-def prepare_own(context: WebContext, identity: Identity, course_id: int, path: Path) -> CourseAssignment:
+def prepare_own(
+    context: WebContext, identity: Identity, course_id: int, path: Path, *, replace: bool
+) -> CourseAssignment:
     """Let the course have the assignment whose folder is in a zip; where there is one, grade its reference solution.
 
-    Raises UsageError, with every mistake in a line, where it is none.
+    Raises UsageError, with every mistake in a line, where it is none; StudentsKnowAnother.
     """
     folder = _unpacked(path)
     found = read_assignment(folder)
+    if not replace:
+        _refuse_one_that_students_know(context, course_id, found)
     made = prepare(context, identity, course_id, found)
     reference = folder / EXAMPLES / REFERENCE
     if reference.is_dir():
@@ -73,6 +81,16 @@ def preview(context: WebContext, identity: Identity, course_id: int, assignment:
     if reference is None:
         raise UsageError(f"there is no reference solution of this version of {assignment}; upload its folder again")
     return _grade(context, identity, course_id, found, reference)
+
+
+def _refuse_one_that_students_know(context: WebContext, course_id: int, found: Assignment) -> None:
+    with context.store.reading() as session:
+        there = [each for each in open_assignments.of_course(session, course_id) if each.assignment == found.id]
+    if any(each.opened_at is not None and each.version != found.version for each in there):
+        raise StudentsKnowAnother(
+            f"{found.id}: students have been shown another assignment of this id, {there[0].title!r}; "
+            "give yours another id, or say that it takes that one's place"
+        )
 
 
 def _grade(context: WebContext, identity: Identity, course_id: int, found: Assignment, reference: Path) -> str:

@@ -107,4 +107,4 @@ def _worth_a_row(change: Change) -> bool:
 
 def _criterion(change: CriterionChange) -> str:
     before, after = (out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
-    return f"{change.title}: {before} to {after}"
+    return f"{change.title}: {before} to {after}{' (set by hand)' if change.by_hand else ''}"

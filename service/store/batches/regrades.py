@@ -19,6 +19,7 @@ from service.store.batches import batches
 from service.store.courses.versions import freeze, keep
 from service.store.engine import Store, now
 from service.store.grades import overrides
+from service.store.grades.overrides import CriterionMarks
 from service.store.models import AssignmentVersion, Batch, Enrolment, Job, TrialRow
 from service.store.queue.jobs import enqueue
 from service.store.states import UNFINISHED, JobState, Lane, Standing
@@ -42,11 +43,15 @@ class Regraded:
 
 @dataclass(frozen=True, slots=True)
 class CriterionChange:
-    """One criterion whose marks differ, as (marks, the most there are); None where the assignment did not have it."""
+    """One criterion whose marks differ, as (marks, the most there are); None where the assignment did not have it.
+
+    ``by_hand`` where what somebody set counts in place of the new grade's: it may have been out of other marks.
+    """
 
     title: str
     before: tuple[Decimal, Decimal] | None
     after: tuple[Decimal, Decimal] | None
+    by_hand: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,23 +266,20 @@ def _change(session: Session, after: Job, before: Job, student: str) -> Change:
 
 def _criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
     before, after = _marks(session, before_id), _marks(session, after_id)
-    differing = [key for key in {**after, **before} if _worth(before.get(key)) != _worth(after.get(key))]
-    return tuple(
-        CriterionChange((after.get(key) or before[key])[0], _worth(before.get(key)), _worth(after.get(key)))
-        for key in differing
-    )
+    changed = []
+    for key, line in {**before, **after}.items():
+        worths = _worth(before.get(key)), _worth(after.get(key))
+        if worths[0] != worths[1]:
+            changed.append(CriterionChange(line.title, *worths, by_hand=key in after and line.override is not None))
+    return tuple(changed)
 
 
-_Marked = tuple[str, Decimal, Decimal]  # title, marks, the most there are
+def _marks(session: Session, job_id: str) -> dict[str, CriterionMarks]:
+    return {line.criterion: line for line in overrides.criterion_marks(session, job_id)}
 
 
-def _marks(session: Session, job_id: str) -> dict[str, _Marked]:
-    lines = overrides.criterion_marks(session, job_id)
-    return {line.criterion: (line.title, line.marks, line.max_marks) for line in lines}
-
-
-def _worth(marked: _Marked | None) -> tuple[Decimal, Decimal] | None:
-    return None if marked is None else marked[1:]
+def _worth(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
+    return None if line is None else (line.marks, line.max_marks)
 
 
 def _reason(session: Session, before: Job, after: Job) -> str:

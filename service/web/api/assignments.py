@@ -180,8 +180,11 @@ def prepare(here: Manages, context: Context, asked: AssignmentAsked) -> Assignme
 
 @router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
 def upload(here: Manages, context: Context, sent: Uploaded) -> AssignmentShape:
-    """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview."""
-    made = preparing.prepare_own(context, here.caller.identity, here.course_id, sent)
+    """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview.
+
+    It takes the place of one of the same id.
+    """
+    made = preparing.prepare_own(context, here.caller.identity, here.course_id, sent, replace=True)
     return AssignmentShape.model_validate(made)
 
 

@@ -74,6 +74,7 @@ class CriterionChangeShape(Shape):
     title: str
     before: tuple[float, float] | None
     after: tuple[float, float] | None
+    by_hand: bool = Field(description="What somebody set counts in place of the new grade's marks.")
 
 
 class ChangeShape(Shape):
@@ -103,7 +104,7 @@ class ChangeShape(Shape):
         before_max=12,
         after_max=12,
         differs=True,
-        criteria=[{"title": "Names the shapes", "before": [4, 6], "after": [6, 6]}],
+        criteria=[{"title": "Names the shapes", "before": [4, 6], "after": [6, 6], "by_hand": False}],
         reason="assignment changed",
     )
 

@@ -29,6 +29,7 @@ from service.web.attachments import attachment
 from service.web.context import Context, WebContext
 from service.web.kept_uploads import file_name
 from service.web.moments import written_moment
+from service.web.preparing import StudentsKnowAnother
 from service.web.rendering import page
 from sim.errors import UsageError
 from submissions.assignment.export import write_new
@@ -54,7 +55,13 @@ def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form
 
 
 @router.post("/assignments/uploads")
-def upload(request: Request, here: Instructing, context: Context, file: Annotated[UploadFile, File()]) -> Response:
+def upload(
+    request: Request,
+    here: Instructing,
+    context: Context,
+    file: Annotated[UploadFile, File()],
+    replace: Annotated[bool, Form()] = False,
+) -> Response:
     """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview."""
     sent = SentFile(file.filename or "", file.file)
     try:
@@ -64,9 +71,11 @@ def upload(request: Request, here: Instructing, context: Context, file: Annotate
             path = Path(folder) / file_name(sent)
             with path.open("xb") as sink:
                 shutil.copyfileobj(sent.stream, sink)
-            return _to(here, preparing.prepare_own(context, here.reader.identity, here.course_id, path))
+            made = preparing.prepare_own(context, here.reader.identity, here.course_id, path, replace=replace)
+            return _to(here, made)
     except UsageError as error:
-        return _list(request, here, context, refused=str(error).splitlines(), status_code=422)
+        asks = isinstance(error, StudentsKnowAnother)
+        return _list(request, here, context, refused=str(error).splitlines(), asks_to_replace=asks, status_code=422)
 
 
 @router.get("/assignments/uploads")
@@ -182,6 +191,7 @@ def _list(
     *,
     done: str = "",
     refused: list[str] | None = None,
+    asks_to_replace: bool = False,
     status_code: int = 200,
 ) -> Response:
     with context.store.reading() as session:
@@ -198,6 +208,7 @@ def _list(
         policies=allowed,
         policy=allowed.get("") or PolicyLimits(),
         refused=refused or [],
+        asks_to_replace=asks_to_replace,
         done=done,
         at=datetime.now(UTC),
     )

@@ -159,7 +159,7 @@ def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> Non
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
         (change,) = regrades.changes(session, again.batch_id or "")
     assert (change.before, change.after) == (8, Decimal("7.5"))
-    assert [each.title for each in change.criteria] == [aloud.title]
+    assert [(each.title, each.by_hand) for each in change.criteria] == [(aloud.title, False)]
     publishing.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(7.5, 8)}
     # What is set goes for the earlier grade and the later one, whichever it was set in.
@@ -173,6 +173,10 @@ def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives
     regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
     shape, aloud = GRADE.criteria
     _grade_all(store, replace(GRADE, criteria=(replace(shape, marks=Decimal(1), max_marks=Decimal(4)), aloud)))
+    with store.reading() as session:
+        again = session.query(Job).filter(Job.regrade_of == job_id).one()
+        (change,) = regrades.changes(session, again.batch_id or "")
+    assert change.criteria == (regrades.CriterionChange(shape.title, (6, 6), (4, 4), by_hand=True),)
     publishing.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(6, 6)}
 

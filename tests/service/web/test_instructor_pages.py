@@ -15,6 +15,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
+from httpx2 import Response
 from sqlalchemy import event, func, select
 from starlette.testclient import TestClient
 
@@ -306,7 +307,8 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     path = f"{HOME}/batches/{made.id}/similar"
     page = grace.get(path).text
     assert "1 pair is alike among 2 students" in words(page)
-    assert len(re.findall(rf'href="{HOME}/grades/\w+">ada', page)) == 3
+    assert len(re.findall(rf'href="{HOME}/grades/\w+">ada', page)) == 2
+    assert page.count("<details open>") == page.count("<details") == 1
     assert "sum = value * 3" in page
     assert "<script>alert" not in page
     with web.store.transaction() as session:
@@ -475,6 +477,29 @@ def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: Te
     assert "mine.zip: has no assignment.toml" in words(answer.text)
     example = grace.get(f"{HOME}/assignments/uploads/my-assignment.zip").content
     assert submit(grace, f"{HOME}/assignments/uploads", files={"file": ("my.zip", example)}).status_code == 303
+
+
+def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_said(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/assignments"
+    submit(grace, path, {"assignment": "echo-responder"})
+    text = (assignment_folder("echo-responder") / "assignment.toml").read_text(encoding="utf-8")
+
+    def upload(title: str, **fields: str) -> Response:
+        changed = re.sub("^title = .*", f'title = "{title}"', text, count=1, flags=re.MULTILINE)
+        files = {"file": ("echo.zip", zipped({"echo-responder/assignment.toml": changed}), "application/zip")}
+        return submit(grace, f"{path}/uploads", fields, files=files)
+
+    assert 'name="replace"' not in grace.get(path).text
+    assert upload("Nobody saw the other").status_code == 303
+    submit(grace, f"{path}/echo-responder/open")
+    refused = upload("Another")
+    assert refused.status_code == 422
+    assert "students have been shown another assignment of this id, 'Nobody saw the other'" in words(refused.text)
+    assert 'name="replace"' in refused.text
+    assert upload("Nobody saw the other").status_code == 303
+    assert "Nobody saw the other" in grace.get(path).text
+    assert upload("Another", replace="true").status_code == 303
+    assert "Another" in grace.get(path).text
 
 
 def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: TestClient) -> None:
