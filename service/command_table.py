@@ -100,6 +100,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "prepare": Command("course:prepare", "Put an assignment into a course."),
                 "open": Command("course:open_assignment", "Let students submit to it on the web."),
                 "close": Command("course:close_assignment", "Let nobody submit to it any more."),
+                "remove": Command("course:remove_assignment", "Take out one that no student has been shown."),
                 "export-student": Command("privacy:export_student", "Write all there is of a student."),
                 "delete-student": Command("privacy:delete_student", "Remove all there is of a student."),
                 "purge": Command("privacy:purge_course", "Remove what is old."),

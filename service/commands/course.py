@@ -143,6 +143,16 @@ def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None
     _tell_state(_changed(course, assignment, "close", open_assignments.close))
 
 
+def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+    """Let a course have an assignment no more that no student has been shown; graded batches stay."""
+    with open_store(load_settings()) as store, store.transaction() as session:
+        course_id = course_of(session, course, now(session))
+        open_assignments.remove(session, course_id, assignment)
+        audit.note(session, audit.this_user(), "remove", "course", str(course_id), assignment=assignment)
+    document(assignment=assignment)
+    tell(f"{assignment} is in the course no more")
+
+
 def _changed(
     course: str, assignment: str, action: str, change: Callable[[Session, int, str], None]
 ) -> CourseAssignment:

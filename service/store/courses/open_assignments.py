@@ -15,6 +15,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store import outbox
+from service.store.courses import policies
 from service.store.courses.versions import Frozen, assignment_from_bytes, keep
 from service.store.engine import now
 from service.store.models import AssignmentVersion, Batch
@@ -79,6 +80,21 @@ def close(session: Session, course_id: int, assignment: str) -> None:
     session.flush()
     if row.batch_id is not None:
         outbox.batch_ended(session, row.batch_id)
+
+
+def remove(session: Session, course_id: int, assignment: str) -> None:
+    """Let the course have it no more, and no limits of its own; graded batches stay as they are.
+
+    Raises UsageError where the course has none of this id, students have been shown it, or names are hidden by it.
+    """
+    row = _there(session, course_id, assignment)
+    if row.opened_at is not None:
+        raise UsageError(f"{assignment}: students have been shown it, so it stays; it can be closed")
+    if row.names_hidden:
+        raise UsageError(f"{assignment}: without it, names that are hidden would be shown; show them first")
+    session.delete(row)
+    session.flush()
+    policies.drop_policy(session, course_id, assignment)
 
 
 def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) -> None:

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import Depends, Path, Query
+from fastapi import Depends, Path, Query, Response
 from pydantic import BaseModel, Field
 
 from service.store import audit
@@ -240,6 +240,14 @@ def close_one(here: Manages, context: Context, assignment: AssignmentId) -> Assi
         open_assignments.close(session, here.course_id, assignment)
         audit.note(session, here.actor, "close", "course", str(here.course_id), assignment=assignment)
         return AssignmentShape.model_validate(open_assignments.find(session, here.course_id, assignment))
+
+
+@router.delete("/courses/{course_id}/assignments/{assignment}", status_code=204, response_class=Response)
+def remove(here: Manages, context: Context, assignment: AssignmentId) -> None:
+    """Let the course have it no more, as long as no student has been shown it."""
+    with context.store.transaction() as session:
+        open_assignments.remove(session, here.course_id, assignment)
+        audit.note(session, here.actor, "remove", "course", str(here.course_id), assignment=assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")

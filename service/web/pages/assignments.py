@@ -134,6 +134,13 @@ def close_one(here: Instructing, context: Context, assignment: AssignmentId) -> 
     return _changed(here, context, assignment, "close", open_assignments.close)
 
 
+@router.post("/assignments/{assignment}/remove")
+def remove(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+    """Let the course have it no more, as long as no student has been shown it."""
+    _changed(here, context, assignment, "remove", open_assignments.remove)
+    return RedirectResponse(_path(here, ""), 303)
+
+
 @router.post("/assignments/{assignment}/names")
 def hide_names(
     here: Instructing, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False

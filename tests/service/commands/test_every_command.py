@@ -15,6 +15,7 @@ import pytest
 
 from builders import echo, grading_request
 from command import robomark
+from paths import ROOT
 from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
@@ -78,6 +79,7 @@ SHOWING = {
     "course prepare echo-responder": "assignment title open opened_at closed_at version",
     "course open echo-responder": "assignment title open opened_at closed_at version",
     "course close echo-responder": "assignment title open opened_at closed_at version",
+    "course remove echo-responder": "assignment",
     "course export-student ada -o ada-all.zip": "student output bytes",
     "course delete-student cyd --for-good": "submissions grades",
     "course purge --older-than 9000": "removed archive submissions grades students",
@@ -115,6 +117,21 @@ _BOXES_AND_ESCAPES = re.compile(r"[\u2500-\u259f\x1b]")
 def test_every_command_that_shows_something_is_tried_here() -> None:
     tried = {words for line in {**SHOWING, **LONG} for words in ALL if tuple(line.split()[: len(words)]) == words}
     assert tried | _ELSEWHERE == {words for words, command in ALL.items() if not command.serves}
+
+
+def test_the_table_of_keys_for_instructors_has_every_command_and_key() -> None:
+    rows = {}
+    table = (ROOT / "docs" / "instructors.md").read_text(encoding="utf-8").partition("| command | keys |")[2]
+    for row in table.partition("\n\n")[0].splitlines():
+        names, _, keys = row.strip("|").partition("|")
+        first, *more = re.findall(r"`([a-z-]+(?: [a-z-]+)?)`", names) or [""]
+        for name in (first, *(f"{first.partition(' ')[0]} {each}" for each in more)):
+            rows[name] = {word for code in re.findall("`([^`]*)`", keys) for word in code.split()}
+    for line, keys in {**SHOWING, **LONG}.items():
+        (name,) = (" ".join(words) for words in ALL if tuple(line.split()[: len(words)]) == words)
+        # The demonstration's are in the row of submitting.
+        if name != "demo":
+            assert set(keys.split()) <= rows.get(name, set()), name
 
 
 def test_every_command_that_is_listed_can_be_loaded_and_is_listed_whole() -> None:

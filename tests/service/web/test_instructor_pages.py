@@ -448,6 +448,29 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
     assert submit(grace, path, {"assignment": "/etc"}).status_code == 422
 
 
+def test_an_assignment_that_nobody_was_shown_is_taken_out(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/assignments"
+    one = f"{path}/echo-responder"
+    submit(grace, path, {"assignment": "echo-responder"})
+    submit(grace, f"{HOME}/policy", {"assignment": "echo-responder", "due": "2026-11-30T17:00"})
+    submit(grace, f"{one}/names", {"hidden": "true"})
+    assert "Take out of the course" not in grace.get(one).text
+    assert "names that are hidden would be shown" in words(submit(grace, f"{one}/remove").text)
+    submit(grace, f"{one}/names", {"hidden": "false"})
+    assert "Take out of the course" in grace.get(one).text
+    assert submit(grace, f"{one}/remove").headers["location"] == path
+    assert "There is none yet" in grace.get(path).text
+    assert submit(grace, f"{one}/remove").status_code == 422
+    with web.store.reading() as session:
+        assert policies.policies(session, 1) == {}
+    submit(grace, path, {"assignment": "echo-responder"})
+    submit(grace, f"{one}/open")
+    submit(grace, f"{one}/close")
+    assert "Take out of the course" not in grace.get(one).text
+    refused = submit(grace, f"{one}/remove")
+    assert (refused.status_code, "it can be closed" in words(refused.text)) == (422, True)
+
+
 def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: TestClient) -> None:
     folder = assignment_folder("echo-responder")
     files = {
