@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,14 @@ from httpx2 import Response
 from starlette.testclient import TestClient
 
 from builders import opened, settings_in
+from service.grading.grade import Grade
 from service.queue.broker import broker_url
 from service.settings import Settings
 from service.store.engine import Store
+from service.store.grades import results
 from service.store.people import credentials, people
 from service.store.people.people import Member
+from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.web.app import make_app
 from submissions.people import Student
@@ -92,3 +95,15 @@ def submit(client: TestClient, path: str, data: dict[str, Any] | None = None, **
     """Post a form as the page it stands on would."""
     word = csrf(client.get("/account"))
     return client.post(path, data={**(data or {}), "csrf": word}, **options)
+
+
+def words(html: str) -> str:
+    """What a page says."""
+    body = html[html.find("<main") :]
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", body)).split())
+
+
+def grade_all(web: Web, grade: Grade) -> None:
+    """What waits gets this grade at once, without a worker."""
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(grade), datetime.now(UTC))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import resource
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.downloads import moodle_number
 from submissions.people import People, read_people
+from zips import zipped
 
 ASSIGNMENT = "echo-responder"
 ROBOT = "print('hello')\n"
@@ -34,14 +33,6 @@ def laid(folder: Path, files: Mapping[str, str | bytes]) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)
     return folder
-
-
-def zipped(files: Mapping[str, str | bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return buffer.getvalue()
 
 
 def under(folder: str, files: Mapping[str, str | bytes] = BOTH) -> dict[str, str | bytes]:

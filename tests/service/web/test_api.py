@@ -6,7 +6,6 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -45,12 +44,6 @@ class Program:
 
     def ask(self, method: str, path: str, headers: dict[str, str] | None = None, **options: Any) -> Response:
         return self.client.request(method, f"{HERE}{path}", headers=self.token | (headers or {}), **options)
-
-
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as web:
-        yield web
 
 
 @pytest.fixture

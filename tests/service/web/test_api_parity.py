@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +15,7 @@ from service.store.queue import tryouts
 from submissions.assignment.export import write_new
 from web import Web, web_in
 from web_world import World, make_world
+from zips import zipped
 
 HERE = "/api/v1/courses/1"
 ECHO = {"robot.py": "print('hello')\n", "responder.py": "def responder(msg):\n    return msg\n"}
@@ -43,14 +42,6 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Programs]:
         members = {"grace": world.grace, "ada": world.ada, "bob": web.student("bob"), "root": web.operator()}
         tokens = {who: web.token(each, "read", "submit", "mark", "manage") for who, each in members.items()}
         yield Programs(web, world, web.browser(), tokens)
-
-
-def zipped(files: dict[str, bytes]) -> bytes:
-    sink = io.BytesIO()
-    with zipfile.ZipFile(sink, "w") as archive:
-        for name, data in files.items():
-            archive.writestr(name, data)
-    return sink.getvalue()
 
 
 def test_an_assignment_of_ones_own_is_checked_prepared_and_previewed(

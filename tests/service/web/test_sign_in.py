@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 
@@ -16,13 +15,7 @@ from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE
 from sim.errors import UsageError
 from submissions.people import Student
-from web import Web, csrf, submit, web_in
-
-
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as made:
-        yield made
+from web import Web, csrf, submit
 
 
 def test_a_link_counts_once_and_only_when_its_button_is_pressed(web: Web) -> None:

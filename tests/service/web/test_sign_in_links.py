@@ -5,31 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
-import pytest
 from sqlalchemy import select
 from starlette.testclient import TestClient
 
 from service.store import audit
 from service.store.people import people
 from service.store.web_tables import Credential
-from web import Web, submit, web_in
+from web import Web, submit
 
 PEOPLE = "/courses/1/people"
 _SECRET = re.compile(r"/sign-in/(rml_[\w-]+)")
-
-
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as made:
-        yield made
-
-
-@pytest.fixture
-def grace(web: Web) -> TestClient:
-    return web.browser(web.instructor())
 
 
 def signs_in(web: Web, secret: str) -> bool:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
-from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
@@ -21,22 +19,15 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.policies import PolicyLimits
 from service.store.courses.versions import freeze
 from service.store.engine import now
-from service.store.grades import results
 from service.store.models import Batch, Job
 from service.store.people import webhooks
 from service.store.people.people import Member
-from service.store.queue import batch_control, jobs
+from service.store.queue import batch_control
 from service.store.states import JobState
 from sim.errors import UsageError
-from web import Web, submit, web_in
+from web import Web, grade_all, submit
 
 RESPONDER = "def responder(msg):\n    return msg\n"
-
-
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as made:
-        yield made
 
 
 @pytest.fixture
@@ -60,11 +51,10 @@ def send(web: Web, member: Member, program: str = PROGRAM) -> None:
     assert answer.status_code == 303, answer.text
 
 
-def grade_all(web: Web, marks: int = 1) -> None:
+def grade_with(web: Web, marks: int = 1) -> None:
     grade = report_builders.faulty_grade()
     first = replace(grade.criteria[0], marks=Decimal(marks), max_marks=Decimal(4))
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(replace(grade, criteria=(first,))), datetime.now(UTC))
+    grade_all(web, replace(grade, criteria=(first,)))
 
 
 def rows(page: str) -> list[str]:
@@ -76,9 +66,9 @@ def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web
     web.student("cyd")
     for marks, program in enumerate(("print(1)\n", "print(2)\n", "print(3)\n")):
         send(web, ada, program)
-        grade_all(web, marks)
+        grade_with(web, marks)
     send(web, bob)
-    grade_all(web, 4)
+    grade_with(web, 4)
     path = f"/courses/1/batches/{batch_of(web)}"
     page = grace.get(path).text
     assert rows(page) == ["ada", "bob"]
@@ -100,14 +90,14 @@ def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web
 def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace: TestClient) -> None:
     ada, bob = web.student("ada"), web.student("bob")
     send(web, ada, "print(1)\n")
-    grade_all(web)
+    grade_with(web)
     with web.store.transaction() as session:
         policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
     send(web, ada, "print(2)\n")
     with web.store.transaction() as session:
         policies.set_policy(session, 1, "", PolicyLimits(due_at=datetime(2020, 1, 1, tzinfo=UTC)))
     send(web, bob)
-    grade_all(web)
+    grade_with(web)
     with web.store.reading() as session:
         found = {line.student: (line.attempt, line.staff_only) for line in batches.job_lines(session, batch_of(web))}
     assert found["ada"] == (1, None)
@@ -134,7 +124,7 @@ def test_it_is_not_held_back_and_what_could_not_be_graded_is_retried(web: Web, g
         job = session.query(Job).one()
         job.state, job.error = JobState.DEAD, "the worker ended"
     submit(grace, f"/courses/1/batches/{batch}/retry")
-    grade_all(web)
+    grade_with(web)
     with web.store.reading() as session:
         assert session.query(Job).one().state is JobState.DONE
 
@@ -143,7 +133,7 @@ def test_it_is_finished_when_the_assignment_is_closed(web: Web, grace: TestClien
     with web.store.transaction() as session:
         webhooks.create(session, 1, "https://hooks.example.org/x", ["batch.finished"], "grace")
     send(web, web.student())
-    grade_all(web)
+    grade_with(web)
     assert told_outbox.claim(web.store, 9) == []
     submit(grace, "/courses/1/assignments/echo-responder/close")
     (told,) = told_outbox.claim(web.store, 9)
@@ -156,12 +146,12 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
     ada = web.student()
     for program in ("print(1)\n", "print(2)\n"):
         send(web, ada, program)
-        grade_all(web)
+        grade_with(web)
     batch = batch_of(web)
     made = regrades.regrade(web.store, batch, None, max_attempts=1, actor="grace")
     assert made.jobs == 1
     send(web, ada, "print(3)\n")
-    grade_all(web, 2)
+    grade_with(web, 2)
     page = grace.get(f"/courses/1/batches/{batch}/publish").text
     assert "This releases 3 grades to their students" in page
     assert "They are of 1 student." in page
@@ -175,7 +165,7 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
 
 def test_it_outlives_what_was_in_it_and_is_called_as_the_assignment(web: Web, grace: TestClient) -> None:
     send(web, web.student())
-    grade_all(web)
+    grade_with(web)
     batch = batch_of(web)
     with web.store.reading() as session:
         later = now(session)

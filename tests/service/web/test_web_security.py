@@ -17,12 +17,6 @@ from sim.errors import UsageError
 from web import Web, csrf, submit, web_in
 
 
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as made:
-        yield made
-
-
 def test_pages_run_and_load_nothing_but_our_files_and_are_kept_nowhere(web: Web) -> None:
     browser = web.browser(web.instructor())
     for path in ("/account", "/sign-in", "/nonsense", "/static/nonsense", "/api/v1/nonsense"):

@@ -1,4 +1,4 @@
-"""What instructors do on their pages: batches from upload to publication, assignments, people, and hidden names."""
+"""What instructors do with a batch on the web: looked at, taken in, watched, read, published, taken away."""
 
 from __future__ import annotations
 
@@ -7,15 +7,10 @@ import csv
 import io
 import re
 import zipfile
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 from decimal import Decimal
-from html import unescape
-from pathlib import Path
 
 import pytest
-from httpx2 import Response
 from sqlalchemy import event, func, select
 from starlette.testclient import TestClient
 
@@ -25,41 +20,20 @@ from report_builders import HOSTILE
 from service.reports.formats import FORMATS
 from service.store import audit
 from service.store.batches import intake
-from service.store.courses import open_assignments, policies
+from service.store.courses import open_assignments
 from service.store.courses.versions import freeze
-from service.store.grades import result_cache, results
+from service.store.grades import result_cache
 from service.store.installation import secret_of
-from service.store.models import Batch, Enrolment, Job, SubmissionRow, TrialRow
-from service.store.people import people
-from service.store.queue import jobs
-from service.store.states import BatchState, JobState, Role, Standing
+from service.store.models import Batch, Enrolment, Job, TrialRow
+from service.store.states import BatchState, JobState, Standing
 from service.version import grader_sha256
-from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.folder import assignment_folder
 from submissions.people import Refusal, Student
-from web import COURSE, Web, submit, web_in
+from web import COURSE, Web, grade_all, submit, words
+from zips import zipped
 
 HOME = "/courses/1"
 ECHO = {"robot.py": "print('hello')\n", "responder.py": "def responder(msg):\n    return msg\n"}
-
-
-@pytest.fixture
-def web(tmp_path: Path) -> Iterator[Web]:
-    with web_in(tmp_path) as made:
-        yield made
-
-
-@pytest.fixture
-def grace(web: Web) -> TestClient:
-    return web.browser(web.instructor())
-
-
-def zipped(files: Mapping[str, str]) -> bytes:
-    """A zip of texts."""
-    sink = io.BytesIO()
-    with zipfile.ZipFile(sink, "w") as archive:
-        for name, text in files.items():
-            archive.writestr(name, text)
-    return sink.getvalue()
 
 
 def a_class(*students: str) -> bytes:
@@ -75,23 +49,11 @@ def sent(grace: TestClient, data: bytes, name: str = "week one.zip", **fields: s
     return answer.headers["location"]
 
 
-def words(html: str) -> str:
-    """What a page says."""
-    body = html[html.find("<main") :]
-    return " ".join(unescape(re.sub(r"<[^>]+>", " ", body)).split())
-
-
-def grade_all(web: Web) -> None:
-    """What waits is graded at once, by hand."""
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
-
-
 def a_batch(web: Web, *students: str, refusals: tuple[Refusal, ...] = ()) -> intake.AcceptedBatch:
     """A graded batch."""
     requests = [grading_request(who, f"print({who!r})\n") for who in students]
     made = intake.accept_batch(web.store, "week one", requests, refusals, course=COURSE, max_attempts=3)
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     return made
 
 
@@ -127,7 +89,7 @@ def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, g
     web.student("ada")
     web.student("bob")
     submit(grace, f"{sent(grace, a_class('ada'))}/confirm")
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     secret = secret_of(web.store).sha256
     with web.store.transaction() as session:
         job = session.query(Job).one()
@@ -252,7 +214,7 @@ def test_progress_tells_how_far_it_is_and_asks_for_the_page_at_the_end(web: Web,
     assert 'hx-trigger="every 2s"' in first.text
     assert "hx-refresh" not in first.headers
     assert '<meta http-equiv="refresh"' in grace.get(path).text
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     last = grace.get(f"{path}/progress", headers={"hx-request": "true"})
     assert last.headers["hx-refresh"] == "true"
     assert "hx-trigger" not in last.text
@@ -303,7 +265,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     for student, program in (("ada", own), ("bob", own.replace("step", "go").replace("total", "sum"))):
         request = grading_request(student, program)
         made = intake.accept_batch(web.store, f"of {student}", [request], (), course=COURSE, max_attempts=3)
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     path = f"{HOME}/batches/{made.id}/similar"
     page = grace.get(path).text
     assert "1 pair is alike among 2 students" in words(page)
@@ -345,13 +307,13 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
     answer = submit(grace, f"{HOME}/batches/{made.id}/regrade")
     changes = answer.headers["location"]
     assert changes.endswith("/changes")
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     assert "0 of 2 have other marks" in words(grace.get(changes).text)
     first = made.jobs[0].job_id
     answer = submit(grace, f"{HOME}/grades/{first}/regrade", {"assignment": "echo-responder"})
     second = answer.headers["location"].rpartition("/")[2]
     assert "It waits to be graded." in grace.get(answer.headers["location"]).text
-    grade_all(web)
+    grade_all(web, report_builders.faulty_grade())
     shown = words(grace.get(answer.headers["location"]).text)
     assert "Graded again:" in shown
     assert "Graded more than once" in shown
@@ -420,177 +382,3 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
         422,
         True,
     )
-
-
-def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/assignments"
-    assert submit(grace, path, {"assignment": "echo-responder"}).headers["location"] == f"{path}/echo-responder"
-    for action, is_open in (("open", True), ("close", False), ("open", True)):
-        submit(grace, f"{path}/echo-responder/{action}")
-        with web.store.reading() as session:
-            assert open_assignments.find(session, 1, "echo-responder").open is is_open
-    policy = {"assignment": "echo-responder", "due": "2026-11-30T17:00", "late_days": "2", "attempts": "3"}
-    submit(grace, f"{HOME}/policy", policy)
-    shown = grace.get(f"{path}/echo-responder").text
-    assert 'value="2026-11-30T17:00"' in shown
-    with web.store.reading() as session:
-        allowed = policies.policies(session, 1)["echo-responder"]
-        done = [entry.action for entry in audit.entries(session, "course", "1")]
-    assert (allowed.late_days, allowed.attempts) == (2, 3)
-    submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
-    told = words(grace.get(f"{path}/echo-responder?done=policy").text)
-    assert "Set." in told
-    assert "This date has passed" in told
-    submit(grace, f"{path}/echo-responder/no-policy")
-    assert "It has no dates and attempts of its own" in words(grace.get(f"{path}/echo-responder").text)
-    assert done == ["prepare", "open", "close", "open", "policy"]
-    assert submit(grace, f"{HOME}/policy", {"due": "soon"}).status_code == 422
-    assert submit(grace, path, {"assignment": "/etc"}).status_code == 422
-
-
-def test_an_assignment_that_nobody_was_shown_is_taken_out(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/assignments"
-    one = f"{path}/echo-responder"
-    submit(grace, path, {"assignment": "echo-responder"})
-    submit(grace, f"{HOME}/policy", {"assignment": "echo-responder", "due": "2026-11-30T17:00"})
-    submit(grace, f"{one}/names", {"hidden": "true"})
-    assert "Take out of the course" not in grace.get(one).text
-    assert "names that are hidden would be shown" in words(submit(grace, f"{one}/remove").text)
-    submit(grace, f"{one}/names", {"hidden": "false"})
-    assert "Take out of the course" in grace.get(one).text
-    assert submit(grace, f"{one}/remove").headers["location"] == path
-    assert "There is none yet" in grace.get(path).text
-    assert submit(grace, f"{one}/remove").status_code == 422
-    with web.store.reading() as session:
-        assert policies.policies(session, 1) == {}
-    submit(grace, path, {"assignment": "echo-responder"})
-    submit(grace, f"{one}/open")
-    submit(grace, f"{one}/close")
-    assert "Take out of the course" not in grace.get(one).text
-    refused = submit(grace, f"{one}/remove")
-    assert (refused.status_code, "it can be closed" in words(refused.text)) == (422, True)
-
-
-def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: TestClient) -> None:
-    folder = assignment_folder("echo-responder")
-    files = {
-        f"mine/{path.relative_to(folder)}": path.read_text(encoding="utf-8")
-        for path in folder.rglob("*")
-        if path.is_file() and path.suffix in (".toml", ".py")
-    }
-    own = {"file": ("mine.zip", zipped(files), "application/zip")}
-    answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
-    assert answer.status_code == 303, words(answer.text)
-    grade_all(web)
-    shown = grace.get(answer.headers["location"]).text
-    preview = re.search(rf'href="({HOME}/grades/\w+)"', shown)
-    assert preview
-    assert grace.get(preview[1]).status_code == 200
-    with web.store.reading() as session:
-        role = select(Enrolment.role).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
-        assert session.scalars(role).all() == [Role.INSTRUCTOR]
-    assert submit(grace, f"{answer.headers['location']}/preview").status_code == 303
-    files["mine/assignment.toml"] += '\n[[criterion]]\ntitle = "No check"\nmarks = 1\n'
-    own = {"file": ("mine.zip", zipped(files), "application/zip")}
-    answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
-    assert answer.status_code == 422
-    assert "mine/assignment.toml:" in words(answer.text)
-    assert grace.get(f"{HOME}/assignments/uploads").headers["location"] == f"{HOME}/assignments"
-    answer = submit(grace, f"{HOME}/assignments/uploads", files={"file": ("mine.zip", zipped({"a/b.py": ""}))})
-    assert "mine.zip: has no assignment.toml" in words(answer.text)
-    example = grace.get(f"{HOME}/assignments/uploads/my-assignment.zip").content
-    assert submit(grace, f"{HOME}/assignments/uploads", files={"file": ("my.zip", example)}).status_code == 303
-
-
-def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_said(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/assignments"
-    submit(grace, path, {"assignment": "echo-responder"})
-    text = (assignment_folder("echo-responder") / "assignment.toml").read_text(encoding="utf-8")
-
-    def upload(title: str, **fields: str) -> Response:
-        changed = re.sub("^title = .*", f'title = "{title}"', text, count=1, flags=re.MULTILINE)
-        files = {"file": ("echo.zip", zipped({"echo-responder/assignment.toml": changed}), "application/zip")}
-        return submit(grace, f"{path}/uploads", fields, files=files)
-
-    assert 'name="replace"' not in grace.get(path).text
-    assert upload("Nobody saw the other").status_code == 303
-    submit(grace, f"{path}/echo-responder/open")
-    refused = upload("Another")
-    assert refused.status_code == 422
-    assert "students have been shown another assignment of this id, 'Nobody saw the other'" in words(refused.text)
-    assert 'name="replace"' in refused.text
-    assert upload("Nobody saw the other").status_code == 303
-    assert "Nobody saw the other" in grace.get(path).text
-    assert upload("Another", replace="true").status_code == 303
-    assert "Another" in grace.get(path).text
-
-
-def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/catalogue"
-
-    def found(query: str) -> list[str]:
-        return re.findall(r'name="assignment" value="([^"]+)"', grace.get(f"{path}?{query}").text)
-
-    assert sorted(found("")) == sorted(catalogue())
-    assert found("q=LOLLIPOP+noise") == ["lollipop-with-noise"]
-    assert found("q=sensor&topic=05") == [each for each in found("topic=05") if each in found("q=sensor")]
-    assert "relay-a-message" in found("topic=none")
-    assert found("q=nothing+is+like+this") == []
-    assert "<script" not in words(grace.get(f"{path}?q=%3Cscript%3E&topic=%22").text)
-    submit(grace, f"{HOME}/assignments", {"assignment": "lollipop"})
-    assert "lollipop" not in found("q=lollipop")
-    assert f'href="{HOME}/assignments/lollipop"' in grace.get(f"{path}?q=lollipop").text
-
-
-def test_students_are_let_in_and_get_more_time(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/people"
-    table = {"file": ("class.csv", b"id,name,email\nada,Ada Lovelace,ada@example.org\nbob,Bob,\n")}
-    assert submit(grace, f"{path}/table", files=table).status_code == 303
-    own = submit(grace, path, {"who": "cid", "name": "Cid"}).headers["location"]
-    told = words(grace.get(path).text)
-    for each in ("ada Ada Lovelace ada@example.org student", "bob Bob", "cid Cid", "grace Grace instructor"):
-        assert each in told
-    assert "ada@" not in words(grace.get(f"{path}?q=cid").text)
-    submit(grace, f"{own}/extensions", {"due": "2030-01-02", "more_attempts": "2"})
-    assert "2 attempts more" in words(grace.get(own).text)
-    with web.store.reading() as session:
-        done = [entry.action for entry in audit.entries(session, "course", "1")]
-    assert done == ["enrol", "enrol", "extend"]
-    answer = submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")})
-    assert (answer.status_code, "x.csv: " in words(answer.text)) == (422, True)
-    assert grace.get(f"{path}/table").headers["location"] == path
-
-
-def test_letting_in_one_changes_nobody_who_is_there(web: Web, grace: TestClient) -> None:
-    path = f"{HOME}/people"
-    submit(grace, path, {"who": "ada", "name": "Ada Lovelace"})
-    again = submit(grace, path, {"who": "ada", "name": "Somebody Else"})
-    assert (again.status_code, "in this course already, as Ada Lovelace" in words(again.text)) == (422, True)
-    staff = submit(grace, path, {"who": "grace", "name": "Somebody Else"})
-    assert (staff.status_code, "grace is an instructor of this course" in words(staff.text)) == (422, True)
-    assert submit(grace, f"{path}/table", files={"file": ("x.csv", b"id,name\ngrace,Nobody")}).status_code == 303
-    told = words(grace.get(path).text)
-    assert "ada Ada Lovelace" in told
-    assert "grace Grace" in told
-
-
-def test_who_has_submitted_nothing_is_taken_out_of_the_course(web: Web, grace: TestClient) -> None:
-    mistyped = submit(grace, f"{HOME}/people", {"who": "zoe"}).headers["location"]
-    answer = submit(grace, f"{mistyped}/remove")
-    assert "zoe is in the course no more" in words(grace.get(answer.headers["location"]).text)
-    assert grace.get(mistyped).status_code == 404
-    a_batch(web, "ada")
-    with web.store.reading() as session:
-        ada = f"{HOME}/people/{people.member(session, COURSE, 'ada').enrolment_id}"
-    assert f"{ada}/remove" not in grace.get(ada).text
-    assert submit(grace, f"{ada}/remove").status_code == 422
-    assert submit(grace, f"{HOME}/people/{web.instructor('linus').enrolment_id}/remove").status_code == 404
-
-
-def test_no_instructor_makes_a_link_for_another_or_for_who_is_more(web: Web, grace: TestClient) -> None:
-    other = web.instructor("linus")
-    assert submit(grace, f"{HOME}/people/{other.enrolment_id}/link").status_code == 404
-    ada = web.student()
-    with web.store.transaction() as session:
-        people.make_operator(session, ada.person_id)
-    assert submit(grace, f"{HOME}/people/{ada.enrolment_id}/link").status_code == 422
