@@ -20,6 +20,7 @@ from service.store.engine import now
 from service.store.grades import appeals, results
 from service.store.grades.appeals import AppealLine
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.queue import jobs
 from service.store.states import UNFINISHED, BatchState, JobState, Standing
 
 #: Of one student and one assignment; a student who submits more often sees the newest.
@@ -246,7 +247,7 @@ def _submission(
         held_back=batch not in (None, BatchState.OPEN),
         progress=job.progress,
         suspect=job.suspect is not None,
-        superseded=(job.error or "").startswith("superseded by "),
+        superseded=jobs.superseded_by(job.error) is not None,
         published=job.published_at is not None,
     )
     if not found.shown:

@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 from service.language import Language, languages
 from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
+from service.store.queue.jobs import superseded_by
 from service.store.states import Role
 from service.web.access import Reader
 from service.web.language import language_of
@@ -93,6 +94,7 @@ def _environment(language: Language) -> Environment:
     environment.filters["duration"] = _duration
     environment.filters["typed"] = _typed
     environment.globals["zone_now"] = zone_now
+    environment.globals["superseded_by"] = superseded_by
     return environment
 
 

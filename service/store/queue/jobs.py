@@ -31,6 +31,7 @@ from sim.errors import Cancelled, HostError
 if TYPE_CHECKING:
     from service.store.grades import results
 
+_SUPERSEDED = "superseded by "
 _LONGEST_BACKOFF = timedelta(hours=1)
 #: Clocks are corrected all the time by less than this.
 _TOLERANCE = timedelta(seconds=2)
@@ -110,8 +111,16 @@ def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
 def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
     """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
     which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
-    if _make(session, SUPERSEDE, which, at, {"error": f"superseded by {by}"}):
+    if _make(session, SUPERSEDE, which, at, {"error": f"{_SUPERSEDED}{by}"}):
         outbox.superseded(session, submissions, at)
+
+
+def superseded_by(error: str | None) -> str | None:
+    """The id of the job that took the place of one with this error; None where none did, "" where it is not known."""
+    if error is None or not error.startswith(_SUPERSEDED):
+        return None
+    told = error.removeprefix(_SUPERSEDED)
+    return told if told.isalnum() else ""
 
 
 def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:

@@ -245,6 +245,20 @@ def test_a_batch_is_paused_let_go_on_cancelled_and_retried(web: Web, grace: Test
     assert submit(grace, f"{path}/pause").status_code == 422
 
 
+def test_what_a_newer_submission_took_the_place_of_leads_to_it(web: Web, grace: TestClient) -> None:
+    old, new = (
+        intake.accept_batch(
+            web.store, name, [grading_request("ada", f"print({name!r})\n")], (), course=COURSE, max_attempts=3
+        )
+        for name in ("week one", "week two")
+    )
+    link = f'<a href="{HOME}/grades/{new.jobs[0].job_id}">a newer submission took its place</a>'
+    for path in (f"batches/{old.id}", f"grades/{old.jobs[0].job_id}"):
+        page = grace.get(f"{HOME}/{path}").text
+        assert link in page
+        assert "superseded by" not in page
+
+
 def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, grace: TestClient) -> None:
     web.student("zoe")
     made = a_batch(web, "ada", "bob", refusals=(Refusal("x.zip", "is broken, expected a zip."),))
