@@ -104,12 +104,9 @@ def test_what_the_manifests_name_is_there() -> None:
     labels = [each["spec"]["template"]["metadata"]["labels"] for each in MANIFESTS if each["kind"] == "Deployment"]
     for manifest in MANIFESTS:
         spec = manifest["spec"]
-        chosen = {
-            "Deployment": lambda spec: spec["selector"]["matchLabels"],
-            "Service": lambda spec: spec["selector"],
-            "NetworkPolicy": lambda spec: spec["podSelector"]["matchLabels"],
-        }[manifest["kind"]]
-        assert chosen(spec) in labels, manifest["metadata"]["name"]
+        selector = spec["podSelector" if manifest["kind"] == "NetworkPolicy" else "selector"]
+        chosen = selector if manifest["kind"] == "Service" else selector["matchLabels"]
+        assert chosen in labels, manifest["metadata"]["name"]
     for name, pod, container in _containers():
         mounted = {mount["name"] for mount in container["volumeMounts"]}
         assert mounted == {volume["name"] for volume in pod["volumes"]}, name

@@ -38,7 +38,7 @@ from responders.sandbox.child_ends import KilledFromOutside
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import Child, ChildLimits, LibrariesNeeded
+from responders.sandbox.running_child import ChildLimits, LibrariesNeeded, ServedChild
 from responders.sandbox.zygote import NONE, Isolation, Role
 from sim.recording import TICK, Verdict
 
@@ -320,7 +320,7 @@ def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple
 
 
 @contextlib.contextmanager
-def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Iterator[Child]:
+def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Iterator[ServedChild]:
     child = sandboxes.spawn(role, LIMITS, folder)
     try:
         job = {"name": f"{role}.py", "text": text, "seed": 1}
@@ -337,7 +337,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
         child.close()
 
 
-def _heard(child: Child, role: Role, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
+def _heard(child: ServedChild, role: Role, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
     """What a child prints, to its end or to a text that begins with ``until``."""
     said: list[str] = []
     try:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, Dialog, Locator, Page, sync_playwright
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "has_touch": True}
@@ -52,7 +52,12 @@ def opened(browser: Browser, file: Path, after: str = "", **context: Any) -> Ite
     page.on("request", lambda request: None if request.url.startswith("data:") else found.asked.append(request.url))
     page.on("pageerror", lambda error: found.complaints.append(str(error)))
     page.on("console", lambda said: found.complaints.append(said.text) if said.type == "error" else None)
-    page.on("dialog", lambda dialog: (found.complaints.append("a dialog"), dialog.dismiss()))
+
+    def dismiss(dialog: Dialog) -> None:
+        found.complaints.append("a dialog")
+        dialog.dismiss()
+
+    page.on("dialog", dismiss)
     page.goto(file.as_uri() + after)
     page.wait_for_selector("section.replay[data-ready]")
     yield found

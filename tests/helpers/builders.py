@@ -31,7 +31,13 @@ PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
 def settings_in(folder: Path, **changes: Any) -> Settings:
     """Settings with their home in ``folder``, and waits short enough for a test."""
-    values = {"home": folder, "lease_seconds": 5.0, "backoff_seconds": 0.2, "notify_seconds": 1.0, "concurrency": 2}
+    values: dict[str, Any] = {
+        "home": folder,
+        "lease_seconds": 5.0,
+        "backoff_seconds": 0.2,
+        "notify_seconds": 1.0,
+        "concurrency": 2,
+    }
     return Settings(**(values | changes))
 
 

@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from service.grading.grade import CriterionResult, Measure, TrialResult
-from service.grading.judging.judge import judge
+from judging import START, judged
+from service.grading.grade import CriterionResult, Measure
 from sim.recording import Pose, Recording, Ticks, Verdict
-from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
-from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria import Criterion
 
-START = Pose(100, 800, 0)
 #: mm and degrees of each tick, and how many ticks.
 Move = tuple[float, float, int]
 
@@ -63,21 +61,6 @@ def along(points: np.ndarray, heading: np.ndarray, rgb: Sequence[Sequence[float]
         "pen": ((0, True),),
     }
     return Recording(**(values | parts))
-
-
-def criterion(check: str, **keys: Any) -> Criterion:
-    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
-    return made  # type: ignore[return-value]
-
-
-def judged(asked: Criterion, *recordings: Recording, motor_noise: float = 0.0) -> CriterionResult:
-    assignment = Assignment("a", "A", WorldSpec(), Parts(), (Scenario("s", (START,)),), (asked,))
-    trials = tuple(
-        TrialResult("s", index, 1, 0.0, motor_noise, "visible", recording) for index, recording in enumerate(recordings)
-    )
-    (result,) = judge(assignment, trials)
-    assert 0 <= result.marks <= result.max_marks
-    return result
 
 
 def passes(asked: Criterion, recording: Recording) -> bool:

@@ -52,7 +52,7 @@ def long_recording(ticks: int, images: int = 0) -> Recording:
     one = line_follower_recording(150)
     times = -(-ticks // 150)
     chance = np.random.default_rng(0)
-    columns = {
+    columns: dict[str, Any] = {
         each.name: np.concatenate([getattr(one.ticks, each.name)] * times)[:ticks]
         + (chance.integers(0, 3000, (ticks, each.width)) if each.whole else 0)
         for each in COLUMNS
@@ -90,7 +90,7 @@ def parting_grade(after: int = 90) -> Grade:
             "y": old.y[after - 1] + way[1] * steps,
             "heading": np.full(len(steps), old.heading[after - 1]),
         }
-        columns = {
+        columns: dict[str, Any] = {
             each.name: np.concatenate([getattr(old, each.name)[:after], straight[each.name]])
             if each.name in straight
             else np.resize(getattr(old, each.name), (360, *getattr(old, each.name).shape[1:]))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -42,7 +43,8 @@ def evaluation() -> Evaluation:
 
 def texts(figure: Figure) -> list[str]:
     """Each on one line, however it is broken."""
-    return [" ".join(text.get_text().split()) for holder in (figure, *figure.axes) for text in holder.texts]
+    holders: tuple[Figure | Axes, ...] = (figure, *figure.axes)
+    return [" ".join(text.get_text().split()) for holder in holders for text in holder.texts]
 
 
 def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -> None:
@@ -83,7 +85,7 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
     ]
     assert texts(figure).count("n = 6 to 120 images a point") == 4
     line = figure.axes[1].lines[2]
-    assert line.get_xdata().tolist() == list(evaluation.measured.curves[1].values)
+    assert np.asarray(line.get_xdata()).tolist() == list(evaluation.measured.curves[1].values)
 
 
 def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation: Evaluation) -> None:

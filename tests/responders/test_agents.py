@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import Any
 
 import pytest
 
@@ -10,6 +11,7 @@ import running
 from hostile import FIND_WIRE, flood, forged
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.zygote import Role
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Verdict
@@ -351,9 +353,12 @@ def test_no_process_is_started_for_an_assignment_without_agents(
 ) -> None:
     spawned: list[str] = []
     spawn = runner._sandboxes.spawn
-    monkeypatch.setattr(
-        runner._sandboxes, "spawn", lambda role, *rest, **named: spawned.append(role) or spawn(role, *rest, **named)
-    )
+
+    def noted(role: Role, *rest: Any, **named: Any) -> Any:
+        spawned.append(role)
+        return spawn(role, *rest, **named)
+
+    monkeypatch.setattr(runner._sandboxes, "spawn", noted)
     run_program(runner, ONE, responder="def responder(text): return text")
     assert sorted(spawned) == ["responder", "robot"]
     run(runner, program=ONE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from responders.channel import Channel
@@ -13,7 +15,7 @@ from sim.world import Chain
 DELAY = SECOND // 10
 
 
-def conversation(**channel: float) -> Conversation:
+def conversation(**channel: Any) -> Conversation:
     return Conversation(Channel(**channel), 5, Chain(), Cable())
 
 
@@ -93,7 +95,7 @@ def test_the_chain_tells_deliveries_apart() -> None:
         ({"loss": 0.2, "jitter": 0.4, "duplication": 0.4, "reordering": 0.3}, "c9831e6c34c9d0f4"),
     ],
 )
-def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, float], digest: str) -> None:
+def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, Any], digest: str) -> None:
     """Recordings made before there was another link would have other hashes."""
     chain = Chain()
     talk = Conversation(Channel(**channel), 5, chain, Cable())

@@ -47,7 +47,7 @@ print(len(pyState()['messages']))
 """
 _STOPPING = {signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU}
 #: What some signals come to; any other ends the program with an error, or does nothing to it.
-_VERDICTS = {signal.SIGXCPU: Verdict.CPU_LIMIT, signal.SIGSYS: Verdict.SANDBOX_VIOLATION}
+_VERDICTS: dict[int, Verdict] = {signal.SIGXCPU: Verdict.CPU_LIMIT, signal.SIGSYS: Verdict.SANDBOX_VIOLATION}
 
 
 @pytest.mark.parametrize("number", sorted(set(range(1, 65)) - _STOPPING - {32, 33}))

@@ -105,6 +105,9 @@ class _NoRuns:
     def call(self, call: object) -> PlannedRun:
         return PlannedRun()
 
+    def standing(self) -> PlannedRun:
+        raise AssertionError
+
     def ran(self, recording: Recording) -> None:
         raise AssertionError
 

@@ -63,6 +63,11 @@ def add(whole: Document, chance: random.Random, source: object) -> None:
     cells.insert(chance.randint(0, len(cells)), {"cell_type": "code", "metadata": {}, "source": source, "outputs": []})
 
 
+def _many_times(whole: Document, chance: random.Random, source: str) -> None:
+    for _ in range(100):
+        add(whole, chance, source)
+
+
 def version_3(whole: Document, chance: random.Random) -> Document:
     cells = [{**cell, "input": cell["source"]} for cell in cells_of(whole) if "source" in cell]
     for cell in cells:
@@ -123,7 +128,7 @@ CHANGES: tuple[Change, ...] = (
     lambda whole, chance: add(whole, chance, "\ufeff%%sim_magic_imports -R\nprint('hello')"),
     lambda whole, chance: add(whole, chance, "get_ipython().run_cell_magic('sim_magic', '-R', 'x')" * 2),
     lambda whole, chance: add(whole, chance, "get_ipython().run_line_magic(5, None)\nget_ipython().run_cell_magic()"),
-    lambda whole, chance: [add(whole, chance, "import os\nos.listdir('..')") for _ in range(100)] and None,
+    lambda whole, chance: _many_times(whole, chance, "import os\nos.listdir('..')"),
 )
 
 

@@ -201,7 +201,7 @@ def weights(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
 
 
 def _weights(**changed: Any) -> bytes:
-    arrays = {
+    arrays: dict[str, Any] = {
         "coefs_0": np.eye(4, 3),
         "intercepts_0": np.zeros(3),
         "coefs_1": np.eye(3, 2),

@@ -60,7 +60,7 @@ def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch
     def resolve(*_: object, **__: object) -> list[tuple[object, ...]]:
         return [(2, 1, 6, "", (address, 80)) for address in ("93.184.215.14", "10.0.0.1")]
 
-    monkeypatch.setattr(outside.socket, "getaddrinfo", resolve)
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
     others = (ip_network("192.168.0.0/16"),)
     with pytest.raises(NotPublic, match="no public address"):
         ask("http://two.example.org/", method="POST", body=b"", headers={}, others=others)

@@ -21,7 +21,7 @@ from service.store.queue.tryouts import TryoutLine
 from service.store.states import TryoutState
 from service.trying import LONGEST_SECONDS, tryout_assignment
 from sim.errors import HostError
-from submissions.assignment.definition import Assignment, Limits, Scenario
+from submissions.assignment.definition import Assignment, Limits, Scenario, Visibility
 from submissions.assignment.reader import find_assignment
 from submissions.packed import pack_submission
 from submissions.people import Student
@@ -86,7 +86,7 @@ def test_it_is_one_short_trial_of_many() -> None:
 
 
 @pytest.mark.parametrize("hidden", ["hidden", "after_published"])
-def test_where_students_see_no_robot_there_is_nothing_to_try(hidden: str) -> None:
+def test_where_students_see_no_robot_there_is_nothing_to_try(hidden: Visibility) -> None:
     scenarios: tuple[Scenario, ...] = tuple(replace(each, visibility=hidden) for each in echo().scenarios)
     assert tryout_assignment(replace(echo(), scenarios=scenarios)) is None
     assert tryout_assignment(find_assignment("train-a-recogniser")) is None

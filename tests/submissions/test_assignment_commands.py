@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
@@ -195,7 +196,7 @@ def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner)
     checked = check_examples(str(tmp_path / "task"), runner=runner)
     assert (dict(checked.unwritten), len(checked.problems)) == ({}, 2)
     with pytest.raises(UsageError, match=r"stops-short has a table in expected\.toml already"):
-        add_expected(str(tmp_path / "task"), {"stops-short": Expectation(marks="3")})
+        add_expected(str(tmp_path / "task"), {"stops-short": Expectation(marks=Decimal(3))})
 
 
 def test_a_list_says_what_the_assignments_say() -> None:

@@ -207,7 +207,7 @@ marks = 1.005
 check = "pose"
 """
     found = problems(tmp_path / "bad", text)
-    by_line = {}
+    by_line: dict[int, list[str]] = {}
     for problem in found:
         line, _, sentence = problem.removeprefix("bad/assignment.toml:").partition(": ")
         by_line.setdefault(int(line), []).append(sentence)
@@ -232,8 +232,8 @@ check = "pose"
         43: 'scenarios names "tt", expected the id of a scenario',
         46: "marks is 1.005, expected at most two decimal places",
     }
-    for line, phrase in expected.items():
-        assert any(phrase in sentence for sentence in by_line.get(line, [])), (line, found)
+    for number, phrase in expected.items():
+        assert any(phrase in sentence for sentence in by_line.get(number, [])), (number, found)
     assert set(by_line) == set(expected)
 
 

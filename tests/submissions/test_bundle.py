@@ -25,7 +25,7 @@ from submissions.submission import Submission
 
 PROGRAM = 'say("hello")\n'
 RESPONDER = "def responder(text):\n    return text\n"
-BOTH = {"robot.py": PROGRAM, "responder.py": RESPONDER}
+BOTH: dict[str, str | bytes] = {"robot.py": PROGRAM, "responder.py": RESPONDER}
 
 
 def zipped(path: Path, files: Mapping[str, str | bytes] | Iterable[tuple[str | zipfile.ZipInfo, str | bytes]]) -> Path:
@@ -72,7 +72,7 @@ def test_folder_and_zip_with_or_without_top_folder_are_the_same_submission(tmp_p
 
 
 def test_leftovers_of_systems_are_ignored(tmp_path: Path) -> None:
-    leftovers = {
+    leftovers: dict[str, str | bytes] = {
         "__MACOSX/alice/._robot.py": b"\0",
         "alice/.DS_Store": b"\0",
         ".git/config": "x",

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from service.grading.judging.judge import JUDGES
-from submissions.assignment.schema import read_table
+from submissions.assignment.schema import TableProblem, read_table
 from submissions.criteria import SCHEMAS
 
 AREA = {"rectangle": [0, 0, 10, 10]}
@@ -69,5 +69,6 @@ def test_a_criterion_is_judged_in_the_module_that_is_named_like_its_schemas(chec
 
 def test_too_few_numbers_are_told_as_their_own_kind_has_them() -> None:
     keys = {"of": "lap", "measure": "best lap", "steps": [[40]]}
-    (problem,) = read_table(SCHEMAS["ranking"], {"title": "A", "marks": 1, "check": "ranking", **keys})  # type: ignore[misc]
+    (problem,) = read_table(SCHEMAS["ranking"], {"title": "A", "marks": 1, "check": "ranking", **keys})
+    assert isinstance(problem, TableProblem)
     assert problem.sentence == "steps[0] has too few numbers, expected [figure, share]"

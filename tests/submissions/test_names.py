@@ -17,7 +17,7 @@ from command import robomark
 from service.reports.written import file_stem, file_stems, refused_stems
 from service.store.batches import intake
 from service.store.engine import Store, now
-from service.store.models import Enrolment, Person
+from service.store.models import Enrolment, Job, Person, SubmissionRow
 from service.store.people.students import Students, course_of
 from service.store.states import Role
 from sim.errors import UsageError
@@ -278,7 +278,7 @@ def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> 
         accepted = intake.accept(store, grading_request(name), max_attempts=3)
         assert (accepted.student, accepted.attempt) == (name, 1)
         with store.reading() as session:
-            assert session.scalar(select(intake.Job.enrolment_id).where(intake.Job.id == accepted.job_id)) == expected
+            assert session.scalar(select(Job.enrolment_id).where(Job.id == accepted.job_id)) == expected
     with pytest.raises(UsageError, match="cannot be told from"):
         intake.accept(store, grading_request("ADA"), max_attempts=3)
 
@@ -287,7 +287,7 @@ def test_an_older_hash_means_only_that_it_is_graded_again(store: Store) -> None:
     taken = grading_request("ada")
     intake.accept_new(store, "b", [taken], (), max_attempts=3)
     with store.transaction() as session:
-        session.execute(update(intake.SubmissionRow).values(sha256="0" * 64))
+        session.execute(update(SubmissionRow).values(sha256="0" * 64))
     again = intake.accept_new(store, "b", [taken], (), max_attempts=3)
     assert again.batch is not None
     assert [(job.attempt, job.staff_only) for job in again.batch.jobs] == [(2, "")]

@@ -15,7 +15,7 @@ from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import Isolation
+from responders.sandbox.zygote import Isolation, Role
 
 _DATA = """
 import numpy as np
@@ -141,7 +141,7 @@ def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path
 
 
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
-def test_the_standard_library_can_be_imported_late(role: str, sandboxes: Sandboxes, empty: Path) -> None:
+def test_the_standard_library_can_be_imported_late(role: Role, sandboxes: Sandboxes, empty: Path) -> None:
     """All of it that this interpreter can import at all, but for what would draw or needs a screen."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
     names = sorted(sys.stdlib_module_names - left_out)
@@ -160,7 +160,7 @@ for name in {names!r}:
 
 
 def _says(
-    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: str = "responder with libraries"
+    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: Role = "responder with libraries"
 ) -> None:
     lines, stop = run_text(sandboxes, role, text + "\ndef responder(text): return text\n", folder)
     assert (lines, stop) == (said, None)

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from judging import criterion
 from paths import DATA, ROOT
 from report_builders import row_of
 from service.grading.grade import Grade
@@ -26,7 +27,6 @@ from service.reports.view import staff_view, student_view
 from sim.recording import Pose, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.bundle import read_submission
-from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission
 
 _TABLE = tomllib.loads((DATA / "source_evasions.toml").read_text("utf-8"))
@@ -34,17 +34,12 @@ CASES: list[dict[str, Any]] = _TABLE["case"]
 _RULES = ("uses", "avoids", "in_loop", "defines")
 
 
-def criterion(check: str, **keys: Any) -> Criterion:
-    made = SCHEMAS[check].model_validate({"id": check, "title": "C", "marks": "1", "check": check, **keys})
-    return made  # type: ignore[return-value]
-
-
 def assignment(part: str, rules: dict[str, Any]) -> Assignment:
-    source = criterion("source", part=part, **rules)
+    source = criterion("source", **{"id": "source", "marks": "1", "part": part, **rules})
     if part == "program":
         scenario = Scenario("s", (Pose(200, 800, 0),), seconds=5.0)
         return Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (source,))
-    asked = criterion("functions", function="f", calls=[{"returns": True}])
+    asked = criterion("functions", id="functions", marks="1", function="f", calls=[{"returns": True}])
     return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (source, asked))
 
 
@@ -136,7 +131,7 @@ def test_what_was_compiled_of_a_closed_file_is_closed_too(
     module: str, marks: int, tmp_path: Path, runner: TrialRunner
 ) -> None:
     source = ROOT / "responders" / "kit" / "nn_tools" / "weights.py"
-    compiled = Path(py_compile.compile(str(source), doraise=True))
+    compiled = Path(py_compile.compile(str(source), doraise=True) or "")
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})
     assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks

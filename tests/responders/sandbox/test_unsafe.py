@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -43,7 +44,11 @@ def test_a_grade_without_sandbox_says_so(flags: tuple[str, ...]) -> None:
 def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None:
     """The variable that such a setting would have changes nothing for the next worker."""
     settings = settings_in(tmp_path)
-    home = {"ROBOMARK_HOME": str(settings.home), "ROBOMARK_UNSAFE_NO_SANDBOX": "1", "ROBOMARK_NO_WALLS": "1"}
+    home: dict[str, Any] = {
+        "ROBOMARK_HOME": str(settings.home),
+        "ROBOMARK_UNSAFE_NO_SANDBOX": "1",
+        "ROBOMARK_NO_WALLS": "1",
+    }
     for number, flags in enumerate(((_FLAG,), ())):
         folder = tmp_path / f"class{number}"
         shutil.copytree(_REFERENCE, folder / f"student{number}")

@@ -11,33 +11,19 @@ import shutil
 import signal
 import subprocess
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from sqlalchemy import func, select
 
-import command
+from batch_command import Ended, robomark
+from command import COMMAND
 from service.reports.written import file_stem
 from service.settings import Settings
 from service.store.engine import open_store
 from service.store.models import Job
 from service.store.states import JobState
 from submissions.assignment.examples import examples
-
-
-@dataclass(frozen=True)
-class Ended:
-    status: int
-    out: str
-    err: str
-
-
-def robomark(home: Path, *arguments: str | Path, **environment: str) -> Ended:
-    """Run the command with its home in ``home``; a traceback is never an answer."""
-    ended = command.robomark(*arguments, ROBOMARK_HOME=str(home), **{"COLUMNS": "200", **environment})
-    assert "Traceback" not in ended.stderr
-    return Ended(ended.returncode, ended.stdout, ended.stderr)
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +152,7 @@ def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
     shutil.copytree(examples("echo-responder") / "reference", own)
     (own / "robot.py").write_text("while True:\n    pass\n")
     home = tmp_path / "home"
-    submit = [*command.COMMAND, "batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]
+    submit = [*COMMAND, "batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]
     environment = {**os.environ, "ROBOMARK_HOME": str(home)}
     with subprocess.Popen(submit, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as waiting:
         while _running(home) == 0:

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 import pytest
 from rich.console import Console
 from sqlalchemy import select, update
-from test_batch_commands import Ended, robomark
 
+from batch_command import Ended, robomark
 from builders import asked_already, grading_request, settings_in
 from service.commands.batch.waiting import Waiting
 from service.queue.celery_app import make_celery

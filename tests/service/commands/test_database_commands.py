@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,7 +51,7 @@ def elsewhere(service_settings: Settings, request: pytest.FixtureRequest, tmp_pa
 def test_a_course_is_archived_purged_and_brought_back(
     service_settings: Settings, elsewhere: str, tmp_path: Path
 ) -> None:
-    used = {"home": service_settings.home, "database": service_settings.database}
+    used: dict[str, Any] = {"home": service_settings.home, "database": service_settings.database}
     batch, archive = _graded_batch(service_settings), tmp_path / "spring.db"
     tomorrow = f"{datetime.now(UTC) + timedelta(days=2):%Y-%m-%d}"
     assert "revision" in _answer("db", "upgrade", **used)
@@ -62,9 +63,9 @@ def test_a_course_is_archived_purged_and_brought_back(
     assert archive.stat().st_mode & 0o077 == 0
     assert batch not in _answer("batch", "list", **used)
     # The archive is a database that can be looked into, and be brought back.
-    opened = {"home": tmp_path / "reading", "database": f"sqlite:///{archive}"}
+    opened: dict[str, Any] = {"home": tmp_path / "reading", "database": f"sqlite:///{archive}"}
     assert _answer("batch", "export", batch, **opened) == marks
-    new = {"home": tmp_path / "new", "database": elsewhere}
+    new: dict[str, Any] = {"home": tmp_path / "new", "database": elsewhere}
     _answer("db", "restore", archive, **new)
     assert _answer("batch", "export", batch, **new) == marks
     again = robomark("db", "restore", archive, ROBOMARK_HOME=str(new["home"]), ROBOMARK_DATABASE_URL=elsewhere)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -200,7 +201,7 @@ def test_no_command_has_another_meaning_for_the_assignments_letter_or_another_na
         assert "--report" not in options or words == ("grade",), words
 
 
-def _ended(folder: Path, database: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def _ended(folder: Path, database: Path, *words: str, **environment: Any) -> subprocess.CompletedProcess[str]:
     """The command in a folder with what the lines name, on a copy of the database."""
     folder.mkdir()
     shutil.copytree(database, folder / "home")

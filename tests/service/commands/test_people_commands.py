@@ -10,10 +10,11 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
-from test_batch_commands import robomark
 
+from batch_command import robomark
 from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from service.settings import Settings
 from service.store.engine import open_store
@@ -48,7 +49,18 @@ def download(tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path, tmp_path: Path) -> None:
     home, sheet, reports = tmp_path / "home", tmp_path / "worksheet.csv", tmp_path / "reports"
-    words = ["batch", "submit", download, "-a", ECHO, "--people", sheet, "--wait", "--output", reports]
+    words: list[str | Path] = [
+        "batch",
+        "submit",
+        download,
+        "-a",
+        ECHO,
+        "--people",
+        sheet,
+        "--wait",
+        "--output",
+        reports,
+    ]
     ended = robomark(home, *words)
     assert ended.status == 2
     found = re.search(r"batch (\w{12}): 2 queued", ended.out)
@@ -137,11 +149,11 @@ def test_the_autograder_writes_what_gradescope_reads(tmp_path: Path) -> None:
     assert not (root / "results" / "results.json").exists()
 
 
-def _autograded(root: Path) -> dict[str, object]:
+def _autograded(root: Path) -> dict[str, Any]:
     ended = _run(root)
     assert ended.returncode == 0, ended.stderr
     results = root / "results" / "results.json"
-    read: dict[str, object] = json.loads(results.read_text())
+    read: dict[str, Any] = json.loads(results.read_text())
     results.unlink()
     return read
 

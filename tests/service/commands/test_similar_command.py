@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from test_batch_commands import robomark
 
 import report_builders
+from batch_command import robomark
 from benchmarks.harness.copyists import COPYISTS
 from builders import opened, settings_in
 from responders.code import Code

@@ -41,8 +41,9 @@ def _install(folder: Path) -> Path:
     environment = folder / "environment"
     python = next((each for each in _PYTHONS if _open_to_others(each)), _PYTHONS[0])
     subprocess.run([python, "-m", "venv", environment], check=True, umask=_READABLE_FOR_OTHERS)
-    pip = [environment / "bin" / "python", "-m", "pip", "install", "--quiet"]
-    for what in (["--require-hashes", "-r", ROOT / "deploy" / "requirements.lock"], ["--no-deps", wheel]):
+    pip: list[str | Path] = [environment / "bin" / "python", "-m", "pip", "install", "--quiet"]
+    locked: list[str | Path] = ["--require-hashes", "-r", ROOT / "deploy" / "requirements.lock"]
+    for what in (locked, ["--no-deps", wheel]):
         subprocess.run([*pip, *what], check=True, umask=_READABLE_FOR_OTHERS)
     return environment / "bin" / "robomark"
 

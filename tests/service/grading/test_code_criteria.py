@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from judging import criterion
 from responders.code import Code
 from responders.function_calls import FunctionCall, call_functions
 from responders.sandbox.meter import JobMeter
@@ -27,17 +28,12 @@ from sim.recording import Verdict
 from submissions.assignment.definition import Assignment, Limits, Parts, WorldSpec
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
-from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria import Criterion
 from submissions.magics import split_program
 from submissions.plain_cells import python_of
 from submissions.submission import Cell, Notebook, Submission
 
 LIMITS = ChildLimits(1.0, 256 << 20)
-
-
-def criterion(check: str, **keys: Any) -> Criterion:
-    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
-    return made  # type: ignore[return-value]
 
 
 def without_robot(*criteria: Criterion) -> Assignment:

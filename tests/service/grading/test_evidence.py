@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_judging import criterion, judged, recorded
 
 from driving import along, driven, rest, spin, straight
+from judging import criterion, judged, recorded
 from paths import DATA
 from responders.code import Code
 from service.grading.grade import CriterionResult
@@ -135,7 +135,8 @@ def _looking_at(x: float, y: float, heading: float) -> Pose:
 
 def _photographed(*seen: tuple[Pose, str, str], **parts: Any) -> Recording:
     """Images from these poses: what each shows, and the answer."""
-    images, messages = [], []
+    images: list[Image] = []
+    messages: list[Message] = []
     for number, (pose, truth, answer) in enumerate(seen):
         t = number / 10
         pixels = np.full(1600, 255, np.uint8)

@@ -2,47 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from judging import START, criterion, judged, recorded
 from models.intervals import wilson
-from service.grading.grade import CriterionResult, Shown, TrialResult
+from service.grading.grade import Shown, TrialResult
 from service.grading.judging.answers import NOTHING, at_path, parsed, same_value
 from service.grading.judging.judge import judge
 from service.grading.judging.marks import Over, earned, share_of, share_of_accuracy
 from service.grading.judging.outcome import Outcome
 from service.grading.judging.truths import NO_IMAGE
 from sim.errors import HostError
-from sim.recording import Fault, Image, Line, Message, Pose, Recording, Ticks, Verdict
+from sim.recording import Fault, Image, Line, Message, Pose, Recording, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
-from submissions.criteria import SCHEMAS, Criterion
 
-START = Pose(100, 800, 0)
 SQUARE, DIAMOND = "square", "diamond"
-
-
-def recorded(**parts: Any) -> Recording:
-    """A run of three seconds along x at 30 mm a second."""
-    count = 90
-    zeros, sums = np.zeros(count), np.zeros((count, 3), dtype=np.int64)
-    x = 100 + np.arange(1, count + 1.0)
-    values: dict[str, Any] = {
-        "background": "Empty_Map",
-        "start": START,
-        "end": Pose(190, 800, 0),
-        "end_t": 3.0,
-        "ticks": Ticks(x, zeros + 800, zeros, zeros, zeros, sums, sums, zeros, zeros),
-        "verdict": Verdict.FINISHED,
-        "sha256": "0" * 64,
-    }
-    return Recording(**(values | parts))
 
 
 def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Message, ...]:
@@ -59,27 +39,6 @@ def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Mess
 
 def lines(*texts: str) -> tuple[Line, ...]:
     return tuple(Line(float(t), text) for t, text in enumerate(texts))
-
-
-def criterion(check: str, **keys: Any) -> Criterion:
-    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
-    return made  # type: ignore[return-value]
-
-
-def judged(
-    asked: Criterion, *recordings: Recording, visibility: str = "visible", poses: Sequence[Pose] = (START,)
-) -> CriterionResult:
-    scenario = Scenario("s", tuple(poses), trials=max(len(recordings) // len(poses), 1))
-    world = WorldSpec(recordings[0].background) if recordings else WorldSpec()
-    assignment = Assignment("a", "A", world, Parts(), (scenario,), (asked,))
-    trials = tuple(
-        TrialResult("s", index, 1, 0.0, 0.0, visibility, recording, place=index // scenario.trials)
-        for index, recording in enumerate(recordings)
-    )
-    (result,) = judge(assignment, trials)
-    assert 0 <= result.marks <= result.max_marks
-    assert len(result.evidence) == len(recordings)
-    return result
 
 
 def fault(verdict: Verdict, who: Any = "program", t: float = 2.0, line: int | None = 7) -> Fault:

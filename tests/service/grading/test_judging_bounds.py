@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_judging import START, criterion, recorded
 
+from judging import START, criterion, recorded
 from responders.code import Code
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade

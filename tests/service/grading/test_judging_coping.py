@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from test_judging import criterion, judged, recorded
 
+from judging import criterion, judged, recorded
 from service.grading.grade import CriterionResult
 from sim.recording import Fault, Line, LossReason, Message, Recording, Verdict
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from driving import criterion, driven, judged, measured, passes, rest, spin, straight
+from driving import driven, measured, passes, rest, spin, straight
+from judging import criterion, judged
 from service.grading.judging.drawing import between, legs_of
 from service.grading.judging.moves import moves_of
 from sim.recording import Pose

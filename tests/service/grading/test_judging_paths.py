@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from driving import along, criterion, driven, judged, measured, passes, rest, spin, straight
+from driving import along, driven, measured, passes, rest, spin, straight
+from judging import criterion, judged
 from service.grading.judging.geometry import along as along_line
 from service.grading.judging.geometry import covered, distance_to, positions
 from service.grading.judging.point import rounds

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from driving import criterion, driven, judged, measured, passes, rest, spin, straight
+from driving import driven, measured, passes, rest, spin, straight
+from judging import criterion, judged
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording

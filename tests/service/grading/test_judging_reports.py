@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from service.grading.grade import CriterionResult, TrialResult
+from judging import START, criterion, judged
+from service.grading.grade import TrialResult
 from service.grading.judging.judge import judge
 from service.grading.judging.words import tokens_of, words_of
 from sim.floors import floor
 from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
-from submissions.criteria import SCHEMAS, Criterion
-
-START = Pose(100, 800, 0)
 
 
 def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts: Any) -> Recording:
@@ -40,22 +38,6 @@ def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts
         "sha256": "0" * 64,
     }
     return Recording(**(values | parts))
-
-
-def criterion(check: str, **keys: Any) -> Criterion:
-    made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
-    return made  # type: ignore[return-value]
-
-
-def judged(asked: Criterion, *recordings: Recording, poses: Sequence[Pose] = (START,)) -> CriterionResult:
-    world = WorldSpec(recordings[0].background)
-    assignment = Assignment("a", "A", world, Parts(), (Scenario("s", tuple(poses)),), (asked,))
-    trials = tuple(
-        TrialResult("s", index, 1, 0.0, 0.0, "visible", recording, place=index % len(poses))
-        for index, recording in enumerate(recordings)
-    )
-    (result,) = judge(assignment, trials)
-    return result
 
 
 def lines(*texts: str, every: float = 1.0) -> tuple[Line, ...]:

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from driving import along, driven, judged, rest, spin, straight
+from driving import along, driven, rest, spin, straight
+from judging import judged
 from paths import ROOT
 from sim.floors.centrelines import centrelines
 from sim.recording import Datum, Line, Message, Recording

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from driving import criterion, driven, judged, straight
+from driving import driven, straight
+from judging import criterion, judged
 from service.grading.judging.outcome import failed, passed
 from service.grading.judging.precision import Strays, tempered
 from sim.recording import Datum, Line, Message, Recording
@@ -16,11 +17,9 @@ from submissions.criteria import SCHEMAS
 from submissions.criteria.common import AmongMany
 
 ZONES = [{"text": "1", "zone": [120, 0, 140, 1143]}, {"text": "2", "zone": [160, 0, 180, 1143]}]
-BEGINNINGS, ENDS = (
-    ("all", "it is", "now", "I am", "we are", "you are"),
-    ("done", "over", "there", "up", "ready", "finished", "in"),
-)
-ENDS += tuple(f"{word} now" for word in ENDS)
+BEGINNINGS = ("all", "it is", "now", "I am", "we are", "you are")
+_WORDS = ("done", "over", "there", "up", "ready", "finished", "in")
+ENDS = (*_WORDS, *(f"{word} now" for word in _WORDS))
 GUESSES = tuple(map(str, range(100)))
 
 

@@ -16,9 +16,10 @@ from PIL import Image as Pixels
 from pydantic import ValidationError
 
 import report_builders as build
+from judging import START, criterion, judged
 from paths import ROOT
 from responders.code import Code
-from service.grading.grade import Accuracy, Confidence, CriterionResult, Shown, TrialResult
+from service.grading.grade import Accuracy, CriterionResult, Shown, TrialResult
 from service.grading.grader import grade
 from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import CODES, decoded
@@ -32,11 +33,11 @@ from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
-from submissions.criteria import SCHEMAS, Criterion
+from submissions.criteria import Criterion
+from submissions.criteria.classification import Classification
 from submissions.submission import Submission
 from submissions.sweep import Sweep
 
-START = Pose(100, 800, 0)
 HEAD = """
 id = "a"
 title = "A"
@@ -55,7 +56,7 @@ check = "{check}"
 
 
 def asked(check: str = "classification", **keys: Any) -> Criterion:
-    return SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})  # type: ignore[return-value]
+    return criterion(check, **keys)
 
 
 def recorded(
@@ -81,13 +82,6 @@ def talk(*exchanges: tuple[str | None, str | None]) -> Recording:
         if answer is not None:
             messages.append(Message(t, "responder", answer, t + 0.1, len(messages) - 1))
     return recorded(tuple(images), tuple(messages))
-
-
-def judged(criterion: Criterion, *recordings: Recording) -> CriterionResult:
-    scenario = Scenario("s", (START,), trials=max(1, len(recordings)))
-    assignment = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), (scenario,), (criterion,))
-    trials = tuple(TrialResult("s", n, 1, 0.0, 0.0, "visible", recording) for n, recording in enumerate(recordings))
-    return judge(assignment, trials)[0]
 
 
 def accuracy(result: CriterionResult) -> Accuracy:
@@ -299,7 +293,8 @@ def test_places_are_read_from_a_file(tmp_path: Path) -> None:
     )
     (tmp_path / "places.csv").write_text("x,y,label\n230, 920 ,church\n\n310,920,mill\n")
     (criterion,) = read_assignment(tmp_path).criteria
-    assert criterion.places == ((230.0, 920.0, "church"), (310.0, 920.0, "mill"))  # type: ignore[union-attr]
+    assert isinstance(criterion, Classification)
+    assert criterion.places == ((230.0, 920.0, "church"), (310.0, 920.0, "mill"))
     (tmp_path / "places.csv").write_text("230,920,church\n310,north,mill\n")
     with pytest.raises(AssignmentProblems, match=r"assignment\.toml:16: places\.csv:2: '310,north,mill' is no place"):
         read_assignment(tmp_path)
@@ -366,7 +361,10 @@ def test_confidence_is_averaged_apart_for_right_and_wrong() -> None:
         ("diamond", said("diamond", "true")),
     )
     result = judged(asked(answer="shape", confidence="confidence"), recording)
-    assert accuracy(result).confidence == Confidence(pytest.approx(0.8), 2, pytest.approx(0.4), 1)
+    told = accuracy(result).confidence
+    assert told is not None
+    assert (told.right, told.n_right) == (pytest.approx(0.8), 2)
+    assert (told.wrong, told.n_wrong) == (pytest.approx(0.4), 1)
     assert "Mean confidence 0.80 when right (2) and 0.40 when wrong (1)." in result.message
     assert accuracy(judged(asked(answer="shape"), recording)).confidence is None
 

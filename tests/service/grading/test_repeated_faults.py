@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ check = "finishes"
 ECHO = "def responder(text):\n    return text\n"
 ASKS = 'import time\nprint("PY::hi")\ntime.sleep(1)\nspeed = colorLeft.reflected_light_intensity\n'
 BUSY = "def responder(text):\n    while True:\n        pass\n"
-_NO_TICKS = Ticks(*[np.empty(0)] * 9)  # the same object in both
+_NO_TICKS = Ticks(*cast(Any, [np.empty(0)] * 9))  # the same object in both
 
 
 @pytest.fixture(scope="module")

@@ -122,7 +122,9 @@ def table_of(grades: Sequence[Grade]) -> Table:
     table: Table = {}
     for graded in grades:
         for keys, truth in looked_up(graded):
-            for kind, key in keys.items() if truth is not None else ():
+            if truth is None:
+                continue
+            for kind, key in keys.items():
                 table.setdefault(kind, {})[key] = truth
     return table
 

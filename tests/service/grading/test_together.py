@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from driving import criterion, driven, judged, measured, passes, rest, straight
+from driving import driven, measured, passes, rest, straight
+from judging import criterion, judged
 from sim.recording import Fault, Line, Pose, Recording, Verdict
 
 HERE, THERE = Pose(100, 500, 0), Pose(1100, 500, 180)

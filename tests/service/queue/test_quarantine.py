@@ -40,7 +40,7 @@ from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import results
 from service.store.installation import secret_of
-from service.store.models import Job
+from service.store.models import Job, SelfTest
 from service.store.queue import jobs, self_tests, workers
 from service.store.states import JobState, Lane, Standing
 from sim.recording import Recording
@@ -193,7 +193,7 @@ def test_a_right_answer_is_of_one_build_one_machine_and_one_day(
 
 def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
     class Broken(TrialRunner):
-        def run(self, *_: object) -> Recording:  # type: ignore[override]
+        def run(self, *_: object) -> Recording:
             raise OSError("no more processes")
 
     with Broken() as broken:
@@ -213,9 +213,14 @@ def test_a_process_looks_while_nobody_asks_it_to(store: Store, runner: TrialRunn
         watch.end()
 
 
+def _caught_up(notifier: Notifier, store: Store) -> bool:
+    notifier.catch_up()
+    return _unfinished(store) == 0
+
+
 def _last_right(store: Store) -> datetime | None:
     with store.reading() as session:
-        return session.scalar(select(self_tests.SelfTest.right_at))
+        return session.scalar(select(SelfTest.right_at))
 
 
 def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_to_be_seen(store: Store) -> None:
@@ -308,7 +313,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
             _until(lambda: any(_job(store, one).suspect for one in spoilt), seconds=60)
             assert wrong.wait(timeout=60) == QUARANTINED
         with _worker(broker.settings, "-m", "service.queue.worker"):
-            _until(lambda: notifier.catch_up() or _unfinished(store) == 0)
+            _until(lambda: _caught_up(notifier, store))
         with store.reading() as session:
             differs = 0
             for job_id in [*before, *spoilt]:

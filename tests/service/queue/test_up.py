@@ -100,6 +100,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
                 return job if job.plots is PlotState.DONE else None
 
         job = until(plotted)
+        assert job is not None
         assert tuple(job.phases) == phases.NAMES
         assert sorted(job.phases.values()) == list(job.phases.values())
         spinning = accept_batch(

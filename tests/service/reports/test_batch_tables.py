@@ -51,7 +51,7 @@ MARY = TableRow(
     _without_trials(build.shape_grade(missing="responder.py")),
     missing_words("responder.py"),
 )
-ZOE = TableRow(
+ZOE = TableRow[Grade](
     Student("s3", "Zoë Ångström", "zoe@uni.example"),
     of_moodle("Zoë Ångström", 500002),
     "shape-recognition",
@@ -59,11 +59,11 @@ ZOE = TableRow(
     "has no robot.py, expected robot.py (a robot program).",
     refused=True,
 )
-EVE = TableRow(
+EVE = TableRow[Grade](
     Student("=cmd()", "Eve Adams", "eve@uni.example"), of_moodle("Eve Adams", 500003), "shape-recognition", None,
     "waits to be graded",
 )  # fmt: skip
-NOBODY = TableRow(Student(), "line 9", "", None, "names no student.", refused=True)
+NOBODY = TableRow[Grade](Student(), "line 9", "", None, "names no student.", refused=True)
 ROWS: list[TableRow[Grade]] = [ADA, MARY, ZOE, EVE, NOBODY]
 
 
@@ -103,7 +103,7 @@ def _rows_of_json(text: str) -> dict[str, str]:
 def _rows_of_junit(text: str) -> dict[str, str]:
     found = {}
     for suite in JUnitXml.fromstring(text.encode()):
-        told = {each.name: each.value for each in suite.properties()}
+        told = {each.name: each.value for each in suite.properties()}  # type: ignore[no-untyped-call]
         found[told.get("student", "")] = told.get("reason", "")
     return found
 

@@ -14,7 +14,7 @@ from rich.console import Console
 
 import report_builders as build
 from service.grading.grade import CriterionResult, Evidence, Grade, SetByHand
-from service.reports.cause import FULL_MARKS, diagnose
+from service.reports.cause import diagnose
 from service.reports.formats.gradescope import gradescope_document
 from service.reports.formats.json_output import json_document
 from service.reports.formats.junit import junit_text
@@ -23,6 +23,7 @@ from service.reports.formats.text import plain_text
 from service.reports.html import report
 from service.reports.page import page_of
 from service.reports.view import gradebook_view, staff_view, student_view
+from service.reports.words import FULL_MARKS
 from sim.recording import Fault, Verdict
 
 ERROR = "NameError: name 'pasrer' is not defined"

@@ -17,7 +17,7 @@ from service.reports.replay.document import packed, replay_of_grade
 from service.reports.replay.over import parted
 from service.reports.view import BEFORE_PUBLICATION, OtherTrials, other_trials, staff_view, student_view
 from sim.errors import UsageError
-from sim.recording import BROWSER_TICK, Pose, Recording, Ticks
+from sim.recording import BROWSER_TICK, Line, Pose, Recording, Ticks
 
 PUBLISHED = BEFORE_PUBLICATION | {"after_published", "after_due_date"}
 
@@ -132,7 +132,7 @@ def test_a_trial_that_either_hides_lies_over_nothing_for_a_student(released: fro
 
 def test_nothing_hidden_is_in_a_students_replay() -> None:
     mine, other = hiding(build.line_follower_grade()), hiding(parting_grade())
-    secret = replace(other.trials[1].recording, printed=(build.Line(1.0, "SECRETPRINT"),))
+    secret = replace(other.trials[1].recording, printed=(Line(1.0, "SECRETPRINT"),))
     other = replace(other, trials=(other.trials[0], replace(other.trials[1], recording=secret)))
     for view, told in ((student_view(mine), False), (staff_view(mine), True)):
         replay = replay_of_grade(view, others=other_trials(view, other, "other", BEFORE_PUBLICATION))

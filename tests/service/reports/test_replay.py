@@ -9,6 +9,7 @@ import re
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ from submissions.submission import Cell, Notebook, Submission
 KIB = 1024
 
 
-def run(recording: Recording) -> dict[str, object]:
+def run(recording: Recording) -> dict[str, Any]:
     return replay_of_run(recording, "robot.py", 0, Sources(), {})
 
 

@@ -9,9 +9,9 @@ import typing
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_report_html import ATTRIBUTES, TAGS, Reader
 
 import report_builders
+from page_reader import ATTRIBUTES, TAGS, Reader
 from service.grading.grade import Grade
 from service.reports import view
 from service.reports.similarity import as_plain, similarity_page, similarity_rows, what_it_says

@@ -91,11 +91,11 @@ def test_two_files_of_one_student_are_not_compared() -> None:
 
 
 def test_tables_of_numbers_are_not_alike() -> None:
-    tables = [
+    one, other = (
         f"{program(number)}\ntable = [\n" + "".join(f"    [{number}, {row}, 7],\n" for row in range(300)) + "]\n"
         for number in (1, 2)
-    ]
-    assert of_two(*tables) == Writing((), ())
+    )
+    assert of_two(one, other) == Writing((), ())
 
 
 def test_stretches_name_the_lines_of_both() -> None:

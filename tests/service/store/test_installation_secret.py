@@ -164,7 +164,7 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
 # Commands
 
 
-def _seeds(home: Path, **environment: str) -> list[int]:
+def _seeds(home: Path, **environment: Any) -> list[int]:
     ended = robomark("grade", ECHO, "-a", "echo-responder", "--format", "json", ROBOMARK_HOME=str(home), **environment)
     assert ended.returncode == 0, ended.stderr
     return [trial["seed"] for trial in json.loads(ended.stdout)["trials"]]
@@ -182,7 +182,7 @@ def test_every_home_has_its_own_worlds(tmp_path: Path) -> None:
 def test_only_its_hash_is_told(tmp_path: Path) -> None:
     home, batch = tmp_path / "home", tmp_path / "class"
     shutil.copytree(ECHO, batch / "ada")
-    environment = {"ROBOMARK_HOME": str(home), "ROBOMARK_SECRET": SECRET, "ROBOMARK_LOG_LEVEL": "DEBUG"}
+    environment: dict[str, Any] = {"ROBOMARK_HOME": str(home), "ROBOMARK_SECRET": SECRET, "ROBOMARK_LOG_LEVEL": "DEBUG"}
     done = [
         robomark(
             "batch", "submit", batch, "-a", "echo-responder", "--wait", "--output", tmp_path / "out", **environment
@@ -228,7 +228,7 @@ def test_a_backup_has_it(tmp_path: Path) -> None:
 def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> None:
     home, batch = tmp_path / "home", tmp_path / "class"
     shutil.copytree(examples("dead-reckoning-with-noise") / "reference", batch / "ada")
-    environment = {"ROBOMARK_HOME": str(home)}
+    environment: dict[str, Any] = {"ROBOMARK_HOME": str(home)}
     done = robomark("batch", "submit", batch, "-a", "dead-reckoning-with-noise", "--wait", **environment)
     found = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)
     assert found is not None, done

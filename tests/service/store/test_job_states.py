@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import Select, select
 
 import report_builders
 import service
@@ -66,7 +66,7 @@ def _in_session(change: Callable[..., object]) -> Callable[[Store, Subject], obj
     return run
 
 
-def _submissions(subject: Subject) -> object:
+def _submissions(subject: Subject) -> Select[int]:
     return select(SubmissionRow.id).where(SubmissionRow.batch_id == subject.batch_id)
 
 

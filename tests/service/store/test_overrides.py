@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
+from functools import partial
 from xml.etree import ElementTree
 
 import pytest
@@ -176,7 +177,9 @@ def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives
     with store.reading() as session:
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
         (change,) = regrades.changes(session, again.batch_id or "")
-    assert change.criteria == (regrades.CriterionChange(shape.title, (6, 6), (4, 4), by_hand=True),)
+    assert change.criteria == (
+        regrades.CriterionChange(shape.title, (Decimal(6), Decimal(6)), (Decimal(4), Decimal(4)), by_hand=True),
+    )
     publishing.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(6, 6)}
 
@@ -283,11 +286,7 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
     _, job_id = _graded(store)
     _change(store, job_id, _set(SHAPE, "6"), _excuse(ALOUD))
     for criterion, text in (("", "Well <b>done</b>."), (SHAPE, "Line 3 was right.")):
-        _change(
-            store,
-            job_id,
-            lambda session, job, about=criterion, said=text: comments.comment(session, job, about, said, "staff"),
-        )
+        _change(store, job_id, partial(comments.comment, criterion=criterion, text=text, actor="staff"))
     with store.reading() as session:
         grade = results.load(session, job_id)
         line = batches.job_line(session, job_id)

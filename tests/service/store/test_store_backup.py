@@ -26,6 +26,7 @@ from service.store.queue import jobs
 from service.store.states import JobState
 from service.store.web_tables import METADATA, Appeal, Comment, Override
 from sim.errors import HostError, UsageError
+from submissions.people import Refusal
 
 GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
 TABLES = METADATA.sorted_tables
@@ -41,7 +42,9 @@ def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
 
 
 def _batch(store: Store, name: str, *students: str) -> str:
-    batch = accept_new(store, name, [grading_request(each) for each in students], [("x", "is bad.")], max_attempts=3)
+    batch = accept_new(
+        store, name, [grading_request(each) for each in students], [Refusal("x", "is bad.")], max_attempts=3
+    )
     assert batch.batch is not None
     _grade_all(store)
     return batch.batch.id

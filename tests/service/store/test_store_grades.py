@@ -96,7 +96,7 @@ def test_accuracy_is_data(store: Store) -> None:
         query = select(CriterionResultRow).where(CriterionResultRow.accuracy < 0.9, CriterionResultRow.accuracy_n >= 6)
         row = session.scalars(query).one()
         assert (row.accuracy, row.accuracy_low, row.accuracy_high) == (accuracy.value, accuracy.low, accuracy.high)
-        counts = {(truth, answer): count for truth, answer, count in row.confusion}
+        counts = {(truth, answer): count for truth, answer, count in row.confusion or ()}
         assert counts == {(truth, answer): count for truth, answer, count in accuracy.confusion}
         total = session.scalar(text("SELECT SUM(CAST(marks AS NUMERIC)) FROM criterion_result"))
     assert Decimal(str(total)) == grade.marks

@@ -149,7 +149,7 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
         of_one = {"course_id": 1, "assignment_version_id": 1, "names_hidden": False}
         for assignment, opened_at in ((name, datetime(2000, 1, 1, tzinfo=UTC)), ("never", None)):
             row = of_one | {"assignment": assignment, "opened_at": opened_at}
-            connection.execute(insert(OpenAssignment.__table__).values(row))
+            connection.execute(insert(OpenAssignment).values(row))
     engine.dispose()
     with open_store(service_settings) as store, store.reading() as session:
         assert open_assignments.find(session, 1, "never").batch_id is None
