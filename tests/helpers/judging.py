@@ -9,7 +9,7 @@ import numpy as np
 
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import judge
-from sim.recording import Pose, Recording, Ticks, Verdict
+from sim.recording import Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion
 
@@ -40,6 +40,23 @@ def recorded(**parts: Any) -> Recording:
     return Recording(**(values | parts))
 
 
+def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Message, ...]:
+    """Each robot's text a second after the last, and its answer a tenth later."""
+    messages: list[Message] = []
+    for t, (text, answer) in enumerate(exchanges):
+        asked = len(messages)
+        messages.append(Message(float(t), "robot", text, float(t)))
+        if answer is not None:
+            note = "" if arrives else "undelivered"
+            messages.append(Message(float(t), "responder", answer, t + 0.1 if arrives else None, asked, note))
+    return tuple(messages)
+
+
+def lines(*texts: str) -> tuple[Line, ...]:
+    """A line a second."""
+    return tuple(Line(float(t), text) for t, text in enumerate(texts))
+
+
 def judged(
     asked: Criterion,
     *recordings: Recording,
@@ -57,5 +74,6 @@ def judged(
     )
     (result,) = judge(assignment, trials)
     assert 0 <= result.marks <= result.max_marks
-    assert len(result.evidence) == len(recordings)
+    # One that looks at what was swept says nothing of a trial in which nothing was.
+    assert len(result.evidence) == (0 if asked.check == "robustness" else len(recordings))
     return result

@@ -51,7 +51,7 @@ MARY = TableRow(
     _without_trials(build.shape_grade(missing="responder.py")),
     missing_words("responder.py"),
 )
-ZOE = TableRow[Grade](
+ZOE: TableRow[Grade] = TableRow(
     Student("s3", "Zoë Ångström", "zoe@uni.example"),
     of_moodle("Zoë Ångström", 500002),
     "shape-recognition",
@@ -59,11 +59,11 @@ ZOE = TableRow[Grade](
     "has no robot.py, expected robot.py (a robot program).",
     refused=True,
 )
-EVE = TableRow[Grade](
+EVE: TableRow[Grade] = TableRow(
     Student("=cmd()", "Eve Adams", "eve@uni.example"), of_moodle("Eve Adams", 500003), "shape-recognition", None,
     "waits to be graded",
 )  # fmt: skip
-NOBODY = TableRow[Grade](Student(), "line 9", "", None, "names no student.", refused=True)
+NOBODY: TableRow[Grade] = TableRow(Student(), "line 9", "", None, "names no student.", refused=True)
 ROWS: list[TableRow[Grade]] = [ADA, MARY, ZOE, EVE, NOBODY]
 
 
