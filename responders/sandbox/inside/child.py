@@ -12,6 +12,7 @@ import resource
 import signal
 import socket
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from . import doorkeeper, lockdown
@@ -35,39 +36,48 @@ _ENVIRONMENT = {
 }
 
 
-def start(
-    spec: dict[str, Any],
-    descriptors: list[int],
-    grants: lockdown.Grants,
-    rules: tuple[bytes, ...],
-    role: Callable[[Wire, lockdown.Grants], None],
-    zygote: int,
-    door: int,
-) -> None:
-    """Never returns. ``descriptors`` are the wire's two and, if the spec has a folder, the folder.
+@dataclass(frozen=True)
+class Prepared:
+    """What a zygote finds out once for all its children."""
 
-    ``rules`` say of the ``grants`` what Landlock is told.
+    grants: lockdown.Grants
+    rules: tuple[bytes, ...]  # what Landlock is told of the grants
+    changed_signals: tuple[int, ...]
+    zygote: int  # its process
+    door: int  # the descriptor on which the doorkeeper hears of a child
+
+
+def changed_signals() -> tuple[int, ...]:
+    """Those that do something else here than they do by default, but for what Python itself changes.
+
+    A worker that was started in the background of a shell ignores some, and what it forks would, too.
     """
+    numbers = signal.valid_signals() - _PYTHONS_OWN - {signal.SIGKILL, signal.SIGSTOP}
+    return tuple(int(number) for number in numbers if signal.getsignal(number) is not signal.SIG_DFL)
+
+
+def start(
+    spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], prepared: Prepared
+) -> None:
+    """Never returns. ``descriptors`` are the wire's two and, if the spec has a folder, the folder."""
     try:
-        _own_session()
+        _own_session(prepared.changed_signals)
         _first_to_go()
-        _descriptors([*descriptors[:2], door, *descriptors[2:]])
+        _descriptors([*descriptors[:2], prepared.door, *descriptors[2:]])
         _limits(spec)
         wire = Wire(_WRITING, _READING)
-        wire.send(_sandbox(spec, grants, rules, zygote))
+        wire.send(_sandbox(spec, prepared))
         os.environ.clear()
         os.environ.update(_ENVIRONMENT)
-        role(wire, dataclasses.replace(grants, without=tuple(spec["without"])))
+        role(wire, dataclasses.replace(prepared.grants, without=tuple(spec["without"])))
     finally:
         os._exit(0)
 
 
-def _own_session() -> None:
+def _own_session(changed: tuple[int, ...]) -> None:
     os.setsid()
-    # A worker that was started in the background of a shell ignores some, and what it forks would, too.
-    for number in signal.valid_signals() - _PYTHONS_OWN - {signal.SIGKILL, signal.SIGSTOP}:
-        if signal.getsignal(number) is not signal.SIG_DFL:
-            signal.signal(number, signal.SIG_DFL)
+    for number in changed:
+        signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
@@ -136,19 +146,19 @@ def _limits(spec: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
-def _sandbox(spec: dict[str, Any], grants: lockdown.Grants, rules: tuple[bytes, ...], zygote: int) -> Frame:
+def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
     """Put up the layers that the spec names, try each, and say what stands; nothing of the student's has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
     memory = _own_memory()
     try:
-        own_user = _own_user(spec, grants)
-        _end_with(zygote)
+        own_user = _own_user(spec, prepared.grants)
+        _end_with(prepared.zygote)
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
         if spec["landlock"]:
-            landlock = _files(spec, rules)
+            landlock = _files(spec, prepared.rules)
         if spec["doorkeeper"]:
             without_doorkeeper = _ask_about_paths(memory)
         if spec["seccomp"]:

@@ -5,11 +5,13 @@ It decides nothing: what the program asks of the world goes over the wire, and s
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import sys
 import types
-from types import FrameType
+from collections.abc import Mapping
+from types import CodeType, FrameType
 from typing import Any
 
 from . import determinism, own_modules, refusals, student_code
@@ -21,13 +23,21 @@ NEEDED = ("brick_link", "brick_preambles", "ev3dev2_glue")
 
 
 def preload(without: list[str]) -> None:
-    """There is nothing beside that."""
+    """Compile the preambles."""
+    preamble_codes()
+
+
+@functools.cache
+def preamble_codes() -> Mapping[str, CodeType]:
+    """What is run before a program, by its name."""
+    from brick_preambles import PREAMBLES
+
+    return {name: compile(text, "<preamble>", "exec", dont_inherit=True) for name, text in PREAMBLES.items()}
 
 
 def run(wire: Wire, grants: Grants) -> None:
     """Receive a program, run it to its end, and report that."""
     from brick_link import link
-    from brick_preambles import PREAMBLES
 
     spec = wire.receive()
     files = student_code.StudentFiles(spec["name"])
@@ -62,14 +72,14 @@ def run(wire: Wire, grants: Grants) -> None:
     own_modules.install(own_modules.given(spec["modules"]), spec["modules"], files, told)
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
-    wire.send({"do": "end", "error": _execute(spec, PREAMBLES[spec["preamble"]], module.__dict__, files)})
+    wire.send({"do": "end", "error": _execute(spec, module.__dict__, files)})
     wire.receive()
 
 
-def _execute(spec: Frame, preamble: str, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
+def _execute(spec: Frame, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
     """The error that ended the program, or None."""
     try:
-        exec(compile(preamble, "<preamble>", "exec", dont_inherit=True), namespace)
+        exec(preamble_codes()[spec["preamble"]], namespace)
         exec(student_code.compile_source(spec["text"], files.main), namespace)
     except SystemExit as ending:
         if ending.code in (None, 0):

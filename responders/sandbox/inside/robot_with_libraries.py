@@ -9,4 +9,9 @@ from . import libraries, robot_role
 
 NEEDED = robot_role.NEEDED
 run = robot_role.run
-preload = libraries.preload
+
+
+def preload(without: list[str]) -> None:
+    """What any robot program is prepared with, and the libraries."""
+    robot_role.preload(without)
+    libraries.preload(without)

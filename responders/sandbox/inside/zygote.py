@@ -53,11 +53,12 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
     door = doorkeeper.start(allowed, control.fileno())
     role.preload(without)
-    rules = lockdown.reading_rules(allowed)
+    prepared = child.Prepared(
+        allowed, lockdown.reading_rules(allowed), child.changed_signals(), os.getpid(), door.fileno()
+    )
     with_libraries = role_name.endswith("with libraries")
     run = role.run if with_libraries else functools.partial(libraries.run_without, role.run)
     roles = {"role": run, "battery": battery.run}
-    zygote = os.getpid()
     _one_thread()
     gc.collect()
     gc.freeze()
@@ -72,7 +73,7 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
             os.sched_setaffinity(0, spec["processors"])
             pid = os.fork()
             if pid == 0:
-                child.start(spec, descriptors, allowed, rules, roles[spec["work"]], zygote, door.fileno())
+                child.start(spec, descriptors, roles[spec["work"]], prepared)
             _hand_over(control, pid)
             for fd in descriptors:
                 os.close(fd)
