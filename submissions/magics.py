@@ -155,6 +155,8 @@ def _name(magic: str) -> str:
 def parse_magic(line: str, number: int = 1) -> Flags:
     """The flags of a ``%%sim_magic...`` line. Raises UsageError, naming line ``number``, for what does not exist."""
     name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
+    if name.startswith("%") and (meant := name.lstrip("%")[:40]):
+        raise UsageError(f"line {number}: there is a blank between the percent signs; expected %%{meant}")
     try:
         return parse_flags(name, "".join(rest))
     except UsageError as error:

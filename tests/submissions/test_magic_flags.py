@@ -154,10 +154,15 @@ def test_a_refused_line_is_named_by_its_number_and_is_none_of_the_program() -> N
     assert without_magic(program) == "\n#\nprint(1)"
 
 
-@pytest.mark.parametrize("line", ["%", "%%", "%% ", "%%\u00a0"])
+@pytest.mark.parametrize("line", ["%", "%%", "%% ", "%%\u00a0", "% %"])
 def test_a_magic_without_a_name_is_refused(line: str) -> None:
     with pytest.raises(UsageError, match=r"^line 1: "):
         split_program(line)
+
+
+def test_a_blank_between_the_percent_signs_is_what_is_told() -> None:
+    with pytest.raises(UsageError, match=r"^line 1: there is a blank .*; expected %%sim_magic$"):
+        split_program("% %sim_magic -b Loop\nprint(1)\n")
 
 
 def pages(*lines: str) -> list[Setup]:
