@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends, Path, Query, Response
 from pydantic import BaseModel, Field
@@ -18,6 +17,7 @@ from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
 from service.web.api_uploads import ZIP_BODY, Uploaded
 from service.web.context import Context
+from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.assignment.overview import overview
 from submissions.assignment.reader import find_in_catalogue
@@ -27,6 +27,21 @@ Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
 Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
 AssignmentId = Annotated[str, Path(min_length=1, max_length=100)]
 _EXAMPLE = {"title": "Shape recognition", "max_marks": 12}
+_ASKED_EXAMPLE = {
+    "id": "shape-recognition",
+    "version": "3f9a1c20",
+    "description": "The robot stands over one of six shapes ...",
+    "background": "Simple_Shapes",
+    "program": "student",
+    "responder": "student",
+    "given": [],
+    "criteria": [
+        {"id": "named", "title": "Names the shape", "check": "classification", "marks": 6, "visibility": "visible"}
+    ],
+    "scenarios": [{"id": "each-shape", "title": "", "seconds": 10, "trials": 12, "visibility": "visible"}],
+    "has_reference": True,
+    **_EXAMPLE,
+}
 
 
 class CatalogueShape(Shape):
@@ -99,9 +114,13 @@ class ScenarioShape(Shape):
     visibility: str
 
 
-class WholeAssignmentShape(AssignmentShape):
-    """An assignment with what it asks for, hidden criteria and scenarios among it."""
+class AskedShape(Shape):
+    """An assignment of the catalogue with all that it asks for, hidden criteria and scenarios among it."""
 
+    id: str
+    title: str
+    max_marks: float
+    version: str
     description: str
     background: str = Field(description="The floor.")
     program: str = Field(description="Who has the robot program: student, none, or a given file.")
@@ -111,24 +130,19 @@ class WholeAssignmentShape(AssignmentShape):
     scenarios: list[ScenarioShape]
     has_reference: bool = Field(description="Whether there is a reference solution to be graded as a preview.")
 
+    model_config = like(**_ASKED_EXAMPLE)
+
+
+class WholeAssignmentShape(AskedShape):
+    """An assignment of a course with all that it asks for, hidden criteria and scenarios among it."""
+
+    open: bool
+    opened_at: datetime | None
+    closed_at: datetime | None
+    names_hidden: bool
+
     model_config = like(
-        id="shape-recognition",
-        version="3f9a1c20",
-        open=True,
-        opened_at="2026-11-02T09:00:00Z",
-        closed_at=None,
-        names_hidden=False,
-        description="The robot stands over one of six shapes ...",
-        background="Simple_Shapes",
-        program="student",
-        responder="student",
-        given=[],
-        criteria=[
-            {"id": "named", "title": "Names the shape", "check": "classification", "marks": 6, "visibility": "visible"}
-        ],
-        scenarios=[{"id": "each-shape", "title": "", "seconds": 10, "trials": 12, "visibility": "visible"}],
-        has_reference=True,
-        **_EXAMPLE,
+        open=True, opened_at="2026-11-02T09:00:00Z", closed_at=None, names_hidden=False, **_ASKED_EXAMPLE
     )
 
 
@@ -159,6 +173,12 @@ def list_catalogue(
     left = (overview(assignment_folder(each)) for each in catalogue() if place is None or each > place[0])
     found = [each for each in left if each.says(q) and topic in ("", each.topic)][: limit + 1]
     return page_of([CatalogueShape.model_validate(each) for each in found], limit, lambda each: [each.id])
+
+
+@router.get("/courses/{course_id}/catalogue/{assignment}")
+def one_of_catalogue(_here: Reads, assignment: AssignmentId) -> AskedShape:
+    """What an assignment of the catalogue asks for, as a course would have it."""
+    return AskedShape(**_asked(find_in_catalogue(assignment)))
 
 
 @router.get("/courses/{course_id}/assignments")
@@ -194,28 +214,13 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> W
     with context.store.reading() as session:
         line = open_assignments.find(session, here.course_id, assignment)
         found = open_assignments.load(session, here.course_id, assignment)
-    runs = [trial.scenario.id for trial in found.trials()]
-    told = {
-        "open": line.open,
-        "description": found.description,
-        "background": found.world.background,
-        "program": found.parts.program,
-        "responder": found.parts.responder,
-        "given": sorted(found.given),
-        "criteria": [MarkedLineShape.model_validate(each) for each in found.criteria],
-        "scenarios": [
-            ScenarioShape(
-                id=each.id,
-                title=each.title,
-                seconds=each.seconds,
-                trials=runs.count(each.id),
-                visibility=each.visibility,
-            )
-            for each in found.scenarios
-        ],
-        "has_reference": preparing.reference_of(found) is not None,
-    }
-    return WholeAssignmentShape.model_validate(asdict(line) | told)
+    return WholeAssignmentShape(
+        **_asked(found),
+        open=line.open,
+        opened_at=line.opened_at,
+        closed_at=line.closed_at,
+        names_hidden=line.names_hidden,
+    )
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
@@ -258,3 +263,30 @@ def hide_names(here: Manages, context: Context, assignment: AssignmentId, asked:
         hidden = {"assignment": assignment, "hidden": asked.names_hidden}
         audit.note(session, here.actor, "names", "course", str(here.course_id), **hidden)
         return AssignmentShape.model_validate(open_assignments.find(session, here.course_id, assignment))
+
+
+def _asked(found: Assignment) -> dict[str, Any]:
+    runs = [trial.scenario.id for trial in found.trials()]
+    return {
+        "id": found.id,
+        "title": found.title,
+        "max_marks": found.max_marks,
+        "version": found.version,
+        "description": found.description,
+        "background": found.world.background,
+        "program": found.parts.program,
+        "responder": found.parts.responder,
+        "given": sorted(found.given),
+        "criteria": [MarkedLineShape.model_validate(each) for each in found.criteria],
+        "scenarios": [
+            ScenarioShape(
+                id=each.id,
+                title=each.title,
+                seconds=each.seconds,
+                trials=runs.count(each.id),
+                visibility=each.visibility,
+            )
+            for each in found.scenarios
+        ],
+        "has_reference": preparing.reference_of(found) is not None,
+    }

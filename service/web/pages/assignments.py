@@ -110,8 +110,6 @@ def show(request: Request, here: Instructing, context: Context, assignment: Assi
         here=here,
         line=line,
         found=found,
-        trials={each.id: sum(trial.scenario is each for trial in found.trials()) for each in found.scenarios},
-        paragraphs=[part.strip() for part in (found.description or "").split("\n\n") if part.strip()],
         own_policy=allowed.get(assignment),
         policy=allowed.get(assignment) or allowed.get("") or PolicyLimits(),
         previews=previews,

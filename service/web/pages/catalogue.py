@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
+from fastapi import Path as InPath
 from fastapi.responses import Response
 
 from service.store.courses import open_assignments
@@ -13,6 +14,7 @@ from service.web.context import Context
 from service.web.rendering import page
 from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.assignment.overview import TOPICS, overview
+from submissions.assignment.reader import find_in_catalogue
 
 router = APIRouter()
 
@@ -42,3 +44,14 @@ def look_through(
         text=q,
         topic=topic,
     )
+
+
+@router.get("/courses/{course_id}/catalogue/{assignment}")
+def read(
+    request: Request, here: Instructing, context: Context, assignment: Annotated[str, InPath(max_length=100)]
+) -> Response:
+    """What an assignment of the catalogue asks for, before it is taken into the course."""
+    found = find_in_catalogue(assignment)
+    with context.store.reading() as session:
+        taken = found.id in {each.assignment for each in open_assignments.of_course(session, here.course_id)}
+    return page(request, here.reader, "catalogue_entry.html", here=here, found=found, in_course=taken)

@@ -14,6 +14,7 @@ from service.store.courses import open_assignments, policies
 from service.store.models import Enrolment, SubmissionRow
 from service.store.states import Role
 from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.reader import find_in_catalogue
 from web import Web, grade_all, submit, words
 from zips import zipped
 
@@ -139,3 +140,15 @@ def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: Tes
     submit(grace, f"{HOME}/assignments", {"assignment": "lollipop"})
     assert "lollipop" not in found("q=lollipop")
     assert f'href="{HOME}/assignments/lollipop"' in grace.get(f"{path}?q=lollipop").text
+
+
+def test_an_assignment_of_the_catalogue_is_read_before_it_is_taken(web: Web, grace: TestClient) -> None:
+    path = f"{HOME}/catalogue/echo-responder"
+    assert f'href="{path}"' in grace.get(f"{HOME}/catalogue").text
+    asks = find_in_catalogue("echo-responder")
+    before = grace.get(path).text
+    assert all(criterion.title in words(before) for criterion in asks.criteria)
+    submit(grace, f"{HOME}/assignments", dict(re.findall(r'name="(assignment)" value="([^"]+)"', before)))
+    assert f'href="{HOME}/assignments/echo-responder"' in grace.get(path).text
+    assert 'name="assignment"' not in grace.get(path).text
+    assert grace.get(f"{HOME}/catalogue/nothing-like-this").status_code == 422
