@@ -145,7 +145,10 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
         for path in (
             batch,
             *of_batch,
-            *(f"{course}/{each}" for each in ("batches", "people", "catalogue", "assignments")),
+            *(
+                f"{course}/{each}"
+                for each in ("batches", "people", "catalogue", "catalogue/image-parser", "assignments")
+            ),
         ):
             narrow.goto(path)
             assert_in_order(narrow)
