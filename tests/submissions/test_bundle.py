@@ -177,9 +177,6 @@ def test_student_names_are_cleaned(name: str, clean: str) -> None:
     assert shown_name(name) == clean
 
 
-# Encodings
-
-
 @pytest.mark.parametrize(
     ("data", "text", "note"),
     [
@@ -205,9 +202,6 @@ def test_nul_and_huge_sources_are_refused(tmp_path: Path) -> None:
     assert "NUL character in line 2" in refusal(folder(tmp_path / "a", {"robot.py": b"x = 1\ny\0\n"}) / "robot.py")
     sentence = refusal(folder(tmp_path / "b", {"robot.py": b"#" * 1_100_000}) / "robot.py")
     assert "at most 1 MB" in sentence
-
-
-# What is not there, or is no submission
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
@@ -254,9 +248,6 @@ def test_folder_caps(tmp_path: Path) -> None:
     assert "32 MB in all" in refusal(path)
     many = folder(tmp_path / "many", {**BOTH, **{f"f{number}": "" for number in range(MAX_FILES)}})
     assert f"at most {MAX_FILES}" in refusal(many)
-
-
-# Hostile archives
 
 
 def test_zip_with_paths_that_lead_elsewhere_is_refused(tmp_path: Path) -> None:
@@ -361,9 +352,6 @@ def test_no_broken_zip_raises_anything_but_a_sentence(data: st.DataObject) -> No
     except UsageError as error:
         sentence = str(error)
     assert sentence.startswith("x.zip: ")
-
-
-# What the database keeps
 
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=60)

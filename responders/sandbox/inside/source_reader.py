@@ -135,9 +135,6 @@ class _Reading:
         return importlib.machinery.PathFinder.find_spec(top) is not None
 
 
-# what is run
-
-
 def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mention, SourcePlace]]:
     """What is mentioned by code that can be run at all; ``looped`` is true where a loop leads to it.
 
@@ -183,8 +180,6 @@ def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mentio
             if mention.live:
                 yield mention._replace(looped=way or mention.looped), place
 
-
-# rules
 
 #: Which kinds of mention answer a call, a module and a name.
 _USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}

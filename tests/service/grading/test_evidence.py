@@ -116,8 +116,6 @@ def test_what_does_not_do_what_was_asked_gets_little(
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
 
 
-# Images
-
 #: The middle of the left sensor, to the robot's right and ahead, as it is mounted.
 _LEFT = (-20.0, 30.0)
 
@@ -252,9 +250,6 @@ def test_one_place_gives_one_image_whatever_the_noise() -> None:
     assert still.marks == 1
     assert "3 repeat" in judged(criterion("collects", source="sent", classes=["square"]), collected(*[310] * 4)).message
     assert judged(asked, collected(306, 308, 310, 312)).marks == 4
-
-
-# What is dark, said, logged and answered
 
 
 def test_what_lies_beside_the_floor_is_nothing_to_come_upon() -> None:

@@ -15,9 +15,6 @@ def fault(verdict: Verdict, who: Any = "program", t: float = 2.0, line: int | No
     return Fault(t, verdict, who, "NameError: name 'x' is not defined", line)
 
 
-# finishes
-
-
 @pytest.mark.parametrize(
     ("verdict", "faults", "passes"),
     [
@@ -50,9 +47,6 @@ def test_finishing_late_and_what_is_said_of_a_fault() -> None:
         "In scenario s, from (100, 800) facing 0°, at 2.00 s: Expected the program to end by itself, but after 2.00 s: "
         "NameError: name 'x' is not defined (line 7)."
     )
-
-
-# prints and says
 
 
 @pytest.mark.parametrize(
@@ -113,9 +107,6 @@ def test_long_and_hostile_texts_are_shortened_and_do_not_hang() -> None:
     assert len(result.message) < 400
 
 
-# messages
-
-
 def test_messages_of_the_robot() -> None:
     run = recorded(messages=talk(("PY::0", "x"), ("IMG_DATA::{}", "y"), ("PY::2", None)))
     assert judged(criterion("messages", starts_with="PY::", in_order=["PY::0", "PY::2"], only=True), run).marks == 4
@@ -159,9 +150,6 @@ def test_queue_grows_only_by_json_that_arrives_in_order() -> None:
     assert judged(asked, recorded(messages=lost)).marks == 4
     both = criterion("messages", queue_grows=True, exactly=3)
     assert "exactly 3 times" in judged(both, recorded(messages=good)).message
-
-
-# replies
 
 
 @pytest.mark.parametrize(
@@ -236,9 +224,6 @@ def test_paths_and_values() -> None:
     assert same_value({"x": [1, None]}, {"x": [1.0, None]})
     assert not same_value({"x": 1}, {"x": 1, "y": 2})
     assert not same_value("1", 1)
-
-
-# pose
 
 
 @pytest.mark.parametrize(

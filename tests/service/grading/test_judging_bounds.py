@@ -35,8 +35,6 @@ from submissions.criteria import SCHEMAS
 from submissions.criteria.expressions import found_in, usable
 from submissions.submission import Submission
 
-# Texts that students choose
-
 #: What one text can hold at most that comes over the wire, in characters.
 _LONG = 60_000
 _TEXTS: Mapping[str, Sequence[str]] = {
@@ -190,9 +188,6 @@ def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunn
     assert not any(result.unjudged for result in graded.criteria)
 
 
-# Patterns that instructors choose
-
-
 @pytest.mark.parametrize(
     ("pattern", "reason"),
     [
@@ -247,9 +242,6 @@ def test_the_very_end_is_told_from_the_end_of_a_line() -> None:
 def test_patterns_are_tried_on_what_is_no_text() -> None:
     assert found_in("a\ud800b", "^a.b$", False)
     assert not found_in("a" * 60_000 + "!", usable(r"^(\w+\s?)+$"), False)
-
-
-# Judges that misbehave
 
 
 def _sleeps() -> None:
@@ -423,9 +415,6 @@ def test_a_grade_says_that_staff_have_to_look(
         "end": 1, "pattern": 1, "number": 0, "words": 1, "log": 0, "answers": 1,
     }  # fmt: skip
     assert graded.marks == Decimal(4)
-
-
-# What is drawn of it
 
 
 def test_of_one_message_only_the_first_calls_are_drawn() -> None:

@@ -109,9 +109,6 @@ def test_no_sentence_says_that_a_lost_text_was_never_sent() -> None:
     assert queue(asked(0, "PY::0", "chance"), equals="PY::0").marks == 4
 
 
-# resends
-
-
 def resent(*messages: Message, run: Recording | None = None, **keys: Any) -> CriterionResult:
     run = run or recorded(end_t=20.0)
     return judged(criterion("resends", over="mean", **keys), replace(run, messages=messages))
@@ -191,9 +188,6 @@ def test_which_messages_must_be_sent_again_can_be_said() -> None:
     assert resent(*messages, equals="PY::ask").marks == 4
 
 
-# in reach
-
-
 def test_in_reach() -> None:
     far, near, unlucky = asked(0, "PY::0", "out of range", **AWAY), asked(1, "PY::1"), asked(2, "PY::2", "chance")
     assert judged(criterion("in_reach"), recorded(messages=(near, unlucky))).marks == 4
@@ -201,9 +195,6 @@ def test_in_reach() -> None:
     assert judged(criterion("in_reach", misses=1), recorded(messages=(far, near))).marks == 4
     none = judged(criterion("in_reach"), recorded())
     assert (none.marks, "but it sent none" in none.message) == (0, True)
-
-
-# fresh answers
 
 
 def believed(*told: tuple[float, str], messages: tuple[Message, ...] = (), **keys: Any) -> CriterionResult:

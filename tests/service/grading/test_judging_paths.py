@@ -24,9 +24,6 @@ coordinates = st.floats(-500, 500, allow_nan=False).map(lambda value: round(valu
 points = st.tuples(coordinates, coordinates)
 
 
-# areas
-
-
 @given(points, st.floats(1, 300))
 @settings(deadline=None)
 def test_a_bar_without_length_is_a_circle(point: tuple[float, float], radius: float) -> None:
@@ -142,9 +139,6 @@ def test_touches() -> None:
     assert passes(criterion("touches_nothing", at_most=1), run)
 
 
-# closest
-
-
 @pytest.mark.parametrize(
     ("moves", "keys", "good"),
     [
@@ -160,9 +154,6 @@ def test_touches() -> None:
 )
 def test_closest(moves: Any, keys: dict[str, Any], good: bool) -> None:
     assert passes(criterion("closest", x=500, y=1000, **keys), driven(*moves)) is good
-
-
-# circuits
 
 
 @given(st.integers(1, 4), st.sampled_from((-1, 1)), st.floats(0.05, 0.9), points, st.floats(20, 300))
@@ -200,9 +191,6 @@ def loop(side: float, turn: float = 90, rounds_of_it: int = 1) -> list[Any]:
 )
 def test_circuits(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
     assert passes(criterion("circuits", x=250, y=950, **keys), driven(*moves)) is good
-
-
-# follows, laps
 
 
 def wavy(offset: float = 0.0, speed: float = 4.0) -> Any:
@@ -342,9 +330,6 @@ def test_named_lines_start_where_the_robots_start() -> None:
         assert round(y) == 46
     assert LineToFollow(on="Thruxton_Circuit").length() == pytest.approx(3850, rel=0.01)
     assert all(0 <= y <= 1143 for line in centrelines().values() for _, y in line)
-
-
-# hostile recordings
 
 
 @pytest.mark.parametrize(

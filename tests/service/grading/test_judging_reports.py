@@ -44,9 +44,6 @@ def lines(*texts: str, every: float = 1.0) -> tuple[Line, ...]:
     return tuple(Line(place * every, text) for place, text in enumerate(texts))
 
 
-# words and numbers
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -76,9 +73,6 @@ def test_words_without_case_and_punctuation(text: str, words: list[str]) -> None
 )
 def test_numbers_as_python_writes_them(text: str, values: list[float]) -> None:
     assert [token.value for token in tokens_of(text) if token.value is not None] == values
-
-
-# reports
 
 
 @pytest.mark.parametrize(
@@ -134,9 +128,6 @@ def test_label_of_the_floor_is_what_has_to_be_reported() -> None:
     assert judged(asked, wrong, poses=(start,)).marks == 0
 
 
-# sequence
-
-
 @pytest.mark.parametrize(
     ("keys", "said", "marks"),
     [
@@ -171,8 +162,6 @@ def test_nothing_is_said_before_the_word_before_has_been_spoken() -> None:
     assert "while it was still speaking" in hurried.message
 
 
-# events
-
 BANDS = [{"text": "1", "zone": [120, 700, 140, 900]}, {"text": ["2", "two"], "zone": [160, 700, 180, 900]}]
 
 
@@ -190,9 +179,6 @@ def test_each_event_happens_at_its_place(times: tuple[float, ...], marks: int) -
 def test_margin_widens_every_zone() -> None:
     said = (Line(0.1, "1"), Line(2.0, "2"))
     assert judged(criterion("events", events=BANDS, margin=15), recorded(spoken=said)).marks == 4
-
-
-# stop on
 
 
 @pytest.mark.parametrize(
@@ -225,9 +211,6 @@ def test_a_program_that_is_still_running_has_not_stopped(verdict: Verdict, marks
 
 def test_a_robot_without_a_tick_has_not_stopped_on_anything() -> None:
     assert judged(criterion("stop_on", reflected=[0, 5]), recorded(seconds=0, rgb=(0, 0, 0))).marks == 0
-
-
-# datalog
 
 
 def series(*values: float, name: str = "Light_left", timed: bool = True) -> tuple[Datum, ...]:
@@ -301,9 +284,6 @@ def test_one_series_dips_below_another_and_samples_have_times() -> None:
     assert not judged(criterion("datalog", series="Light_left", timed=True), untimed).marks
 
 
-# image log
-
-
 def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tuple[str, str, int]:
     """What the sensor sees at ``pose`` on sheet 34, from the image itself."""
     drawn = floor("MNIST_Digits", seed=34).pixels
@@ -354,9 +334,6 @@ def test_image_log_without_images_has_no_marks() -> None:
     assert "there is none" in result.message
 
 
-# time and ranks
-
-
 def test_time_of_program_movement_and_speech() -> None:
     run = recorded(spoken=lines("one two", every=1))
     assert judged(criterion("timing", between=[2.9, 3.1]), run).marks == 4
@@ -391,9 +368,6 @@ def test_figure_of_another_criterion_is_worth_marks_by_steps(
 
     assert marks_of(recorded()) == marks
     assert marks_of(recorded(verdict=Verdict.TIME_LIMIT)) == 0
-
-
-# what cannot be asked
 
 
 @pytest.mark.parametrize(

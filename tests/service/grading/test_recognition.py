@@ -89,9 +89,6 @@ def accuracy(result: CriterionResult) -> Accuracy:
     return result.accuracy
 
 
-# What becomes of an image
-
-
 @pytest.mark.parametrize(
     ("answers", "status", "duplicates"),
     [
@@ -194,9 +191,6 @@ def test_the_counts_add_up(driven: list[Recording], keys: dict[str, Any]) -> Non
     assert 0 <= found.low <= found.value <= found.high <= 1
     numbers = [int(word) for word in recognition_table(result).sums.split() if word.isdecimal()]
     assert numbers[0] == sum(numbers[1:5])
-
-
-# Where the truth comes from
 
 
 def test_the_grey_patch_can_be_the_truth() -> None:
@@ -346,9 +340,6 @@ def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
     (tmp_path / "drive_over_shapes.py").write_text("")
     with pytest.raises(AssignmentProblems, match="scenarios names every scenario, expected one whose images"):
         read_assignment(tmp_path)
-
-
-# Confidence, steps, patterns, classes
 
 
 def test_confidence_is_averaged_apart_for_right_and_wrong() -> None:

@@ -207,9 +207,6 @@ def _model(table: Mapping[str, str]) -> Submission:
     return Submission("s", None, Code("responder.py", TRAINS.replace("{table!r}", repr(packed))))
 
 
-# What a child may know
-
-
 SHOWS = """
 import os, random, uuid
 print("PY::", random.random(), os.urandom(4).hex(), uuid.getnode())

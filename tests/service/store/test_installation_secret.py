@@ -161,9 +161,6 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert 0 in here["told"](), kept
 
 
-# Commands
-
-
 def _seeds(home: Path, **environment: Any) -> list[int]:
     ended = robomark("grade", ECHO, "-a", "echo-responder", "--format", "json", ROBOMARK_HOME=str(home), **environment)
     assert ended.returncode == 0, ended.stderr
