@@ -64,6 +64,7 @@ class ServiceShape(Shape):
     findings: list[FindingShape]
     tryouts: TryoutLaneShape
     dead: int = Field(description="Jobs that could not be graded.")
+    host_faults: int = Field(description="Attempts that ended through no fault of a student's, of all jobs.")
     paused_batches: int
 
     model_config = like(
@@ -73,6 +74,7 @@ class ServiceShape(Shape):
         findings=[{"what": "database", "well": True, "sentence": "answers"}],
         tryouts={"queued": 0, "running": 1, "oldest_seconds": 0.0},
         dead=0,
+        host_faults=0,
         paused_batches=0,
     )
 
@@ -185,6 +187,7 @@ def service(_operator: Reads, context: Context) -> ServiceShape:
         findings=[FindingShape.model_validate(finding) for finding in findings],
         tryouts=TryoutLaneShape.model_validate(tried),
         dead=dead,
+        host_faults=found.host_faults,
         paused_batches=found.paused_batches,
     )
 
