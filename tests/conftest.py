@@ -24,6 +24,11 @@ settings.load_profile("robomark")
 gc.disable()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes longest begins first: begun last it would keep all others waiting on one processor."""
+    items.sort(key=lambda item: item.get_closest_marker("longest") is None)
+
+
 def pytest_collection_finish() -> None:
     """Garbage is looked for in what tests make, where much of it is to be had, and no longer among the tests."""
     gc.freeze()
