@@ -25,7 +25,7 @@ gc.disable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes longest begins first: begun last it would keep all others waiting on one processor."""
+    """What takes longest begins first: begun last, all would wait for it while a processor is idle."""
     items.sort(key=lambda item: item.get_closest_marker("longest") is None)
 
 

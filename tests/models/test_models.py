@@ -46,9 +46,8 @@ def test_every_task_is_packaged_and_nothing_else_is() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.longest] * (name == "digits-cnn"), id=name) for name in tasks()]
-)
+@pytest.mark.longest
+@pytest.mark.parametrize("name", tasks())
 def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: Path) -> None:
     about = train(name, tmp_path)
     assert (tmp_path / about.file).read_bytes() == weights_bytes(name)
