@@ -14,9 +14,11 @@ from typing import TypeVar
 import structlog
 from sqlalchemy.exc import DBAPIError
 
+from service.grading.grade import Grade
 from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
 from service.plotting import draw
+from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.batches import intake
 from service.store.engine import Store
@@ -29,8 +31,6 @@ from sim.recording import Verdict
 
 _log = structlog.get_logger(__name__)
 Result = TypeVar("Result")
-#: Whoever waits sees progress so often, however long the lease.
-_PROGRESS_SECONDS = 2.0
 
 
 class JobOutcome(Enum):
@@ -87,13 +87,36 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if jobs.finish_from_cache(store, claim):
         _log.info("job.copied")
         return
-    watch = _LeaseKeeper(store, settings, claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
-    graded = grade(
-        grading_request.submission, grading_request.assignment, secret=secret_of(store), observe=watch, runner=runner
-    )
-    graded_at = watch.now()
+    progress = _Progress(claim)
+    with LeaseKeeper(
+        lambda: jobs.heartbeat(store, claim, settings.lease_seconds, progress.share),
+        settings.lease_seconds,
+        settings.job_seconds,
+    ) as keeper:
+
+        def observe(told: GradingProgress) -> None:
+            progress.saw(told)
+            keeper.check()
+
+        graded = grade(
+            grading_request.submission,
+            grading_request.assignment,
+            secret=secret_of(store),
+            observe=observe,
+            runner=runner,
+        )
+        graded_at = progress.now()
+        _refuse_broken(graded)
+        prepared = results.prepare(graded)
+    # The work is done: a database that is away for a moment must not lose it.
+    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, progress.trials_at), settings.lease_seconds)
+    _log.info("job.graded", verdict=graded.verdict.value, seconds=round(progress.seconds, 3))
+
+
+def _refuse_broken(graded: Grade) -> None:
+    """Raises HostError where this machine, and not the student, ended a trial; what could not be judged is logged."""
     for result in graded.criteria:
         if result.unjudged:
             _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
@@ -101,21 +124,15 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if broken is not None:
         faults = faults_of(broken.recording)
         raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
-    prepared = results.prepare(graded)
-    # The work is done: a database that is away for a moment must not lose it.
-    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, watch.trials_at), settings.lease_seconds)
-    _log.info("job.graded", verdict=graded.verdict.value, seconds=round(watch.seconds, 3))
 
 
-class _LeaseKeeper:
-    """Keeps a job's lease while it is graded, and stops the grading when the lease is lost or time is up."""
+class _Progress:
+    """How far the grading of a job has come since its claim."""
 
-    def __init__(self, store: Store, settings: Settings, claim: jobs.Claim) -> None:
-        self._store = store
-        self._settings = settings
-        self._claim = claim
+    def __init__(self, claim: jobs.Claim) -> None:
+        self._claimed_at = claim.at
         self._begun = time.monotonic()
-        self._kept = self._begun
+        self.share = 0.0
         self.trials_at: datetime | None = None  # when the last trial had been run
 
     @property
@@ -125,24 +142,13 @@ class _LeaseKeeper:
 
     def now(self) -> datetime:
         """By the database's clock: this machine's own may be wrong."""
-        return self._claim.at + timedelta(seconds=self.seconds)
+        return self._claimed_at + timedelta(seconds=self.seconds)
 
-    def __call__(self, progress: GradingProgress, /) -> None:
-        moment = time.monotonic()
-        if progress.trials_done >= progress.trials and self.trials_at is None:
+    def saw(self, told: GradingProgress) -> None:
+        """Take in how many trials are done."""
+        self.share = told.trials_done / max(1, told.trials)
+        if told.trials_done >= told.trials and self.trials_at is None:
             self.trials_at = self.now()
-        if moment - self._begun > self._settings.job_seconds:
-            raise HostError(f"grading took longer than {self._settings.job_seconds:.0f} s")
-        if moment - self._kept < min(self._settings.lease_seconds / 3, _PROGRESS_SECONDS):
-            return
-        share = progress.trials_done / max(1, progress.trials)
-        try:
-            jobs.heartbeat(self._store, self._claim, self._settings.lease_seconds, share)
-        except DBAPIError as error:
-            # The next heartbeat tries again; should the lease run out meanwhile, the token tells.
-            _log.warning("heartbeat.failed", error=str(error))
-        else:
-            self._kept = moment
 
 
 def _persistent(change: Callable[[], Result], seconds: float) -> Result:

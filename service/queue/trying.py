@@ -5,12 +5,10 @@ Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
 
 from __future__ import annotations
 
-import time
-
 import structlog
 
-from service.grading.grader import GradingProgress
 from service.grading.trial_runner import TrialRunner
+from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.courses.versions import assignment_from_bytes
 from service.store.engine import Store
@@ -51,24 +49,13 @@ def _run(store: Store, settings: Settings, runner: TrialRunner, claimed: TryoutC
     once = tryout_assignment(assignment)
     if once is None:
         raise UsageError(f"{assignment.id} has nothing to try: no robot is run that you see.")
-    result = run_tryout(unpack_submission(packed), once, runner, _LeaseOfTryout(store, settings, claimed))
+
+    def renew() -> None:
+        if not tryouts.keep(store, claimed, settings.lease_seconds):
+            raise Cancelled("another worker has it")
+
+    with LeaseKeeper(renew, settings.lease_seconds, settings.job_seconds) as keeper:
+        result = run_tryout(unpack_submission(packed), once, runner, lambda _: keeper.check())
     if result.verdict is Verdict.HOST_ERROR:
         raise HostError("a trial ended by a fault of the machine")
     tryouts.finish(store, claimed, result.words, result.replay)
-
-
-class _LeaseOfTryout:
-    """Keeps the lease while a program runs, and stops it when the lease is lost."""
-
-    def __init__(self, store: Store, settings: Settings, claimed: TryoutClaim) -> None:
-        self._store = store
-        self._seconds = settings.lease_seconds
-        self._claimed = claimed
-        self._kept = time.monotonic()
-
-    def __call__(self, progress: GradingProgress, /) -> None:
-        if time.monotonic() - self._kept < self._seconds / 3:
-            return
-        if not tryouts.keep(self._store, self._claimed, self._seconds):
-            raise Cancelled("another worker has it")
-        self._kept = time.monotonic()
