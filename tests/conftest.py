@@ -16,8 +16,11 @@ from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from service.store.engine import Store
 
-# Two cores are shared with whatever else runs: how long an example takes says nothing.
-settings.register_profile("robomark", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# Two cores are shared with whatever else runs: how long an example takes says nothing. And one checkout has one answer;
+# what has not been tried yet is for whoever searches.
+_PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("robomark", _PATIENT, derandomize=True)
+settings.register_profile("search", _PATIENT, max_examples=1000)
 settings.load_profile("robomark")
 
 # To find thousands of tests throws little away, and to look through them again and again is a third of what it costs.
