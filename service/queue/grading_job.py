@@ -87,9 +87,9 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     if jobs.finish_from_cache(store, claim):
         _log.info("job.copied")
         return
+    progress = _Progress(claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
-    progress = _Progress(claim)
     with LeaseKeeper(
         lambda: jobs.heartbeat(store, claim, settings.lease_seconds, progress.share),
         settings.lease_seconds,
@@ -108,6 +108,9 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
             runner=runner,
         )
         graded_at = progress.now()
+        for result in graded.criteria:
+            if result.unjudged:
+                _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
         _refuse_broken(graded)
         prepared = results.prepare(graded)
     # The work is done: a database that is away for a moment must not lose it.
@@ -116,10 +119,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
 
 
 def _refuse_broken(graded: Grade) -> None:
-    """Raises HostError where this machine, and not the student, ended a trial; what could not be judged is logged."""
-    for result in graded.criteria:
-        if result.unjudged:
-            _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
+    """Raises HostError where this machine, and not the student, ended a trial."""
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
         faults = faults_of(broken.recording)

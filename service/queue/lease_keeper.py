@@ -9,7 +9,6 @@ import os
 import time
 from collections.abc import Callable
 from threading import Event, Lock, Thread
-from types import TracebackType
 from typing import Self
 
 import structlog
@@ -34,23 +33,16 @@ class LeaseKeeper:
         self._renew = renew
         self._every = min(lease_seconds / 3, _PROGRESS_SECONDS)
         self._most = most_seconds
-        self._begun = time.monotonic()
+        self._until = time.monotonic() + most_seconds
         self._ended = Event()
         self._lost: Cancelled | None = None
         self._thread = Thread(target=self._run, name="lease keeper", daemon=True)
-
-    @property
-    def seconds(self) -> float:
-        """Since it was made."""
-        return time.monotonic() - self._begun
 
     def __enter__(self) -> Self:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
 
@@ -58,20 +50,20 @@ class LeaseKeeper:
         """Raises Cancelled when the lease is lost, HostError when all has taken too long."""
         if self._lost is not None:
             raise self._lost
-        if self.seconds > self._most:
+        if time.monotonic() > self._until:
             raise HostError(f"it took longer than {self._most:.0f} s")
 
     def _run(self) -> None:
         # What hangs for good must not be held for good.
-        while not self._ended.wait(self._every) and self.seconds <= self._most:
-            try:
-                with _renewing:
+        while not self._ended.wait(self._every) and time.monotonic() <= self._until:
+            with _renewing:
+                try:
                     self._renew()
-            except Cancelled as lost:
-                self._lost = lost
-                return
-            except DBAPIError as error:
-                # The next renewal tries again; should the lease run out meanwhile, the token tells.
-                _log.warning("heartbeat.failed", error=str(error))
-            except Exception:
-                _log.exception("heartbeat.failed")
+                except Cancelled as lost:
+                    self._lost = lost
+                    return
+                except DBAPIError as error:
+                    # The next renewal tries again; should the lease run out meanwhile, the token tells.
+                    _log.warning("heartbeat.failed", error=str(error))
+                except Exception:
+                    _log.exception("heartbeat.failed")

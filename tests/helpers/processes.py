@@ -16,7 +16,7 @@ PATIENCE = 120
 COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 
 
-def until(look: Callable[[], Found], what: str = "it does not come") -> Found:
+def until(look: Callable[[], Found | None], what: str = "it does not come") -> Found:
     """The first thing that ``look`` finds which is true."""
     begun = time.monotonic()
     while not (found := look()):

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import pytest
 
 from benchmarks.harness.process_tree import command_line
 from paths import HELPERS
+from processes import alive, until
 from responders.sandbox import zygote
 from responders.sandbox.meter import JobMeter
 from running import run_program
@@ -56,20 +56,20 @@ def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder:
     )
     try:
         # Two zygotes, and a child of each.
-        _wait_until(lambda: len(_descendants(worker.pid)) >= 4)
+        until(lambda: len(_descendants(worker.pid)) >= 4)
         # In this order: a zygote that starts in between is killed with the others.
         family = _descendants(worker.pid)
         zygotes = _children(worker.pid)
         if killed == "worker":
             worker.kill()
             worker.wait()
-            _wait_until(lambda: not any(_alive(pid) for pid in family))
+            until(lambda: not any(alive(pid) for pid in family))
         else:
             for zygote in zygotes:
                 # A worker that has lost one may end, and take the others along, before they are reached.
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(zygote, signal.SIGKILL)
-            _wait_until(lambda: not any(_alive(pid) for pid in family))
+            until(lambda: not any(alive(pid) for pid in family))
     finally:
         worker.kill()
         worker.wait()
@@ -86,16 +86,16 @@ def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> Non
             zygote = next(iter(_children(zygote)), zygote)
 
         def kill() -> None:
-            if _alive(zygote):
+            if alive(zygote):
                 os.kill(zygote, signal.SIGKILL)
 
         again = run_program(runner, "sum(range(10**7)); print(1)", meter=JobMeter(heartbeat=kill))
-        assert not _alive(zygote)
+        assert not alive(zygote)
         assert (again.verdict, again.sha256) == (Verdict.FINISHED, honest.sha256)
         (zygote,) = _zygotes(os.getpid()) - others
         family = {zygote, *_descendants(zygote)}
         os.kill(zygote, signal.SIGKILL)
-        _wait_until(lambda: not any(_alive(pid) for pid in family))
+        until(lambda: not any(alive(pid) for pid in family))
         assert run_program(runner, "print(1)").sha256 == honest.sha256
 
 
@@ -158,22 +158,6 @@ def _descendants(pid: int) -> set[int]:
     while more := {child for child, parent in parents if parent in found} - found:
         found |= more
     return found - {pid}
-
-
-def _alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-def _wait_until(condition: object, seconds: float = 30) -> None:
-    """A second is what is promised; a busy machine gets longer."""
-    assert callable(condition)
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.01)
 
 
 def test_what_children_import_is_compiled_once_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,12 +8,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Thread
-from typing import TypeVar
 
 import pytest
 from sqlalchemy import select
@@ -22,6 +21,7 @@ import false_worker
 import report_builders
 import sim.robot
 from builders import grading_request, settings_in
+from processes import until
 from responders.trial_spec import ProgramSpec, ResponderSpec
 from service.grading.grade import Grade
 from service.grading.grader import grade
@@ -49,7 +49,6 @@ MOVE = (
     "from ev3dev2.motor import MoveTank, OUTPUT_B, OUTPUT_C, SpeedPercent\n"
     "MoveTank(OUTPUT_B, OUTPUT_C).on_for_seconds(SpeedPercent(30), SpeedPercent({speed}), 0.5)\n"
 )
-T = TypeVar("T")
 
 
 def _take(store: Store, *students: str) -> str:
@@ -206,9 +205,9 @@ def test_a_process_looks_while_nobody_asks_it_to(store: Store, runner: TrialRunn
     watch = Watch(store, runner, "machine-1", 1.0)
     watch.keep_looking()
     try:
-        _until(lambda: _last_right(store))
+        until(lambda: _last_right(store))
         first = _last_right(store)
-        _until(lambda: _last_right(store) != first)
+        until(lambda: _last_right(store) != first)
     finally:
         watch.end()
 
@@ -263,14 +262,6 @@ def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) ->
         jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
 
 
-def _until(look: Callable[[], T | None], seconds: float = 120) -> T:
-    begun = time.monotonic()
-    while not (found := look()):
-        assert time.monotonic() - begun < seconds, "it does not come"
-        time.sleep(0.1)
-    return found
-
-
 @contextmanager
 def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subprocess.Popen[bytes]]:
     environment = {**os.environ, **settings.environment(), **more}
@@ -303,17 +294,17 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
 
         with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
             before = submit(range(10, 13))
-            _until(lambda: _unfinished(store) == 0)
+            until(lambda: _unfinished(store) == 0)
             vouched = _last_right(store)
             # Its next look is then some seconds away.
-            _until(lambda: _last_right(store) != vouched)
+            until(lambda: _last_right(store) != vouched)
             switch.touch()
             time.sleep(0.3)
             spoilt = submit(range(20, 24))
-            _until(lambda: any(_job(store, one).suspect for one in spoilt), seconds=60)
+            until(lambda: any(_job(store, one).suspect for one in spoilt))
             assert wrong.wait(timeout=60) == QUARANTINED
         with _worker(broker.settings, "-m", "service.queue.worker"):
-            _until(lambda: _caught_up(notifier, store))
+            until(lambda: _caught_up(notifier, store))
         with store.reading() as session:
             differs = 0
             for job_id in [*before, *spoilt]:

@@ -6,7 +6,7 @@ import fcntl
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from sqlalchemy import func, select
 from benchmarks.harness.postgresql_server import fresh_database
 from benchmarks.harness.process_tree import children, command_line, descendants
 from builders import comparable, grading_request, settings_in
-from processes import until
+from processes import PATIENCE, until
 from service.commands.batch.waiting import Waiting
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -42,7 +42,6 @@ from submissions.grading_request import GradingRequest
 
 #: Costs its whole limit of processor time, so that something can be killed while it runs.
 SPIN = "print('begun')\nwhile True:\n    pass\n"
-PATIENCE = 120
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Service:
 
     def until_running(self, batch: str) -> Job:
         """A job of the batch that a worker has in hand."""
-        return _until(lambda: next((job for job in self.jobs(batch) if job.state is JobState.RUNNING), None))
+        return until(lambda: next((job for job in self.jobs(batch) if job.state is JobState.RUNNING), None))
 
     def assert_graded_once(self, batch: str) -> None:
         with self.store.reading() as session:
@@ -98,21 +97,6 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     settings = settings_in(tmp_path_factory.mktemp("home"), concurrency=1, lease_seconds=6.0)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         yield Service(settings, store, services)
-
-
-def _until(look: Callable[[], Job | int | None]) -> Job:
-    begun = time.monotonic()
-    while (found := look()) is None:
-        assert time.monotonic() - begun < PATIENCE, "it does not come"
-        time.sleep(0.05)
-    return found  # type: ignore[return-value]
-
-
-def _alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def _pool_children(worker: int) -> list[int]:
@@ -217,7 +201,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         busy = until(lambda: [pid for pid in _pool_children(worker) if _has_student(pid)])
         for pid in busy:
             os.kill(pid, signal.SIGSTOP)
-        _until(lambda: next((found for found in service.jobs(batch) if found.attempt == 2), None))
+        until(lambda: next((found for found in service.jobs(batch) if found.attempt == 2), None))
         for pid in busy:
             os.kill(pid, signal.SIGCONT)
         service.wait(batch)
